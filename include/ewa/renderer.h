@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures and gradients of a fixed splat scene.
+// Renders and gradients of a fixed splat scene.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -40,16 +40,16 @@ class Renderer {
 
     /// The colour alone, as 8-bit RGBA: rounded and clamped as save_image does it. What a window shows: the
     /// floating-point planes stay on the device. Drawing::color or ellipsoids. The reference holds until the
-    /// next picture.
+    /// next render.
     const std::vector<uint8_t>& render_bytes(const Camera& camera, const DrawOptions& options);
 
     /// Another scene in place of the present one, with the kernels that there are. Throws as the constructor
     /// does; the renderer then has no splats.
     void replace(const Gaussians& gaussians);
 
-    /// Splats skipped in the last picture because a stored value is not finite or the quaternion is zero.
+    /// Splats skipped in the last render because a stored value is not finite or the quaternion is zero.
     uint32_t skipped_nonfinite() const;
-    /// Splats that reach a pixel's tile in the last picture that was drawn with DrawOptions.
+    /// Splats that reach a pixel's tile in the last render with DrawOptions.
     uint32_t splats_drawn() const;
     std::vector<PassTime> pass_times() const;  // of the last frame
 

@@ -27,7 +27,7 @@ void set_sh_degree(Gaussians& gaussians, int degree);
 /// Footprint::density, these are fitted to the other kernels.
 void append_splats(Gaussians& gaussians, const Gaussians& more);
 
-/// Converts the opacities to those of Footprint::density, or from them to those of the other kernels, so that pictures
+/// Converts the opacities to those of Footprint::density, or from them to those of the other kernels, so that renders
 /// look about the same. Does nothing if Gaussians::density says that they are of that kind. Exact to float32 when it is
 /// undone.
 void fit_opacities(Gaussians& gaussians, bool density);

@@ -67,7 +67,7 @@ class Trainer {
 
     /// The splats, read back from the device. Their order is the trainer's own.
     Gaussians gaussians() const;
-    /// Pictures of the splats as they are, without exposures: those that a Renderer of gaussians() draws. Every rank draws
+    /// Renders of the splats as they are, without exposures: those that a Renderer of gaussians() draws. Every rank draws
     /// some of them. Throws InputError if the splats are points.
     std::vector<Image> render(std::span<const Camera> cameras) const;
     uint32_t splats() const;

@@ -24,7 +24,7 @@ void main() {
     const uint row_texels = push.image.stride / 4u, plane = push.image.plane_floats / 4u, channel = gl_WorkGroupID.z;
     const uint row_items = (row_texels + LOSS_TEXELS - 1u) / LOSS_TEXELS;
     const bool inside = item < row_items * push.image.size[1];
-    // Differences in other rows than the picture's own belong to another band.
+    // Differences in other rows than the band's own belong to another band.
     const bool counts = inside && item >= row_items * push.own[0] && item < row_items * push.own[1];
     const float l1_scale = counts ? push.l1_scale : 0.0;
     const int row = int(item / row_items) * int(row_texels), first = int(item % row_items * LOSS_TEXELS);

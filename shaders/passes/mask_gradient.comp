@@ -1,6 +1,6 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Gradient of mask_pictures: dL/d(image) times the pixel's weight.
+// Gradient of mask_images: dL/d(image) times the pixel's weight.
 // One invocation owns one pixel. It reads the weight from the training image's alpha, and updates dL/d(image) in place.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"

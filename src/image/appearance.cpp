@@ -171,15 +171,15 @@ std::vector<float> ColorGrid::identity_cells() {
     return cells;
 }
 
-Image exposed(Image picture, const Exposure& exposure) {
-    for (size_t p = 0; p < picture.pixels.size(); p += size_t(picture.channels)) {
-        float* color = &picture.pixels[p];
+Image exposed(Image image, const Exposure& exposure) {
+    for (size_t p = 0; p < image.pixels.size(); p += size_t(image.channels)) {
+        float* color = &image.pixels[p];
         const float r = color[0], g = color[1], b = color[2];
         for (size_t c = 0; c < 3; ++c)
             color[c] =
                 exposure[4 * c] * r + exposure[4 * c + 1] * g + exposure[4 * c + 2] * b + exposure[4 * c + 3];
     }
-    return picture;
+    return image;
 }
 
 Image with_appearance(Image image, const Appearance& appearance) {

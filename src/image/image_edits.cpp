@@ -86,7 +86,7 @@ Image with_alpha(const Image& color, const Image& alpha) {
 Image oriented(const Image& image, int orientation) {
     assert(orientation >= 1 && orientation <= 8);
     if (orientation == 1) return image;
-    // EXIF 2.32, tag 274: where the first row and column of the stored picture are in the upright one.
+    // EXIF 2.32, tag 274: where the first row and column of the stored image are in the upright one.
     const bool swapped = orientation >= 5;
     const bool from_right = orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8;
     const bool from_bottom = orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7;

@@ -65,11 +65,11 @@ constexpr uint64_t kMaxChannels = 1024;
 constexpr uint64_t kMaxDecodedBytes = uint64_t(4) << 30;
 /// Codecs hold several whole tiles in memory.
 constexpr uint64_t kMaxTilePixels = 4096 * 4096;
-/// A decoder visits the whole picture once for each scan of a progressive JPEG. Encoders write about ten
+/// A decoder visits the whole image once for each scan of a progressive JPEG. Encoders write about ten
 /// scans.
 constexpr int kMaxJpegScans = 100;
-/// A picture that takes more bytes than this, as floats, must come from a file of at least one
-/// kMaxCompression-th of its size. Even pictures of a single colour compress less in every format.
+/// An image that takes more bytes than this, as floats, must come from a file of at least one
+/// kMaxCompression-th of its size. Even images of a single colour compress less in every format.
 constexpr uint64_t kUncheckedBytes = uint64_t(256) << 20;
 constexpr uint64_t kMaxCompression = 5000;
 
@@ -78,7 +78,7 @@ struct ImageHeader {
     uint64_t bytes_per_value = 1;
 };
 
-/// Throws where the picture is empty, beyond a limit, or too large to come from a file of `file_bytes`.
+/// Throws where the image is empty, beyond a limit, or too large to come from a file of `file_bytes`.
 void check_limits(const ImageHeader& header, uint64_t file_bytes);
 
 /// Pixels with the channels that the file has: grey, grey and alpha, RGB, or RGBA.

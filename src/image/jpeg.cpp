@@ -95,7 +95,7 @@ class JpegReader {
         }
     }
 
-    /// Each scan costs a pass over the whole picture, however few bytes it has.
+    /// Each scan costs a pass over the whole image, however few bytes it has.
     static void on_progress(j_common_ptr jpeg) {
         if (reinterpret_cast<j_decompress_ptr>(jpeg)->input_scan_number <= kMaxJpegScans) return;
         std::snprintf(self(jpeg).message_, sizeof(self(jpeg).message_), "the JPEG has more than %d scans",

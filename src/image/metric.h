@@ -12,7 +12,7 @@ namespace ewa::image {
 /// Channels that are compared: RGB, without alpha. Throws InputError.
 int compared_channels(const Image& a, const Image& b);
 /// The number of pixels, each with its weight. Throws InputError if the weights have another size.
-double weight_sum(const Image& weights, const Image& picture);
+double weight_sum(const Image& weights, const Image& image);
 
 inline double weight_at(const Image& weights, int x, int y) {
     return weights.pixels.empty() ? 1.0 : double(*weights.at(x, y));

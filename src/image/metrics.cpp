@@ -22,9 +22,9 @@ int compared_channels(const Image& a, const Image& b) {
     return channels;
 }
 
-double weight_sum(const Image& weights, const Image& picture) {
-    if (weights.pixels.empty()) return double(picture.width) * picture.height;
-    if (weights.width != picture.width || weights.height != picture.height || weights.channels != 1)
+double weight_sum(const Image& weights, const Image& image) {
+    if (weights.pixels.empty()) return double(image.width) * image.height;
+    if (weights.width != image.width || weights.height != image.height || weights.channels != 1)
         throw InputError("the weights of a picture have another size");
     double sum = 0;
     for (const float weight : weights.pixels) sum += double(weight);
@@ -108,7 +108,7 @@ double psnr(const Image& a, const Image& b, const Image& weights) {
 }
 
 ImageDifference compare_images(const Image& a, const Image& b, double tolerance) {
-    const double of_colours = psnr(a, b);  // refuses pictures that cannot be compared
+    const double of_colours = psnr(a, b);  // refuses images that cannot be compared
     ImageDifference out =
         a.channels == 3 && b.channels == 4   ? compare_values(with_opaque_alpha(a), b, tolerance)
         : a.channels == 4 && b.channels == 3 ? compare_values(a, with_opaque_alpha(b), tolerance)

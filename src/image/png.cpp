@@ -97,7 +97,7 @@ class PngReader {
 
     void read_values(StoredImage& image) {
         const size_t row = png_get_rowbytes(png_, info_), height = size_t(image.size.height);
-        // The passes of an interlaced picture need all rows at once.
+        // The passes of an interlaced image need all rows at once.
         const bool interlaced = png_get_interlace_type(png_, info_) != PNG_INTERLACE_NONE;
         std::vector<png_byte> bytes(row * (interlaced ? height : 1));
         std::vector<png_bytep> rows;

@@ -108,7 +108,7 @@ class Directory {
     std::map<uint64_t, Entry> entries_;
 };
 
-/// Strips are tiles of the picture's width.
+/// Strips are tiles of the image's width.
 struct Parts {
     uint64_t width = 0, height = 0;
     bool tiles = false;

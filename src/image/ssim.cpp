@@ -46,7 +46,7 @@ void clear(Moments& moments, int width) {
     for (auto& moment : moments) moment.assign(size_t(width), 0.0);
 }
 
-/// A row of one channel of both pictures, with zeros beyond its ends.
+/// A row of one channel of both images, with zeros beyond its ends.
 struct Rows {
     std::vector<double> a, b;
 };
@@ -79,7 +79,7 @@ void read_rows(const Image& a, const Image& b, int y, int channel, Rows& rows) {
 }
 
 /// Calls at(x, y, moments) for each pixel of a channel. Only the rows under the window are in memory, however tall the
-/// picture.
+/// image.
 template <class At>
 void for_windows(const Image& a, const Image& b, int channel, const std::array<double, kTaps>& taps,
                  const At& at) {

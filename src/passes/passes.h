@@ -333,13 +333,13 @@ struct UnpackTarget {
 
 /// Unpacks a masked training image, and moves a copy of the render towards it where pixels count less.
 /// Variant: SPEC_COLOR_FLOATS.
-struct MaskPictures {
-    static constexpr char shader[] = "mask_pictures";
+struct MaskImages {
+    static constexpr char shader[] = "mask_images";
     using Work = PerElement<pixels<shared::MaskPush>>;
     gpu::BufferPart photo, image, target, masked;
 };
 
-/// Gradient of MaskPictures, in place. Variant: SPEC_COLOR_FLOATS.
+/// Gradient of MaskImages, in place. Variant: SPEC_COLOR_FLOATS.
 struct MaskGradient {
     static constexpr char shader[] = "mask_gradient";
     using Work = PerElement<pixels<shared::MaskPush>>;

@@ -156,7 +156,7 @@ void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse*
     if (appearance) apply_appearance(*appearance);
     if (masked)
         record(
-            passes::MaskPictures{
+            passes::MaskImages{
                 .photo = photo, .image = render, .target = frame.target, .masked = frame.masked},
             mask, colors);
     else

@@ -87,7 +87,7 @@ Band band_of(const passes::KernelConfig& config, uint32_t height, uint32_t bands
     const auto border = [&](uint32_t b) {
         return std::min(uint32_t(uint64_t(tile_rows) * b / bands) * tile, height);
     };
-    // A value of SSIM depends on the picture up to SSIM_RADIUS rows away. Its gradient goes to those rows of the same band.
+    // A value of SSIM depends on the image up to SSIM_RADIUS rows away. Its gradient goes to those rows of the same band.
     const uint32_t halo = (shared::SSIM_RADIUS + tile - 1) / tile * tile;
     const uint32_t begin = border(band), end = border(band + 1);
     const uint32_t first = begin - std::min(begin, halo), last = std::min(end + halo, height);

@@ -19,11 +19,11 @@ struct CameraUse {
     uint32_t width = 0, height = 0;       // px
 };
 
-/// Rows of a view that a picture shows. The loss counts some of them: the others are a halo, which the windows of SSIM reach.
+/// Rows of a view that a render shows. The loss counts some of them: the others are a halo, which the windows of SSIM reach.
 struct Band {
-    uint32_t first = 0;                   // row of the view that is the picture's first
-    uint32_t rows = 0;                    // of the picture; 0: it shows the whole view
-    uint32_t own_begin = 0, own_end = 0;  // of the picture's rows, those that count
+    uint32_t first = 0;                   // row of the view that is the render's first
+    uint32_t rows = 0;                    // of the render; 0: it shows the whole view
+    uint32_t own_begin = 0, own_end = 0;  // of the render's rows, those that count
 };
 
 struct FrameInputs {

@@ -71,7 +71,7 @@ struct Plan {
     uint32_t evaluated_degree(int wanted) const;
 };
 
-/// A picture stores the degrees that are present and wanted (request.render.sh_degree). A gradient
+/// A render stores the degrees that are present and wanted (request.render.sh_degree). A gradient
 /// and a training store all: every stored coefficient has a gradient. Inputs that do not apply to
 /// the purpose are ignored.
 Plan plan_for(const PlanRequest& request);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A step of several views. Each view draws a list of the splats that it sees. Then one update adds the gradients of all
 // views to each splat, in the order of the views. The list of a view and its sums are all that passes between the model and
-// the picture, so another process may draw the view. A view may be cut into bands, which are pictures with a list each.
+// the render, so another process may draw the view. A view may be cut into bands, which have a list each.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -12,11 +12,10 @@
 namespace ewa::pipeline {
 
 struct ViewBuffers {
-    gpu::Buffer cameras;  // CameraBlocks, one view after another
-    gpu::Buffer
-        list_indices;  // a word a splat of each list: its index in all lists, one after another, or NOT_LISTED
-    gpu::Buffer visible;  // records of one list or several
-    gpu::Buffer sums;     // by list index: see SUM_FLOATS
+    gpu::Buffer cameras;       // CameraBlocks, one view after another
+    gpu::Buffer list_indices;  // a word a splat of each list: its index in all lists, or NOT_LISTED
+    gpu::Buffer visible;       // records of one list or several
+    gpu::Buffer sums;          // by list index: see SUM_FLOATS
 
     /// Bytes of `splats` listed splats in sums.
     static uint64_t sum_bytes(const Plan& plan, uint64_t splats);

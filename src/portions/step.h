@@ -3,8 +3,8 @@
 // from the lists of all portions, by one rank, and the sums of its gradients go back to the portions. Then each portion is
 // updated. A part of a view is a band of its tile rows, or the whole view.
 //
-// Between a list and a part of a view, and back, data stay on the device, wait in host memory, or go to another rank. Which of these
-// follows from the portions alone.
+// Between a list and a part of a view, and back, data stay on the device, wait in host memory, or go to another rank. Which of
+// these follows from the portions alone.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -66,8 +66,8 @@ class Step {
                 const std::function<void(const passes::Recorder&, const pipeline::Model&)>& more,
                 StepSums& sums);
 
-    /// Draws whole views without a loss: view k by rank k. There are at most as many views as ranks. Returns whether this rank has drawn one,
-    /// which the frame then holds.
+    /// Draws whole views without a loss: view k by rank k. There are at most as many views as ranks. Returns whether this rank
+    /// has drawn one, which the frame then holds.
     bool draw_views(const StepParts& parts, std::span<const StepView> views);
 
     const Traffic& traffic() const { return traffic_; }
@@ -75,8 +75,8 @@ class Step {
   private:
     /// What this rank's portions list of a part of a view.
     struct Seen {
-        std::vector<uint64_t> listed,
-            first_indices;  // of each portion: splats, and the list index of the first one
+        // Of each portion: its listed splats, and the list index of the first one.
+        std::vector<uint64_t> listed, first_indices;
         std::vector<std::vector<std::byte>> records;  // of portions that leave the device
         std::vector<std::byte> sums;                  // for such portions, one after another
         uint64_t skipped = 0;                         // splats

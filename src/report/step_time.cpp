@@ -26,7 +26,7 @@ const std::vector<Stage>& stages() {
         {"blend", "renders the view, each tile from front to back", {"blend"}},
         {"loss",
          "compares the render with the training image, and finds how each pixel should change",
-         {"unpack_target", "mask_pictures", "expose", "loss_columns", "loss_rows", "reduce",
+         {"unpack_target", "mask_images", "expose", "loss_columns", "loss_rows", "reduce",
           "loss_backward_columns", "loss_backward_rows", "mask_gradient", "expose_backward",
           "exposure_update"}},
         {"blend backward", "finds how each splat should change for that", {"blend_backward"}},

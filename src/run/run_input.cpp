@@ -138,11 +138,11 @@ std::optional<std::string> too_short_remark(const TrainOptions& options) {
 
 /// What lets all ranks draw, if some do not.
 std::optional<std::string> idle_ranks_remark(const TrainOptions& options, int ranks) {
-    const int pictures = std::min(options.batch, options.steps) * options.bands;
-    if (ranks <= pictures) return std::nullopt;
+    const int view_parts = std::min(options.batch, options.steps) * options.bands;
+    if (ranks <= view_parts) return std::nullopt;
     return fmt::format(
         "{} of {} ranks draw nothing: a step has {} in {}; --batch {} or --bands {} lets all draw",
-        ranks - pictures, ranks, core::counted(uint64_t(options.batch), "view"),
+        ranks - view_parts, ranks, core::counted(uint64_t(options.batch), "view"),
         core::counted(uint64_t(options.bands), "band"), (ranks + options.bands - 1) / options.bands,
         (ranks + options.batch - 1) / options.batch);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a training cannot do where its splats or its pictures are divided, and what it cannot do with points. Errors print these
+// What a training cannot do where its splats or its views are divided, and what it cannot do with points. Errors print these
 // rows, and docs/scale.md shows those of a division. src/scene/looks.cpp has the rows of renders, src/run/run_input.cpp those of
 // whole runs.
 #pragma once

@@ -135,7 +135,7 @@ double optical_depth(const std::vector<SampledView>& views, size_t stride) {
     return sum / double(views.size());
 }
 
-/// The pictures that ranks draw of a view.
+/// The parts of a view that ranks draw.
 std::vector<Band> bands_of(const passes::KernelConfig& config, uint32_t height, int bands) {
     std::vector<Band> all;
     for (int band = 0; bands > 1 && band < bands; ++band)
@@ -194,7 +194,7 @@ MemoryEstimator::MemoryEstimator(const gpu::Device& device, const Dataset& datas
 
 MemoryEstimator::~MemoryEstimator() = default;
 
-/// (Splat, tile) pairs of the picture that has most of them, for `splats` splats that descend from the first ones.
+/// (Splat, tile) pairs of the image that has most of them, for `splats` splats that descend from the first ones.
 /// - A convex shape at a random place of a grid touches 1 + sides + area cells in the mean.
 /// - Splats that multiply share what their parents covered, but not all of it: sides shrink with a power of the number,
 ///   areas with its square.

@@ -108,7 +108,7 @@ class Training {
         double weight;  // of its image's pixels
     };
 
-    /// Whether a step has one picture of one portion: one kernel then gathers its gradients and moves the splats.
+    /// Whether a step draws one part of a view, of one portion: one kernel then gathers its gradients and moves the splats.
     bool fused() const { return portions_.alone() && options_.batch == 1 && options_.bands == 1; }
     pipeline::Rates rates(int step) const;
     pipeline::Noise noise(int step) const;
@@ -156,7 +156,7 @@ class Training {
     ImageLevels images_;
     const pipeline::Plan plan_;
     portions::Portions portions_;
-    portions::Step several_;  // steps of several pictures or portions
+    portions::Step several_;  // steps of several parts of views, or portions
     Learned learned_;
     std::deque<Flight> in_flight_;
     StepLog log_;

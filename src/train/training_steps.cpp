@@ -271,7 +271,7 @@ Image Training::render_own(std::span<const Camera> cameras) {
 void Training::refine(const std::function<void(const Phase&)>& refine) {
     tools_.frame.free_instances();  // the second copy of an array takes its place
     if (portions_.streamed()) {
-        // A value a splat of any portion, and no picture: with mcmc one portion holds all new splats until they are level.
+        // A value a splat of any portion, and no image: with mcmc one portion holds all new splats until they are level.
         tools_.frame = {};
         tools_.frame.reserve(*device_, tools_.cache.config(),
                              {.splats = portions_.largest(), .width = 1, .height = 1, .instances = 1});

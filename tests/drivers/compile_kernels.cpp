@@ -146,7 +146,7 @@ void compile_rays(Compiler& compiler) {
 void compile_training(Compiler& compiler) {
     using namespace shared;
     compiler.compile<passes::UnpackTarget>({{SPEC_COLOR_FLOATS, {0, 1}}});
-    compiler.compile<passes::MaskPictures>({{SPEC_COLOR_FLOATS, {0, 1}}});
+    compiler.compile<passes::MaskImages>({{SPEC_COLOR_FLOATS, {0, 1}}});
     compiler.compile<passes::MaskGradient>({{SPEC_COLOR_FLOATS, {0, 1}}});
     compiler.compile<passes::LossColumns>();
     compiler.compile<passes::LossRows>();

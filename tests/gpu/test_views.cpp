@@ -30,7 +30,7 @@ struct SeenScene {
         : scene(random_scene(seed, splats, kind, kWidth, kHeight, sh_degree, kernel)) {
         for (size_t v = 0; v < views; ++v) {
             Camera camera = scene.camera;
-            // A step to the side, so that some splats leave the picture.
+            // A step to the side, so that some splats leave the image.
             camera.translation.x += 0.3 * double(v);
             camera.fx *= 1 + 0.1 * double(v);
             cameras.push_back(camera);
@@ -58,7 +58,7 @@ struct SeenScene {
     }
 };
 
-/// The device's step of a scene's views, whose pictures are the bands of one view after those of another.
+/// The device's step of a scene's views, whose parts are the bands of one view after those of another.
 struct Step {
     uint32_t bands;
     Plan plan;
@@ -67,7 +67,7 @@ struct Step {
     ViewBuffers buffers;
     std::vector<gpu::Buffer> cameras, photos;
     std::vector<uint32_t> first_indices{0};
-    std::vector<std::vector<float>> pictures;
+    std::vector<std::vector<float>> renders;
 
     Step(const SeenScene& seen, PlanRequest request, uint32_t of_view = 1) : bands(of_view) {
         request.purpose = Purpose::training;
@@ -91,39 +91,41 @@ struct Step {
                        .gradients = true,
                        .overlaid = true});
     }
-    FrameInputs inputs(const SeenScene& seen, size_t picture) const {
-        FrameInputs result{.camera = {&cameras[picture / bands], 0, uint32_t(kWidth), uint32_t(kHeight)},
+    FrameInputs inputs(const SeenScene& seen, size_t view_part) const {
+        FrameInputs result{.camera = {&cameras[view_part / bands], 0, uint32_t(kWidth), uint32_t(kHeight)},
                            .background = seen.scene.options.background};
-        if (bands > 1) result.band = band_of(rig().config(), kHeight, bands, uint32_t(picture % bands));
+        if (bands > 1) result.band = band_of(rig().config(), kHeight, bands, uint32_t(view_part % bands));
         return result;
     }
-    void list(const SeenScene& seen, size_t picture, bool projected = false) {
+    void list(const SeenScene& seen, size_t view_part, bool projected = false) {
         Rig& r = rig();
         gpu::Recording recording = r.recording();
-        const FrameInputs drawn = inputs(seen, picture);
+        const FrameInputs drawn = inputs(seen, view_part);
         FramePasses{{recording, r.cache}, plan, frame, drawn}.list(model, buffers,
-                                                                   {.view = uint32_t(picture / bands),
-                                                                    .list = uint32_t(picture),
-                                                                    .first_index = first_indices[picture]},
+                                                                   {.view = uint32_t(view_part / bands),
+                                                                    .list = uint32_t(view_part),
+                                                                    .first_index = first_indices[view_part]},
                                                                    projected);
         frame.record_counts(recording);
         r.executor.run(recording);
-        first_indices.push_back(first_indices[picture] + frame.read_counts().scan_total);
+        first_indices.push_back(first_indices[view_part] + frame.read_counts().scan_total);
     }
-    uint32_t listed(size_t picture) const { return first_indices[picture + 1] - first_indices[picture]; }
-    void draw(const SeenScene& seen, size_t picture) {
+    uint32_t listed(size_t view_part) const {
+        return first_indices[view_part + 1] - first_indices[view_part];
+    }
+    void draw(const SeenScene& seen, size_t view_part) {
         Rig& r = rig();
-        const FrameInputs drawn = inputs(seen, picture);
+        const FrameInputs drawn = inputs(seen, view_part);
         if (bands > 1) reserve(drawn.band.rows);
         buffers.reserve_sums(*device(), r.executor, plan, first_indices.back());
         gpu::Recording recording = r.recording();
-        recording.copy(buffers.visible, 0, frame.records, 0, 48ull * listed(picture));
+        recording.copy(buffers.visible, 0, frame.records, 0, 48ull * listed(view_part));
         const FramePasses on{{recording, r.cache}, plan, frame, drawn};
-        const Sorted sorted = on.draw_list(listed(picture));
-        on.loss(photos[picture / bands]);
-        on.list_backward(listed(picture), sorted, buffers.sums, first_indices[picture]);
+        const Sorted sorted = on.draw_list(listed(view_part));
+        on.loss(photos[view_part / bands]);
+        on.list_backward(listed(view_part), sorted, buffers.sums, first_indices[view_part]);
         r.executor.run(recording);
-        pictures.push_back(frame.planes.download<float>(frame.sizes.planes / 4));
+        renders.push_back(frame.planes.download<float>(frame.sizes.planes / 4));
     }
     void update(const SeenScene& seen, Rates rates) {
         Rig& r = rig();
@@ -176,7 +178,7 @@ TEST(ViewBatch, AListHasTheSplatsThatReachATileInTheirOrder) {
     }
 }
 
-TEST(ViewBatch, AListDrawsThePictureOfItsView) {
+TEST(ViewBatch, AListDrawsItsView) {
     const SeenScene seen(71, 900, 2);
     Step step(seen, {});
     for (size_t v = 0; v < 2; ++v) {
@@ -185,7 +187,7 @@ TEST(ViewBatch, AListDrawsThePictureOfItsView) {
         gpu::Recording whole = rig().recording();
         FramePasses{{whole, rig().cache}, step.plan, step.frame, step.inputs(seen, v)}.forward(step.model);
         rig().executor.run(whole);
-        EXPECT_EQ(step.frame.planes.download<float>(step.frame.sizes.planes / 4), step.pictures[v]);
+        EXPECT_EQ(step.frame.planes.download<float>(step.frame.sizes.planes / 4), step.renders[v]);
     }
 }
 
@@ -223,7 +225,7 @@ INSTANTIATE_TEST_SUITE_P(ViewBatch, ViewBatchGradient,
                                          ViewsCase{Footprint::antialias, SplatKind::ordinary, 1, 3},
                                          ViewsCase{Footprint::density, SplatKind::mixed, 2, 3}));
 
-/// The rows that the loss of a band counts have those of the view's picture.
+/// The rows that the loss of a band counts have those of the view's render.
 TEST(ViewBatch, ABandDrawsItsRowsOfTheView) {
     const SeenScene seen(72, 900, 1);
     Step whole(seen, {}), cut(seen, {}, 3);
@@ -240,8 +242,8 @@ TEST(ViewBatch, ABandDrawsItsRowsOfTheView) {
             for (uint32_t x = 0; x < kWidth; ++x)
                 for (uint32_t c = 0; c < 4; ++c)
                     ASSERT_NEAR(
-                        cut.pictures[b][c * plane_floats + y * layout.stride + x],
-                        whole.pictures[0][c * layout.plane_floats + (band.first + y) * layout.stride + x],
+                        cut.renders[b][c * plane_floats + y * layout.stride + x],
+                        whole.renders[0][c * layout.plane_floats + (band.first + y) * layout.stride + x],
                         2e-5);
         rows += band.own_end - band.own_begin;
     }
