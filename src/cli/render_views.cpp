@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr core::PixelSize kUsualSize{1280, 720};
 constexpr int kOrbitFrames = 8 * kFilmRate;
-constexpr double kLegSeconds = 2;  // of a film, from one saved view to the next
+constexpr double kSecondsBetweenViews = 2;  // of a film, from one saved view to the next
 constexpr int kMostFrames = 100000;
 
 /// Eye and target.
@@ -79,7 +79,7 @@ std::vector<Camera> saved_views(const ViewsArguments& arguments, ViewsOutput out
         for (Camera& camera : cameras) camera = scene::fitted(camera, size.width, size.height);
     }
     if (!path) return cameras;
-    return along_views(cameras, arguments.film_seconds > 0 ? arguments.film_seconds : kLegSeconds);
+    return along_views(cameras, arguments.film_seconds > 0 ? arguments.film_seconds : kSecondsBetweenViews);
 }
 
 std::vector<Camera> around(const scene::Framing& framing, int count) {

@@ -180,7 +180,7 @@ void TrainObserver::forecast(const StepReport& step) {
     if (!forecast_->known()) return;
     const double left = forecast_->left();
     progress_->set_left(left);
-    if (std::exchange(told_time_, true) || left < kLong || step.step >= steps_) return;
+    if (std::exchange(printed_time_, true) || left < kLong || step.step >= steps_) return;
     const double whole = left + progress_->seconds();
     std::string line = fmt::format("the training takes about {} on this device", core::duration_text(whole));
     if (whole > kVeryLong && steps_ > kShortRun && first_step_ < kShortRun)
@@ -195,7 +195,7 @@ void TrainObserver::on_step(const StepReport& step) {
         ++psnr_steps_;
     }
     const bool due = progress_->due(step.step);
-    if (due || !told_time_)
+    if (due || !printed_time_)
         forecast(step);
     else
         forecast_->add(step.step, step.seconds, step.splats);

@@ -55,7 +55,7 @@ class TrainObserver : public RunObserver {
     std::unique_ptr<Progress> progress_;
     std::optional<train::Forecast> forecast_;
     int first_step_ = 0;      // of this process; 0 before it
-    bool told_time_ = false;  // how long the run takes
+    bool printed_time_ = false;  // how long the run takes
     // Training PSNR of the steps since the progress was last shown; steps differ much, since each has another view.
     double psnr_sum_ = 0;
     int psnr_steps_ = 0;

@@ -109,15 +109,15 @@ std::vector<std::vector<std::byte>> exchanged(Ranks& ranks, std::vector<std::vec
     return in;
 }
 
-std::vector<std::byte> told(Ranks& ranks, std::span<const std::byte> own) {
+std::vector<std::byte> from_rank_0(Ranks& ranks, std::span<const std::byte> own) {
     const uint64_t size = own.size();
-    std::vector<std::byte> heard(ranks.gather(std::span(&size, 1)).front());
+    std::vector<std::byte> received(ranks.gather(std::span(&size, 1)).front());
     OutParts out(size_t(ranks.size()));
     InParts in(size_t(ranks.size()));
     if (ranks.rank() == 0) std::fill(out.begin(), out.end(), own);
-    in[0] = heard;
+    in[0] = received;
     ranks.exchange(out, in);
-    return heard;
+    return received;
 }
 
 }  // namespace ewa::portions

@@ -30,6 +30,6 @@ void hand_out(Ranks& ranks, const std::vector<uint64_t>& sizes,
 std::vector<std::vector<std::byte>> exchanged(Ranks& ranks, std::vector<std::vector<std::byte>> out);
 
 /// Bytes of rank 0, on every rank. own: ignored on other ranks. Collective.
-std::vector<std::byte> told(Ranks& ranks, std::span<const std::byte> own);
+std::vector<std::byte> from_rank_0(Ranks& ranks, std::span<const std::byte> own);
 
 }  // namespace ewa::portions

@@ -223,7 +223,7 @@ Gaussians Portions::gaussians() {
 }
 
 std::vector<std::byte> Portions::sent(std::span<const std::byte> own) const {
-    return told(*ranks_, own);
+    return from_rank_0(*ranks_, own);
 }
 
 void Portions::clear(uint32_t splats) {

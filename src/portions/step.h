@@ -75,7 +75,7 @@ class Step {
   private:
     /// What this rank's portions list of a part of a view.
     struct Seen {
-        // Of each portion: its listed splats, and the list index of the first one.
+        // The listed splats of each portion, and the list index of the first one.
         std::vector<uint64_t> listed, first_indices;
         std::vector<std::vector<std::byte>> records;  // of portions that leave the device
         std::vector<std::byte> sums;                  // for such portions, one after another

@@ -61,12 +61,12 @@ Place place_of(std::span<const Allowed> all, int rank) {
 
 Place find_place(Ranks& ranks) {
     const Allowed own = this_process();
-    std::vector<uint64_t> told = {own.machine};
-    told.insert(told.end(), own.cores.begin(), own.cores.end());
-    const std::vector<uint64_t> heard = ranks.gather(told);
+    std::vector<uint64_t> sent = {own.machine};
+    sent.insert(sent.end(), own.cores.begin(), own.cores.end());
+    const std::vector<uint64_t> received = ranks.gather(sent);
     std::vector<Allowed> all;
-    for (auto at = heard.begin(); at != heard.end(); at += std::ptrdiff_t(told.size()))
-        all.push_back({*at, {at + 1, at + std::ptrdiff_t(told.size())}});
+    for (auto at = received.begin(); at != received.end(); at += std::ptrdiff_t(sent.size()))
+        all.push_back({*at, {at + 1, at + std::ptrdiff_t(sent.size())}});
     return place_of(all, ranks.rank());
 }
 

@@ -71,7 +71,7 @@ void agree_on_options(RunOptions& options) {
     for (const RunOption& option : run_options())
         if (option.decides_result) asked["options"][option.name] = option.get(options);
     const std::string text = asked.dump(-1, ' ', false, Json::error_handler_t::replace);
-    const Json first = parsed(portions::told(ranks, std::as_bytes(std::span(text))));
+    const Json first = parsed(portions::from_rank_0(ranks, std::as_bytes(std::span(text))));
     for (const auto& [name, value] : first.at("options").items()) {
         if (value == asked["options"].value(name, Json())) continue;
         // The run's folder has the options of a run that is resumed. Another node may lack it.
@@ -98,8 +98,8 @@ void agree(RunOptions& options, const Json& settings, const std::string& fingerp
             throw InputError(ranks.name(int(i / kParts.size())) + " has " + kParts[i % kParts.size()] +
                              " than " + ranks.name(0));
     const std::string text = settings.dump();
-    const std::vector<std::byte> heard = portions::told(ranks, std::as_bytes(std::span(text)));
-    if (ranks.rank() != 0) take_options(parsed(heard), options);
+    const std::vector<std::byte> received = portions::from_rank_0(ranks, std::as_bytes(std::span(text)));
+    if (ranks.rank() != 0) take_options(parsed(received), options);
 }
 
 }  // namespace ewa::train

@@ -172,8 +172,8 @@ SplatFormat format_of_file(const std::filesystem::path& path) {
         head.starts_with('{') && ((kind && kind->format == SplatFormat::sog_meta) || io::is_sog_meta(path));
     if (sog_meta)
         kind = &kind_of(SplatFormat::sog_meta);
-    else if (const Kind* told = kind_of_head(head))
-        kind = told;
+    else if (const Kind* found = kind_of_head(head))
+        kind = found;
     if (!kind) refuse(path, all_kinds());
     if (kind->format != SplatFormat::ply) return kind->format;
     return io::is_compressed_ply(io::PlyTable(path)) ? SplatFormat::compressed_ply : SplatFormat::ply;
