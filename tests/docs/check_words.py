@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Checks documents and comments: links, anchors, paths of the source tree, long sentences, and words that the glossary replaces.
+Checks identifiers for words that mean several things.
 
     tests/docs/check_words.py [FILE...]     Markdown files and sources; without any: all documents, src, include and shaders
     tests/docs/check_words.py --random N    prints N random paragraphs, for a reader to judge
@@ -21,9 +22,18 @@ BANNED = {  # pattern: what to write
 }
 # Only in comments. The last pattern stands for a sentence without a subject.
 BANNED_IN_COMMENTS = {r"told": "printed, sent, or known", r"(?<![^.!?:] )Of(?= )": "the subject's name first"}
+# Words of identifiers: the word, the folders where it misleads, and what to write.
+BANNED_IN_IDENTIFIERS = (
+    (r"told|heard|twins?|legs?", ("src", "include", "shaders", "python/bindings"), "printed, sent, found, or received"),
+    (r"pictures?", ("src/gpu", "src/image", "src/operators", "src/passes", "src/pipeline", "src/portions", "src/reference", "src/train", "shaders"),
+     "image, render, or part of a view"),
+)
 SUFFIXES = {".h", ".cpp", ".glsl", ".comp"}
 SOURCES = ("src", "include", "shaders", "python/bindings")
 WORD = re.compile(r"\w+(?:[-'’.,]\w+)*")
+NO_IDENTIFIER = re.compile(r'\'\\?.\'|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|//[^\n]*|/\*.*?\*/', re.S)
+IDENTIFIER = re.compile(r"\b[A-Za-z_]\w*")
+WORD_OF_IDENTIFIER = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 SOURCE_PATH = re.compile(r"`((?:src|shaders|tests|include|scripts|cmake|docs|examples|scenes)/[\w./-]*)`")
 
 
@@ -65,9 +75,23 @@ def blocks_of_header(text):
         yield first, " ".join(block)
 
 
+def problems_of_identifiers(text, folder):
+    """folder: of the source, relative to the root. A snake_case or CamelCase identifier is checked word by word."""
+    banned = [(pattern, instead) for pattern, folders, instead in BANNED_IN_IDENTIFIERS if any(folder.is_relative_to(f) for f in folders)]
+    code = NO_IDENTIFIER.sub(lambda m: "\n" * m.group().count("\n"), text)
+    for number, line in enumerate(code.splitlines() if banned else (), 1):
+        for identifier in IDENTIFIER.findall(line):
+            for word in WORD_OF_IDENTIFIER.findall(identifier):
+                for pattern, instead in banned:
+                    if re.fullmatch(pattern, word, re.I):
+                        yield f"{number}: '{word}' in {identifier}: write {instead}"
+
+
 def problems_of(path):
     text = path.read_text()
     markdown = path.suffix == ".md"
+    if not markdown and path.is_relative_to(ROOT):
+        yield from problems_of_identifiers(text, path.parent.relative_to(ROOT))
     for line, block in (blocks_of_markdown if markdown else blocks_of_header)(text):
         plain = re.sub(r"`[^`]*`", "x", re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", block))
         for sentence in re.split(r"(?<=[.!?:])\W*\s+", plain):
@@ -91,7 +115,16 @@ def problems_of(path):
                 yield f"{line}: no heading for {target}"
 
 
+def check_this_script():
+    """Planted words are found, and words of comments, texts and other folders are not."""
+    text = 'int told;\nf("picture"); // picture\nclass PictureOfView {};\n/* a\n*/ int of_pictures_, pictured, kPICTURE;\n'
+    found = [problem.split(":")[0] for problem in problems_of_identifiers(text, pathlib.PurePath("src/train"))]
+    assert found == ["1", "3", "5", "5"], found
+    assert len([*problems_of_identifiers(text, pathlib.PurePath("src/viewer"))]) == 1
+
+
 def main(arguments):
+    check_this_script()
     documents = [p for p in sorted(ROOT.rglob("*.md")) if not {"build", "out"} & set(p.relative_to(ROOT).parts)]
     if arguments[:1] == ["--random"]:
         long = [(p, *b) for p in documents for b in blocks_of_markdown(p.read_text()) if len(b[1].split()) > 12]
