@@ -169,30 +169,30 @@ float border_of(Placing placing, uint j, uint samples) {
 }
 
 // Intervals that are evaluated together, in registers.
-layout(constant_id = SPEC_MODE) const uint CHUNK = 8;
+layout(constant_id = SPEC_MODE) const uint GROUP = 8;
 
-float borders[CHUNK + 1u];
-float depths[CHUNK];
-vec3 emissions[CHUNK];  // sum of colour * depth
+float borders[GROUP + 1u];
+float depths[GROUP];
+vec3 emissions[GROUP];  // sum of colour * depth
 
 // (1 - exp(-x)) / x
 float mean_transmittance(float x) { return x < 0.01 ? 1.0 - x * (0.5 - x * (0.16666667 - x * 0.041666667)) : (1.0 - exp(-x)) / x; }
 
-// Evaluates CHUNK intervals from `begin` on. open: whether this lane's ray counts. from, to: the subgroup's borders.
-void march_chunk(uint tile, uint strip, Ray ray, Placing placing, uint begin, uint samples, bool open, out float from, out float to) {
+// Evaluates GROUP intervals from `begin` on. open: whether this lane's ray counts. from, to: the subgroup's borders.
+void march_group(uint tile, uint strip, Ray ray, Placing placing, uint begin, uint samples, bool open, out float from, out float to) {
     const float top = strip_top(tile, strip), bottom = top + float(ROW_STEP - 1u);
     const uint end = tile_starts[tile + 1u];
-    [[unroll]] for (uint j = 0u; j <= CHUNK; ++j) borders[j] = border_of(placing, begin + j, samples);
-    [[unroll]] for (uint j = 0u; j < CHUNK; ++j) {
+    [[unroll]] for (uint j = 0u; j <= GROUP; ++j) borders[j] = border_of(placing, begin + j, samples);
+    [[unroll]] for (uint j = 0u; j < GROUP; ++j) {
         depths[j] = 0.0;
         emissions[j] = vec3(0.0);
     }
     from = subgroup_min(open ? borders[0] : NEVER);
-    to = subgroup_max(open ? borders[CHUNK] : 0.0);
+    to = subgroup_max(open ? borders[GROUP] : 0.0);
     FOR_EACH_SPLAT(from, to)
         const Passing p = pass_by(r, ray);
         float before = share_before(p, borders[0]);
-        [[unroll]] for (uint i = 0u; i < CHUNK; ++i) {
+        [[unroll]] for (uint i = 0u; i < GROUP; ++i) {
             const float after = share_before(p, borders[i + 1u]);
             const float depth = p.depth * (after - before);
             depths[i] += depth;

@@ -11,7 +11,7 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_MODE) const uint CHANNELS = 5;
-const uint CHUNKS = (CHANNELS + 3u) / 4u;
+const uint GROUPS = (CHANNELS + 3u) / 4u;
 const uint SUMS = 11u;
 TEXELS(0, records);
 layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
@@ -24,10 +24,10 @@ layout(push_constant, scalar) uniform Push { BlendPush push; };
 #include "lib/tile_sums.glsl"
 
 // Features of a splat, and zeros behind its last channel.
-vec4 chunk_of(uint splat, uint chunk) {
+vec4 group_of(uint splat, uint group) {
     vec4 values = vec4(0.0);
     [[unroll]] for (uint c = 0; c < 4; ++c) {
-        if (4u * chunk + c < CHANNELS) values[c] = features[CHANNELS * splat + 4u * chunk + c];
+        if (4u * group + c < CHANNELS) values[c] = features[CHANNELS * splat + 4u * group + c];
     }
     return values;
 }
@@ -47,7 +47,7 @@ void main() {
         const uint y = py + p * ROW_STEP;
         at[p] = min(y, height - 1u) * width + min(px, width - 1u);
         T[p] = px < width && y < height ? 1.0 : -1.0;
-        rest[p] = fetch(pixels, CHUNKS * width * height + at[p]).x;
+        rest[p] = fetch(pixels, GROUPS * width * height + at[p]).x;
     }
     const uint end = tile_starts[tile + 1u];
     uint k = tile_starts[tile];
@@ -63,10 +63,10 @@ void main() {
                 column_alphas(s, raw);
                 [[unroll]] for (uint p = 0; p < PIXELS; ++p) shade[p] = 0.0;
                 const uint splat = splat_of(min(k + first + j, end - 1u));
-                [[dont_unroll]] for (uint chunk = 0; chunk < CHUNKS; ++chunk) {
-                    const vec4 feature = chunk_of(splat, chunk);
+                [[dont_unroll]] for (uint group = 0; group < GROUPS; ++group) {
+                    const vec4 feature = group_of(splat, group);
                     [[unroll]] for (uint p = 0; p < PIXELS; ++p)
-                        shade[p] += dot(feature, fetch(pixels, chunk * width * height + at[p]));
+                        shade[p] += dot(feature, fetch(pixels, group * width * height + at[p]));
                 }
                 vec2 absolute = vec2(0.0);
                 [[unroll]] for (uint p = 0; p < PIXELS; ++p) {

@@ -23,13 +23,13 @@ void main() {
     const uint i = item_index();
     if (i >= push.splats) return;
     for (uint first = 0u; first < push.channels; first += 4u) {
-        vec4 chunk[25];
+        vec4 group[25];
         [[unroll]] for (uint k = 0; k < BASES; ++k)
-            chunk[k] = vec4(RGB ? rgb_coefficients[i * push.coefficients + k] : vec3(0.0), 0.0);
+            group[k] = vec4(RGB ? rgb_coefficients[i * push.coefficients + k] : vec3(0.0), 0.0);
         [[unroll]] for (uint c = 0; c < 4; ++c) {
             if (!RGB && first + c < push.channels)
                 [[unroll]] for (uint k = 0; k < BASES; ++k)
-                    chunk[k][c] = coefficients[(i * push.coefficients + k) * push.channels + first + c];
+                    group[k][c] = coefficients[(i * push.coefficients + k) * push.channels + first + c];
         }
         for (uint v = 0u; v < push.views; ++v) {
             const uint at = v * push.splats + i;
@@ -37,7 +37,7 @@ void main() {
             float norm, basis[25];
             harmonics_basis(unit_direction(directions[at], norm), basis);
             vec4 sum = vec4(0.0);
-            [[unroll]] for (uint k = 0; k < BASES; ++k) sum += basis[k] * chunk[k];
+            [[unroll]] for (uint k = 0; k < BASES; ++k) sum += basis[k] * group[k];
             [[unroll]] for (uint c = 0; c < 4; ++c)
                 if (first + c < push.channels) colors[at * push.channels + first + c] = shown ? sum[c] : 0.0;
         }

@@ -25,7 +25,7 @@ layout(push_constant, scalar) uniform Push { HarmonicsPush push; };
 // First of the channels of coefficient k of splat i.
 uint coefficient_at(uint i, uint k) { return (i * push.coefficients + k) * push.channels; }
 
-// dL/d(direction of any length), of a chunk of channels that begins with `first`.
+// dL/d(direction of any length), of a group of channels that begins with `first`.
 vec3 direction_gradient(uint i, uint first, vec4 by_color, vec3 direction, float norm) {
     vec3 slope[25];
     harmonics_basis_gradient(direction, slope);

@@ -36,12 +36,12 @@ void main() {
 
     float T = 1.0;
     vec3 color = vec3(0.0);
-    for (uint begin = 0u; begin < ray_push.samples; begin += CHUNK) {
+    for (uint begin = 0u; begin < ray_push.samples; begin += GROUP) {
         const bool open = inside && T > float(MARCH_STOP) && placing.last > 0.0;
         if (subgroupAll(!open)) break;
         float from, to;
-        march_chunk(tile, strip, ray, placing, begin, ray_push.samples, open, from, to);
-        [[unroll]] for (uint i = 0u; i < CHUNK; ++i) {
+        march_group(tile, strip, ray, placing, begin, ray_push.samples, open, from, to);
+        [[unroll]] for (uint i = 0u; i < GROUP; ++i) {
             color += (T * mean_transmittance(depths[i])) * emissions[i];
             T *= exp(-depths[i]);
         }

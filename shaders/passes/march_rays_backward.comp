@@ -35,23 +35,23 @@ float mean_transmittance_slope(float x) {
     return x < 0.03 ? -0.5 + x * (0.33333333 - x * (0.125 - x * 0.033333333)) : (exp(-x) - mean_transmittance(x)) / x;
 }
 
-float by_depth[CHUNK];   // dL/d(d_ij) without the splat's own colour
-vec3 by_emitted[CHUNK];  // and its slope by that
+float by_depth[GROUP];   // dL/d(d_ij) without the splat's own colour
+vec3 by_emitted[GROUP];  // and its slope by that
 
-void add_chunk(uint tile, uint strip, Ray ray, bool open, float from, float to) {
+void add_group(uint tile, uint strip, Ray ray, bool open, float from, float to) {
     const float top = strip_top(tile, strip), bottom = top + float(ROW_STEP - 1u);
     const uint end = tile_starts[tile + 1u];
     FOR_EACH_SPLAT(from, to)
         const Passing p = pass_by(r, ray);
         float g = 0.0, s1 = 0.0, s2 = 0.0, last = 0.0, before = 0.0;
         vec3 color = vec3(0.0);
-        [[unroll]] for (uint i = 0u; i <= CHUNK; ++i) {
+        [[unroll]] for (uint i = 0u; i <= GROUP; ++i) {
             const float at = clamp((borders[i] - p.m.middle) * p.sharpness, -40.0, 40.0), share = normal_cdf(at);
             if (i > 0u) {
                 g += last * (share - before);
                 color += (p.depth * (share - before)) * by_emitted[i - 1u];
             }
-            const float own = i < CHUNK ? p.depth * (by_depth[min(i, CHUNK - 1u)] + dot(by_emitted[min(i, CHUNK - 1u)], r.color.rgb)) : 0.0;
+            const float own = i < GROUP ? p.depth * (by_depth[min(i, GROUP - 1u)] + dot(by_emitted[min(i, GROUP - 1u)], r.color.rgb)) : 0.0;
             const float moved = (last - own) * normal_density(at);
             s1 += moved;
             s2 += moved * at;
@@ -73,19 +73,19 @@ void main() {
     const Placing placing = place_intervals(tile, strip, ray, ray_push.samples);
     const vec3 gradient = gradient_of(at);
     float T = 1.0, rest = dot(gradient, color_of(at));
-    for (uint begin = 0u; begin < ray_push.samples; begin += CHUNK) {
+    for (uint begin = 0u; begin < ray_push.samples; begin += GROUP) {
         const bool open = inside && T > float(MARCH_STOP) && placing.last > 0.0;
         if (subgroupAll(!open)) break;
         float from, to;
-        march_chunk(tile, strip, ray, placing, begin, ray_push.samples, open, from, to);
-        [[unroll]] for (uint i = 0u; i < CHUNK; ++i) {
+        march_group(tile, strip, ray, placing, begin, ray_push.samples, open, from, to);
+        [[unroll]] for (uint i = 0u; i < GROUP; ++i) {
             const float emitted = T * dot(gradient, emissions[i]);
             rest -= mean_transmittance(depths[i]) * emitted;
             by_emitted[i] = (T * mean_transmittance(depths[i])) * gradient;
             by_depth[i] = mean_transmittance_slope(depths[i]) * emitted - rest;
             T *= exp(-depths[i]);
         }
-        add_chunk(tile, strip, ray, open, from, to);
+        add_group(tile, strip, ray, open, from, to);
     }
     report_turns();
 }

@@ -213,11 +213,11 @@ void FramePasses::blend_backward(const Sorted& sorted) const {
     const passes::BlendBackwardBuffers buffers = blend_buffers(frame, sorted);
     const shared::BlendPush push = blend_push(cache.config(), frame, inputs.background);
     const gpu::SpecConstant mode{shared::SPEC_MODE, plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0};
-    const uint32_t chunk = march_chunk(inputs.samples, 8);
+    const uint32_t group = march_group(inputs.samples, 8);
     if (plan.integrator == Integrator::ray)
         integrate_backward<passes::BlendRaysBackward>(sorted, {kernel()});
     else if (plan.integrator == Integrator::march)
-        integrate_backward<passes::MarchRaysBackward>(sorted, {kernel(), {shared::SPEC_MODE, chunk}});
+        integrate_backward<passes::MarchRaysBackward>(sorted, {kernel(), {shared::SPEC_MODE, group}});
     else if (plan.points())
         record(passes::BlendPointsBackward{buffers}, push, {mode, {shared::SPEC_NEAREST, plan.nearest}});
     else

@@ -98,7 +98,7 @@ void record_tile_order(const passes::Recorder& on, bool gradients, const FrameBu
 
 }  // namespace
 
-uint32_t march_chunk(uint32_t samples, uint32_t most) {
+uint32_t march_group(uint32_t samples, uint32_t most) {
     return std::min(std::bit_ceil(samples), most);
 }
 
@@ -162,11 +162,11 @@ Sorted FramePasses::draw(uint32_t splats) const {
     if (plan.rays()) {
         const passes::AlongRays along{buffers, frame.rays, camera(), frame.counts};
         const shared::RayPush rays{.blend = push, .samples = inputs.samples, .strip = 0};
-        const uint32_t chunk = march_chunk(inputs.samples, cache.config().texel_buffers ? 16 : 8);
+        const uint32_t group = march_group(inputs.samples, cache.config().texel_buffers ? 16 : 8);
         if (plan.integrator == Integrator::ray)
             record(passes::BlendRays{along}, rays, {kernel(), mode});
         else
-            record(passes::MarchRays{along}, rays, {kernel(), {shared::SPEC_MODE, chunk}});
+            record(passes::MarchRays{along}, rays, {kernel(), {shared::SPEC_MODE, group}});
     } else if (plan.points()) {
         record(passes::BlendPoints{buffers}, push, {mode, {shared::SPEC_NEAREST, plan.nearest}});
     } else {

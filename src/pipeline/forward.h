@@ -93,7 +93,7 @@ void record_tile_lists(const passes::Recorder& on, bool gradients, uint32_t spla
                        const FrameBuffers& frame);
 
 /// Intervals of a ray that a march evaluates together; most: a power of two.
-uint32_t march_chunk(uint32_t samples, uint32_t most);
+uint32_t march_group(uint32_t samples, uint32_t most);
 
 shared::BlendPush blend_push(const passes::KernelConfig& config, const FrameBuffers& frame,
                              const std::array<float, 3>& background);
