@@ -350,7 +350,11 @@ TEST_F(TrainRanks, TakeTheOptionsOfRankZeroWhereItResumes) {
     expect_same("o", "half");
 }
 
+/// mpirun itself ends a job of which one process ends after another has joined. Here one ends before.
 TEST_F(TrainRanks, DoNotWaitForeverForOneThatNeverJoins) {
+    const std::string ended = folder / "ended";
+    const std::string wait = "until [ -e '" + ended + "' ]; do sleep 0.1; done; sleep 1; exec \"$0\" \"$@\"";
+    prefixes = {{0, {"sh", "-c", wait}}, {1, {"sh", "-c", "\"$0\" \"$@\"; touch '" + ended + "'"}}};
     const Outcome outcome =
         mpirun({arguments_of(folder / "data", "o", {"--rank-timeout", "2"}), {"info", folder / "s.ply"}});
     EXPECT_EQ(outcome.status, 1) << outcome.err;
