@@ -49,11 +49,6 @@ std::string reason(const std::exception_ptr& failure) {
     }
 }
 
-template <class Result>
-bool finished(const std::future<Result>& future) {
-    return future.valid() && future.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
-}
-
 }  // namespace
 
 Size camera_size_or_usual(const Startup& startup) {
@@ -81,29 +76,27 @@ std::filesystem::path free_name(const std::string& stem, const std::string& exte
 App::App(const Startup& startup)
     : startup_(startup),
       window_(system_, window_title(startup.scene), initial_size(startup, system_), !startup.picture),
-      view_(start_view(startup.scene, startup.frame, startup.size.value_or(kUsualSize))),
       settings_(startup.settings),
-      views_(startup.views),
-      times_(startup.times),
       device_name_(startup.device_name),
-      capture_(startup.picture.has_value()),
-      search_([this] { system_.wake(); }),
-      dialog_([this] { system_.wake(); }),
-      comparison_([this] { system_.wake(); }),
-      quality_([this] { system_.wake(); }),
+      loop_{.capture = startup.picture.has_value(), .times = startup.times},
+      navigation_{
+          .view = ViewCamera(start_view(startup.scene, startup.frame, startup.size.value_or(kUsualSize))),
+          .views = startup.views},
+      shown_([this] { system_.wake(); }),
       renders_(startup.open_device, [this] { system_.wake(); }),
-      live_([this] { system_.wake(); }) {
+      session_([this] { system_.wake(); }) {
     change_text();
-    last_frame_ = Clock::now();
+    loop_.last_frame = Clock::now();
     message_.hint_until = in(kHintSeconds);
     // A screenshot is framed as `ewa render` does.
-    if (!scripted()) view_.restart(start_view(startup.scene, startup.frame, picture_area().size()));
+    if (!scripted())
+        navigation_.view.restart(start_view(startup.scene, startup.frame, picture_area().size()));
     adopt(startup.scene, startup.frame);
     settings_.look = startup.settings.look;
     if (startup.film) start_film();
     if (startup.watch) watch(*startup.watch, startup.trainer);
     if (!startup.scene.photos.empty()) find_cameras(startup.scene.photos);
-    times_.window_open = times_.now();
+    loop_.times.window_open = loop_.times.now();
 }
 
 KeptSettings App::kept() const {
@@ -119,12 +112,12 @@ KeptSettings App::kept() const {
 }
 
 void App::run() {
-    while (!done_ && !window_.closed()) {
+    while (!loop_.done && !window_.closed()) {
         const auto keys = window_.wait(patience());
         const auto now = Clock::now();
-        const double seconds = std::chrono::duration<double>(now - last_frame_).count();
-        last_frame_ = now;
-        if (window_.stirred()) redraws_ = kRedraws;
+        const double seconds = std::chrono::duration<double>(now - loop_.last_frame).count();
+        loop_.last_frame = now;
+        if (window_.stirred()) loop_.redraws = Loop::kRedraws;
         if (message_.expire(now)) redraw();
         if (!scripted()) {
             for (const KeyPress& key : keys) handle_key(key);
@@ -137,36 +130,36 @@ void App::run() {
         take_found();
         take_renders();
         take_comparison();
-        if (finished(saving_)) say(saving_.get());
+        if (Session::finished(session_.saving)) say(session_.saving.get());
         take_live();
-        if (film_) continue_film();
-        if (redraws_ > 0) draw();
+        if (navigation_.film) continue_film();
+        if (loop_.redraws > 0) draw();
         if (const auto camera = requested_camera()) renders_.ask(*camera, settings_.look, scripted());
     }
-    if (startup_.verbose) times_.print(renders_.shown().get());
-    if (scripted() && !done_)
+    if (startup_.verbose) loop_.times.print(renders_.shown().get());
+    if (scripted() && !loop_.done)
         throw RunError("the window was closed before " +
                        startup_.picture.value_or(startup_.film.value_or("")).string() + " was written");
 }
 
 /// How long to wait for input, in seconds.
 double App::patience() const {
-    if (redraws_ > 0 || flying() || settings_.turntable) return 1.0 / 60;
-    return renders_.reduced() || opening_.valid() || saving_.valid() ? kPollSeconds : 1.0;
+    if (loop_.redraws > 0 || flying() || settings_.turntable) return 1.0 / 60;
+    return renders_.reduced() || session_.opening.valid() || session_.saving.valid() ? kPollSeconds : 1.0;
 }
 
 void App::say(const std::string& note) {
     message_.note = note;
     message_.note_until = in(kNoteSeconds);
-    redraw(kRedraws);
+    redraw(Loop::kRedraws);
 }
 
 /// Empty while the window is minimised, and while a film has cameras of its own.
 std::optional<Camera> App::requested_camera() const {
     const Size size = window_.framebuffer();
-    if (size.width == 0 || size.height == 0 || film_) return std::nullopt;
+    if (size.width == 0 || size.height == 0 || navigation_.film) return std::nullopt;
     const Rectangle place = arrangement().rendering;
-    return view_.camera(place.width, place.height);
+    return navigation_.view.camera(place.width, place.height);
 }
 
 void App::take_renders() {
@@ -174,32 +167,32 @@ void App::take_renders() {
     if (news.device) device_name_ = *news.device;
     if (news.failure) {
         if (scripted() || !renders_.shown()) std::rethrow_exception(news.failure);
-        film_.reset();
+        navigation_.film.reset();
         if (message_.note != reason(news.failure)) say(reason(news.failure));
     }
     if (news.point_answered) {
         if (news.point) {
-            view_.focus(*news.point);
-            leave_camera();
+            navigation_.view.focus(*news.point);
+            navigation_.leave_camera();
         } else {
             say("no splat is opaque enough here to look at");
         }
-        redraw(kRedraws);
+        redraw(Loop::kRedraws);
     }
     for (const auto& file : news.written)
-        if (!film_) say("wrote " + std::filesystem::absolute(file).string());
-    quality_.take(news.full);
+        if (!navigation_.film) say("wrote " + std::filesystem::absolute(file).string());
+    shown_.quality.take(news.full);
     if (news.frame) redraw();
 }
 
 void App::take_comparison() {
-    if (at_camera_ && quality_.psnr(*at_camera_) != shown_psnr_) redraw();
-    const ImageComparison::News news = comparison_.take();
+    if (navigation_.at_camera && shown_.quality.psnr(*navigation_.at_camera) != shown_.psnr) redraw();
+    const ImageComparison::News news = shown_.comparison.take();
     if (news == ImageComparison::News::none) return;
     if (news == ImageComparison::News::comparison) return redraw();
-    if (comparison_.image()->failure.empty())
-        screen_->presenter.set_picture(Layer::image, comparison_.image()->picture);
-    redraw(kRedraws);
+    if (shown_.comparison.image()->failure.empty())
+        screen_->presenter.set_picture(Layer::image, shown_.comparison.image()->picture);
+    redraw(Loop::kRedraws);
 }
 
 }  // namespace ewa::viewer

@@ -3,8 +3,8 @@
 #pragma once
 #include <algorithm>
 #include <chrono>
-#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <future>
 #include <memory>
 #include <optional>
@@ -16,6 +16,7 @@
 #include "viewer/file_dialog.h"
 #include "viewer/kept_settings.h"
 #include "viewer/message.h"
+#include "viewer/navigation.h"
 #include "viewer/overlay.h"
 #include "viewer/panel.h"
 #include "viewer/renders.h"
@@ -25,24 +26,6 @@
 #include "viewer/view_quality.h"
 
 namespace ewa::viewer {
-
-/// A film that is being written: frames along the path through saved views, one file each.
-struct Film {
-    static constexpr int kRate = 30;  // frames per second
-
-    std::filesystem::path folder;
-    std::vector<Camera> keys;  // at least one
-    Size size;                 // of every frame, also if the window changes
-    int frames = 0, next = 0;
-    uint64_t waits_for = 0;  // serial of the frame that is being written; 0: none
-
-    /// The keys are kRate * seconds frames apart; the first and last key are frames.
-    Film(const std::vector<io::NamedView>& views, const std::filesystem::path& folder, Size size,
-         double seconds);
-    bool finished() const { return next >= frames; }
-    Camera camera() const;
-    std::filesystem::path file() const;
-};
 
 /// A training on photos, which starts once they have cameras.
 struct LaterTraining {
@@ -77,6 +60,54 @@ Size camera_size_or_usual(const Startup& startup);
 Viewpoint start_view(const OpenedScene& scene, std::optional<int> frame, Size size);
 
 std::string window_title(const OpenedScene& scene);
+
+/// What the loop of the window has still to do.
+struct Loop {
+    static constexpr int kRedraws = 3;  // frames that ImGui needs to answer input
+    std::chrono::steady_clock::time_point last_frame = std::chrono::steady_clock::now();
+    int redraws = kRedraws;  // frames that are still to draw
+    bool capture = false;    // write a screenshot as soon as the full frame is shown
+    bool done = false;
+    int devices_lost = 0;
+    SessionTimes times;
+};
+
+/// What lies beside or over the picture.
+struct Panels {
+    bool beside = true;  // in a window with room for the panel
+    bool over = false;   // in a narrow window, where the panel lies over the picture
+    bool help = false, dragging_wipe = false;
+};
+
+/// The picture on the screen, and how it compares with the image of its camera.
+struct Shown {
+    explicit Shown(const std::function<void()>& wake) : comparison(wake), quality(wake) {}
+
+    std::shared_ptr<const ByteImage> picture;  // the presenter's: a render or a difference
+    bool difference = false;
+    std::optional<double> psnr;  // in the panel, dB
+    double text_height = 0;      // of the screen
+    ImageComparison comparison;
+    ViewQuality quality;
+};
+
+/// What is on its way into the window, and out of it.
+struct Session {
+    explicit Session(const std::function<void()>& wake) : search(wake), dialog(wake), live(wake) {}
+
+    template <class Result>
+    static bool finished(const std::future<Result>& future) {
+        return future.valid() && future.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+    }
+
+    bool live_failed = false;    // a training that cannot be reached was reported
+    std::string search_failure;  // why photos have no cameras; one line
+    std::future<OpenedScene> opening;
+    std::future<std::string> saving;  // a screenshot; the message about it
+    CameraSearch search;
+    FileDialog dialog;
+    LiveRun live;
+};
 
 class App {
   public:
@@ -114,7 +145,7 @@ class App {
     std::optional<Camera> requested_camera() const;
     bool scripted() const { return startup_.picture || startup_.film; }
     double patience() const;
-    void redraw(int frames = 1) { redraws_ = std::max(redraws_, frames); }
+    void redraw(int frames = 1) { loop_.redraws = std::max(loop_.redraws, frames); }
     void say(const std::string& note);
 
     // app_input.cpp: keys, the mouse, the dataset's cameras, saved views, and the film.
@@ -127,13 +158,9 @@ class App {
     void go_to_camera(int frame);
     void go_to_nearest_camera();
     void step_camera(int step);
-    void leave_camera() { at_camera_.reset(); }
-    void reset_view();
     void show_whole_scene();
     void change_comparison();
-    std::vector<io::NamedView>::iterator find_view(size_t number);
     void save_view(size_t number);
-    void go_to_view(const io::NamedView& view);
     void go_to_number(size_t number);
     void write_views();
     void start_film();
@@ -152,9 +179,9 @@ class App {
     double text_height() const;  // px of the framebuffer
     int panel_width() const;     // px of the framebuffer, also while it is hidden
     bool panel_fits() const;     // beside the picture
-    bool panel_shown() const { return !scripted() && (panel_fits() ? show_panel_ : show_over_panel_); }
+    bool panel_shown() const { return !scripted() && (panel_fits() ? panels_.beside : panels_.over); }
     Rectangle picture_area() const;
-    Comparison comparison() const { return at_camera_ ? settings_.comparison : Comparison::none; }
+    Comparison comparison() const { return navigation_.at_camera ? settings_.comparison : Comparison::none; }
     bool comparing() const;  // the image of the camera is shown or compared
     std::optional<ComparisonRequest> comparison_wanted() const;
     Arrangement arrangement() const;
@@ -167,44 +194,17 @@ class App {
     Window window_;
     std::unique_ptr<Screen> screen_;
     OpenedScene scene_;
-    double camera_size_ = 1;          // of a drawn camera, world units
-    std::optional<int> start_frame_;  // the frame that "reset" returns to
-    bool framed_ = false;             // the first view was chosen when there were splats
-    ViewCamera view_;
-    std::optional<int> at_camera_;  // the frame of the dataset whose camera the view is at
     PanelSettings settings_;
-    std::vector<io::NamedView> views_;  // saved under a number, which is the name
-    std::optional<Film> film_;
-    SessionTimes times_;
     std::string device_name_;
     Message message_;
-
-    std::shared_ptr<const ByteImage> on_screen_;  // the presenter's picture: a render or a difference
-    bool difference_on_screen_ = false;
-    std::optional<double> shown_psnr_;  // in the panel, dB
-    Clock::time_point last_frame_;
-    bool show_panel_ = true;        // in a window with room for it
-    bool show_over_panel_ = false;  // in a narrow window, where it lies over the picture
-    bool show_help_ = false, dragging_wipe_ = false;
-    bool capture_ = false;               // write a screenshot as soon as the full frame is shown
-    std::optional<int> pointed_camera_;  // the frame whose camera is under the pointer
-    static constexpr int kRedraws = 3;   // frames that ImGui needs to answer input
-    int redraws_ = kRedraws;             // frames that are still to draw
-    int devices_lost_ = 0;
-    double shown_text_ = 0;     // text_height() of the screen
-    bool live_failed_ = false;  // a training that cannot be reached was reported
-    bool done_ = false;
-    std::string search_failure_;  // why photos have no cameras; one line
-    std::future<OpenedScene> opening_;
-    std::future<std::string> saving_;  // a screenshot; the message about it
+    Loop loop_;
+    Panels panels_;
+    Navigation navigation_;
 
     // Their threads call wake() of the window system. Declared last, so that they end before it does.
-    CameraSearch search_;
-    FileDialog dialog_;
-    ImageComparison comparison_;
-    ViewQuality quality_;
+    Shown shown_;
     Renders renders_;
-    LiveRun live_;
+    Session session_;
 };
 
 /// The first of <stem>-1<extension>, <stem>-2<extension>, ... that does not exist.

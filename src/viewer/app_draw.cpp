@@ -16,22 +16,25 @@ constexpr int kMostDevicesLost = 5;  // a device that is lost more often is brok
 }  // namespace
 
 void App::panel() {
-    shown_psnr_ = comparing() ? quality_.psnr(*at_camera_) : std::nullopt;
+    shown_.psnr = comparing() ? shown_.quality.psnr(*navigation_.at_camera) : std::nullopt;
     const PanelFacts facts{
         .scene = scene_,
         .device = device_name_,
         .picture = renders_.shown().get(),
-        .views = views_,
-        .run = live_.update(),
+        .views = navigation_.views,
+        .run = session_.live.update(),
         .drawing = !renders_.settled(),
         .note = message_.note,
-        .image_failure = at_camera_ ? comparison_.failure_of(*at_camera_) : std::string(),
-        .psnr = shown_psnr_,
-        .pictures_a_second = times_.rate(),
-        .first_picture = times_.first_frame(),
-        .film = film_ ? std::optional(float(film_->next) / float(film_->frames)) : std::nullopt,
-        .up = view_.up(),
-        .at_camera = at_camera_,
+        .image_failure =
+            navigation_.at_camera ? shown_.comparison.failure_of(*navigation_.at_camera) : std::string(),
+        .psnr = shown_.psnr,
+        .pictures_a_second = loop_.times.rate(),
+        .first_picture = loop_.times.first_frame(),
+        .film = navigation_.film
+                    ? std::optional(float(navigation_.film->next) / float(navigation_.film->frames))
+                    : std::nullopt,
+        .up = navigation_.view.up(),
+        .at_camera = navigation_.at_camera,
         .width = float(panel_width()) / std::max(1e-3f, ImGui::GetIO().DisplayFramebufferScale.x),
         .over_picture = !panel_fits(),
     };
@@ -39,44 +42,48 @@ void App::panel() {
 }
 
 void App::obey(const PanelActions& actions) {
-    if (actions.screenshot) capture_ = true;
+    if (actions.screenshot) loop_.capture = true;
     if (actions.exr) save_exr();
-    if (actions.reset) reset_view();
+    if (actions.reset) navigation_.reset();
     if (actions.whole_scene) show_whole_scene();
-    if (actions.open) dialog_.ask(*actions.open);
+    if (actions.open) session_.dialog.ask(*actions.open);
     if (actions.train) train();
     if (actions.frame) go_to_camera(*actions.frame);
-    if (actions.command) live_.command(*actions.command);
-    if (actions.up) view_.set_up(*actions.up);
+    if (actions.command) session_.live.command(*actions.command);
+    if (actions.up) navigation_.view.set_up(*actions.up);
     if (actions.save_view) {
         size_t free = 1;
-        while (find_view(free) != views_.end()) ++free;
+        while (navigation_.find(free) != navigation_.views.end()) ++free;
         save_view(free);
     }
-    if (actions.view && *actions.view < views_.size()) go_to_view(views_[*actions.view]);
-    if (actions.forget && *actions.forget < views_.size())
-        views_.erase(views_.begin() + std::ptrdiff_t(*actions.forget));
-    if (actions.film && views_.size() >= 2) start_film();
-    if (actions.stop_film) film_.reset();
+    if (actions.view && *actions.view < navigation_.views.size()) {
+        const io::NamedView& view = navigation_.views[*actions.view];
+        navigation_.go_to(view.camera, view.pivot);
+    }
+    if (actions.forget && *actions.forget < navigation_.views.size())
+        navigation_.views.erase(navigation_.views.begin() + std::ptrdiff_t(*actions.forget));
+    if (actions.film && navigation_.views.size() >= 2) start_film();
+    if (actions.stop_film) navigation_.film.reset();
     if (actions.write_views) write_views();
 }
 
 void App::draw_overlays() {
     const Arrangement places = arrangement();
-    pointed_camera_.reset();
+    navigation_.pointed_camera.reset();
     if (settings_.cameras && scene_.dataset) {
-        const Camera seen = view_.camera(places.rendering.width, places.rendering.height);
-        pointed_camera_ = draw_cameras({*scene_.dataset, seen, places.rendering, camera_size_, at_camera_});
+        const Camera seen = navigation_.view.camera(places.rendering.width, places.rendering.height);
+        navigation_.pointed_camera = draw_cameras(
+            {*scene_.dataset, seen, places.rendering, navigation_.camera_size, navigation_.at_camera});
     }
     if (comparing()) draw_comparison(settings_.comparison, places, settings_.wipe);
     const Rectangle area = picture_area();
     const std::optional<Headline> words = headline();
     if (words) draw_headline(*words, area);
     if (empty())
-        if (const auto wanted = draw_open_buttons(area)) dialog_.ask(*wanted);
-    if (search_.running() && draw_search(search_.progress(), area)) search_.cancel();
+        if (const auto wanted = draw_open_buttons(area)) session_.dialog.ask(*wanted);
+    if (session_.search.running() && draw_search(session_.search.progress(), area)) session_.search.cancel();
     if (const std::string text = banner(); !text.empty()) draw_banner(text, area);
-    if (!words && message_.hinting(Clock::now()) && !show_help_)
+    if (!words && message_.hinting(Clock::now()) && !panels_.help)
         draw_hint(scene_.dataset != nullptr, panel_shown(), area);
 }
 
@@ -99,8 +106,8 @@ Rectangle App::picture_area() const {
 
 Arrangement App::arrangement() const {
     Size image{1, 1};
-    if (at_camera_) {
-        const Camera& camera = scene_.dataset->frames[size_t(*at_camera_)].camera;
+    if (navigation_.at_camera) {
+        const Camera& camera = scene_.dataset->frames[size_t(*navigation_.at_camera)].camera;
         image = {camera.width, camera.height};
     }
     return arrange(comparison(), picture_area(), image);
@@ -108,35 +115,35 @@ Arrangement App::arrangement() const {
 
 /// Opens the screen, also with another size of the text.
 void App::change_text() {
-    if (screen_ && shown_text_ == text_height()) return;
-    shown_text_ = text_height();
+    if (screen_ && shown_.text_height == text_height()) return;
+    shown_.text_height = text_height();
     screen_.reset();
-    screen_ = std::make_unique<Screen>(system_, window_, device_name_, shown_text_);
-    if (const auto image = comparison_.image(); image && image->failure.empty())
+    screen_ = std::make_unique<Screen>(system_, window_, device_name_, shown_.text_height);
+    if (const auto image = shown_.comparison.image(); image && image->failure.empty())
         screen_->presenter.set_picture(Layer::image, image->picture);
-    on_screen_.reset();
+    shown_.picture.reset();
     choose_picture();
-    redraw(kRedraws);
+    redraw(Loop::kRedraws);
 }
 
 bool App::comparing() const {
-    return comparison() != Comparison::none && comparison_.image_of(*at_camera_);
+    return comparison() != Comparison::none && shown_.comparison.image_of(*navigation_.at_camera);
 }
 
 void App::load_image() {
     if (comparison() == Comparison::none) return;
-    comparison_.load(*at_camera_, scene_.dataset->frames[size_t(*at_camera_)], arrangement().image.size(),
-                     settings_.look.background);
+    shown_.comparison.load(*navigation_.at_camera, scene_.dataset->frames[size_t(*navigation_.at_camera)],
+                           arrangement().image.size(), settings_.look.background);
 }
 
 /// The PSNR is of colours, at the size of the image.
 void App::measure_view() {
     const auto& shown = renders_.shown();
     if (scripted() || !comparing() || !renders_.settled() || shown->request.look.mode != Mode::color) return;
-    const Frame& frame = scene_.dataset->frames[size_t(*at_camera_)];
+    const Frame& frame = scene_.dataset->frames[size_t(*navigation_.at_camera)];
     const auto own = scene_.appearances.find(frame.name);
-    quality_.measure(renders_, *at_camera_, frame, settings_.look,
-                     own == scene_.appearances.end() ? scene_.of_new_views : own->second);
+    shown_.quality.measure(renders_, *navigation_.at_camera, frame, settings_.look,
+                           own == scene_.appearances.end() ? scene_.of_new_views : own->second);
 }
 
 /// The full frame can be compared if it shows colours from the camera of the image.
@@ -148,7 +155,7 @@ std::optional<ComparisonRequest> App::comparison_wanted() const {
     const Rectangle rendering = arrangement().rendering, image = arrangement().image;
     if (shown->picture.width != rendering.width || shown->picture.height != rendering.height)
         return std::nullopt;
-    return ComparisonRequest{shown, comparison_.image_of(*at_camera_),
+    return ComparisonRequest{shown, shown_.comparison.image_of(*navigation_.at_camera),
                              fitted(image.size(), {0, 0, rendering.width, rendering.height}), settings_.gain};
 }
 
@@ -158,40 +165,41 @@ void App::choose_picture() {
     const auto& shown = renders_.shown();
     if (!shown) return;
     const auto wanted = comparison_wanted();
-    comparison_.compare(wanted);
+    shown_.comparison.compare(wanted);
     std::shared_ptr<const ByteImage> picture(shown, &shown->picture);
     if (wanted) {
-        if (const auto compared = comparison_.compared())
+        if (const auto compared = shown_.comparison.compared())
             picture = std::shared_ptr<const ByteImage>(compared, &compared->difference);
-        else if (difference_on_screen_)
+        else if (shown_.difference)
             return;
     }
-    difference_on_screen_ = picture.get() != &shown->picture;
-    if (picture == on_screen_) return;
-    on_screen_ = picture;
+    shown_.difference = picture.get() != &shown->picture;
+    if (picture == shown_.picture) return;
+    shown_.picture = picture;
     screen_->presenter.set_picture(Layer::rendering, *picture);
 }
 
 void App::draw() {
-    --redraws_;
+    --loop_.redraws;
     load_image();
     const Comparison before = settings_.comparison;
     screen_->gui.begin_frame();
     if (!scripted()) draw_overlays();
     if (panel_shown()) panel();
-    if (show_help_) draw_help(show_help_);
+    if (panels_.help) draw_help(panels_.help);
     if (!scripted() && message_.noting(Clock::now())) draw_note(message_.note, picture_area());
     handle_mouse();
     ImDrawData* drawn = screen_->gui.end_frame();
-    if (settings_.comparison != before) redraw(kRedraws);
+    if (settings_.comparison != before) redraw(Loop::kRedraws);
     choose_picture();
     measure_view();
 
-    const bool image_ready = comparison() == Comparison::none || comparison_.loaded(*at_camera_);
-    const auto& requested = comparison_.requested();
-    const bool difference_ready = !requested || comparison_.compared();
-    const bool capture =
-        capture_ && renders_.settled() && image_ready && difference_ready && !film_ && !saving_.valid();
+    const bool image_ready =
+        comparison() == Comparison::none || shown_.comparison.loaded(*navigation_.at_camera);
+    const auto& requested = shown_.comparison.requested();
+    const bool difference_ready = !requested || shown_.comparison.compared();
+    const bool capture = loop_.capture && renders_.settled() && image_ready && difference_ready &&
+                         !navigation_.film && !session_.saving.valid();
     Image image;
     if (!present(drawn, capture ? &image : nullptr)) {
         // A minimised window shows nothing. Otherwise the window is changing: try again soon.
@@ -199,7 +207,7 @@ void App::draw() {
         if (size.width > 0 && size.height > 0) redraw();
         return;
     }
-    times_.count(renders_.shown());
+    loop_.times.count(renders_.shown());
     if (capture) save(without_left(image, picture_area().x));
 }
 
@@ -221,9 +229,9 @@ bool App::present(ImDrawData* drawn, Image* capture) {
     try {
         return screen_->presenter.draw(window_.framebuffer(), layers, drawn, capture);
     } catch (const vk::DeviceLostError&) {
-        if (++devices_lost_ > kMostDevicesLost) throw;
+        if (++loop_.devices_lost > kMostDevicesLost) throw;
     } catch (const vk::SurfaceLostKHRError&) {
-        if (++devices_lost_ > kMostDevicesLost) throw;
+        if (++loop_.devices_lost > kMostDevicesLost) throw;
     }
     screen_.reset();
     change_text();
@@ -232,13 +240,13 @@ bool App::present(ImDrawData* drawn, Image* capture) {
 }
 
 void App::save(Image&& image) {
-    capture_ = false;
+    loop_.capture = false;
     if (startup_.picture) {
         save_image(*startup_.picture, image);
-        done_ = true;
+        loop_.done = true;
         return;
     }
-    saving_ = std::async(std::launch::async, [this, image = std::move(image)]() -> std::string {
+    session_.saving = std::async(std::launch::async, [this, image = std::move(image)]() -> std::string {
         const Wake wake{system_};
         try {
             const std::filesystem::path path = free_name("ewa-view", ".png");

@@ -5,11 +5,9 @@
 #include <imgui.h>
 
 #include <algorithm>
-#include <cstdio>
 
 #include "core/folders.h"
 #include "ewa/error.h"
-#include "scene/camera.h"
 #include "viewer/app.h"
 
 namespace ewa::viewer {
@@ -38,17 +36,18 @@ void App::handle_key(const KeyPress& press) {
     // A text field does not use these keys, so they act while one is edited. The other keys belong to the
     // field.
     if (key == GLFW_KEY_Q && press.control) return window_.close();
-    if (key == GLFW_KEY_O && press.control) return dialog_.ask(press.shift ? Wanted::folder : Wanted::file);
-    if (key == GLFW_KEY_ESCAPE) return search_.cancel();
+    if (key == GLFW_KEY_O && press.control)
+        return session_.dialog.ask(press.shift ? Wanted::folder : Wanted::file);
+    if (key == GLFW_KEY_ESCAPE) return session_.search.cancel();
     switch (key) {
         case GLFW_KEY_F1:
-            toggle(show_help_);
+            toggle(panels_.help);
             message_.hint_until = {};
             return;
         case GLFW_KEY_F2:
-            return toggle(panel_fits() ? show_panel_ : show_over_panel_);
+            return toggle(panel_fits() ? panels_.beside : panels_.over);
         case GLFW_KEY_F12:
-            return press.shift ? save_exr() : void(capture_ = true);
+            return press.shift ? save_exr() : void(loop_.capture = true);
         default:
             break;
     }
@@ -57,7 +56,7 @@ void App::handle_key(const KeyPress& press) {
     float& scale = settings_.look.splat_scale;
     switch (key) {
         case GLFW_KEY_R:
-            reset_view();
+            navigation_.reset();
             settings_.turntable = false;
             return;
         case GLFW_KEY_F:
@@ -74,7 +73,7 @@ void App::handle_key(const KeyPress& press) {
         case GLFW_KEY_T:
             return toggle(settings_.turntable);
         case GLFW_KEY_U:
-            return view_.set_up(next_up(view_.up()));
+            return navigation_.view.set_up(next_up(navigation_.view.up()));
         case GLFW_KEY_C:
             return toggle(settings_.cameras);
         case GLFW_KEY_G:
@@ -99,10 +98,11 @@ bool App::flying() const {
 }
 
 void App::move_by_itself(double seconds) {
-    if (capture_) return;  // the screenshot shows the view at the key press, once its full frame is ready
+    if (loop_.capture)
+        return;  // the screenshot shows the view at the key press, once its full frame is ready
     if (settings_.turntable) {
-        view_.orbit(kTurntableSpeed * seconds, 0);
-        leave_camera();
+        navigation_.view.orbit(kTurntableSpeed * seconds, 0);
+        navigation_.leave_camera();
         redraw();
     }
     if (!flying()) return;
@@ -112,8 +112,8 @@ void App::move_by_itself(double seconds) {
     const bool fast = window_.held(GLFW_KEY_LEFT_SHIFT) || window_.held(GLFW_KEY_RIGHT_SHIFT);
     const glm::dvec3 way(either(GLFW_KEY_A, GLFW_KEY_D), either(GLFW_KEY_E, GLFW_KEY_Q),
                          either(GLFW_KEY_S, GLFW_KEY_W));
-    view_.fly(way * (seconds * kFlySpeed * (fast ? 4 : 1)));
-    leave_camera();
+    navigation_.view.fly(way * (seconds * kFlySpeed * (fast ? 4 : 1)));
+    navigation_.leave_camera();
     redraw();
 }
 
@@ -122,19 +122,19 @@ void App::handle_drag(double right, double down) {
     const Rectangle place = arrangement().rendering;
     const bool left_button = ImGui::IsMouseDown(ImGuiMouseButton_Left);
     if (left_button && io.KeyCtrl) {
-        view_.look(right * kRadiansPerPixel, down * kRadiansPerPixel);
+        navigation_.view.look(right * kRadiansPerPixel, down * kRadiansPerPixel);
     } else if (left_button) {
         // Ignore the small motion of a click, so that a double click does not move the camera.
         if (!ImGui::IsMouseDragging(ImGuiMouseButton_Left, kStillPixels)) return;
-        view_.orbit(right * kRadiansPerPixel, down * kRadiansPerPixel);
+        navigation_.view.orbit(right * kRadiansPerPixel, down * kRadiansPerPixel);
     } else if (ImGui::IsMouseDown(ImGuiMouseButton_Right) || ImGui::IsMouseDown(ImGuiMouseButton_Middle)) {
-        view_.pan(right * io.DisplayFramebufferScale.x, down * io.DisplayFramebufferScale.y, place.width,
-                  place.height);
+        navigation_.view.pan(right * io.DisplayFramebufferScale.x, down * io.DisplayFramebufferScale.y,
+                             place.width, place.height);
     } else {
         return;
     }
     settings_.turntable = false;
-    leave_camera();
+    navigation_.leave_camera();
 }
 
 void App::handle_mouse() {
@@ -143,34 +143,34 @@ void App::handle_mouse() {
     const Arrangement places = arrangement();
     const bool wiping = comparing() && settings_.comparison == Comparison::wipe;
     if (ImGui::IsMouseClicked(ImGuiMouseButton_Left))
-        dragging_wipe_ = wiping && over_wipe(places.image, settings_.wipe);
-    if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) dragging_wipe_ = false;
-    if (dragging_wipe_ || (wiping && over_wipe(places.image, settings_.wipe)))
+        panels_.dragging_wipe = wiping && over_wipe(places.image, settings_.wipe);
+    if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) panels_.dragging_wipe = false;
+    if (panels_.dragging_wipe || (wiping && over_wipe(places.image, settings_.wipe)))
         ImGui::SetMouseCursor(ImGuiMouseCursor_ResizeEW);
     const double x = io.MousePos.x * double(io.DisplayFramebufferScale.x);
     const double y = io.MousePos.y * double(io.DisplayFramebufferScale.y);
-    if (dragging_wipe_) {
+    if (panels_.dragging_wipe) {
         settings_.wipe = float(std::clamp((x - places.image.x) / places.image.width, 0.0, 1.0));
         return;
     }
     if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0) handle_drag(io.MouseDelta.x, io.MouseDelta.y);
     if (io.MouseWheel != 0) {
-        view_.zoom(io.MouseWheel);
-        leave_camera();
+        navigation_.view.zoom(io.MouseWheel);
+        navigation_.leave_camera();
     }
     if (ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left)) {
-        renders_.ask_point(view_.camera(places.rendering.width, places.rendering.height),
+        renders_.ask_point(navigation_.view.camera(places.rendering.width, places.rendering.height),
                            {x - places.rendering.x, y - places.rendering.y});
         return;
     }
-    if (pointed_camera_ && ImGui::IsMouseReleased(ImGuiMouseButton_Left) &&
+    if (navigation_.pointed_camera && ImGui::IsMouseReleased(ImGuiMouseButton_Left) &&
         io.MouseDragMaxDistanceSqr[ImGuiMouseButton_Left] < kStillPixels * kStillPixels)
-        go_to_camera(*pointed_camera_);
+        go_to_camera(*navigation_.pointed_camera);
 }
 
 void App::go_to_camera(int frame) {
-    view_.stand(dataset_view(*scene_.gaussians, *scene_.dataset, frame));
-    at_camera_ = frame;
+    navigation_.view.stand(dataset_view(*scene_.gaussians, *scene_.dataset, frame));
+    navigation_.at_camera = frame;
     settings_.turntable = false;
     redraw();
 }
@@ -178,25 +178,21 @@ void App::go_to_camera(int frame) {
 void App::go_to_nearest_camera() {
     if (!scene_.dataset) return say("there are no cameras; --cameras DATASET shows a dataset's");
     const Size size = picture_area().size();
-    go_to_camera(nearest_frame(*scene_.dataset, view_.camera(size.width, size.height), view_.radius()));
+    go_to_camera(nearest_frame(*scene_.dataset, navigation_.view.camera(size.width, size.height),
+                               navigation_.view.radius()));
 }
 
 void App::step_camera(int step) {
-    if (!scene_.dataset || !at_camera_) return go_to_nearest_camera();
+    if (!scene_.dataset || !navigation_.at_camera) return go_to_nearest_camera();
     const int count = int(scene_.dataset->frames.size());
-    go_to_camera((*at_camera_ + step + count) % count);
-}
-
-void App::reset_view() {
-    view_.reset();
-    at_camera_ = start_frame_;
+    go_to_camera((*navigation_.at_camera + step + count) % count);
 }
 
 void App::show_whole_scene() {
     const Size size = picture_area().size();
     Viewpoint place = framing_view(*scene_.gaussians, scene_.dataset.get(), size.width, size.height);
-    view_.stand(place);
-    leave_camera();
+    navigation_.view.stand(place);
+    navigation_.leave_camera();
     settings_.turntable = false;
     redraw();
 }
@@ -204,33 +200,24 @@ void App::show_whole_scene() {
 void App::change_comparison() {
     if (!scene_.dataset) return go_to_nearest_camera();
     settings_.comparison = Comparison((int(settings_.comparison) + 1) % 4);
-    if (settings_.comparison != Comparison::none && !at_camera_) go_to_nearest_camera();
-}
-
-std::vector<io::NamedView>::iterator App::find_view(size_t number) {
-    return std::find_if(
-        views_.begin(), views_.end(),
-        [name = std::to_string(number)](const io::NamedView& view) { return view.name == name; });
+    if (settings_.comparison != Comparison::none && !navigation_.at_camera) go_to_nearest_camera();
 }
 
 void App::save_view(size_t number) {
     const Size size = picture_area().size();
     const std::string name = std::to_string(number);
-    const io::NamedView view{name, view_.camera(size.width, size.height), view_.pivot()};
-    if (const auto same = find_view(number); same != views_.end())
+    const io::NamedView view{name, navigation_.view.camera(size.width, size.height),
+                             navigation_.view.pivot()};
+    if (const auto same = navigation_.find(number); same != navigation_.views.end())
         *same = view;
     else
-        views_.push_back(view);
+        navigation_.views.push_back(view);
     say("view " + name + " is saved; Shift + " + name + " goes to it");
 }
 
-void App::go_to_view(const io::NamedView& view) {
-    view_.stand({view.camera, view.pivot, view_.up(), view_.radius()});
-    leave_camera();
-}
-
 void App::go_to_number(size_t number) {
-    if (const auto view = find_view(number); view != views_.end()) return go_to_view(*view);
+    if (const auto view = navigation_.find(number); view != navigation_.views.end())
+        return navigation_.go_to(view->camera, view->pivot);
     const std::string name = std::to_string(number);
     say("there is no view " + name + "; Ctrl + " + name + " saves one");
 }
@@ -238,7 +225,7 @@ void App::go_to_number(size_t number) {
 void App::write_views() {
     try {
         const std::filesystem::path file = free_name("ewa-views", ".json");
-        io::write_views(file, views_);
+        io::write_views(file, navigation_.views);
         say("wrote " + std::filesystem::absolute(file).string() + "; --views opens it");
     } catch (const RunError& error) {
         say(error.what());
@@ -246,7 +233,7 @@ void App::write_views() {
 }
 
 void App::start_film() {
-    Film film(views_, startup_.film.value_or(free_name("ewa-film", "")), picture_area().size(),
+    Film film(navigation_.views, startup_.film.value_or(free_name("ewa-film", "")), picture_area().size(),
               double(settings_.film_seconds));
     try {
         core::make_folder(film.folder);
@@ -255,44 +242,29 @@ void App::start_film() {
         return say(error.what());
     }
     settings_.turntable = false;
-    leave_camera();
-    film_ = std::move(film);
+    navigation_.leave_camera();
+    navigation_.film = std::move(film);
 }
 
 /// Asks for the next frame once the last one is written.
 void App::continue_film() {
-    if (film_->waits_for != 0) {
-        if (!renders_.shown() || renders_.shown()->request.serial < film_->waits_for) return;
-        ++film_->next;
+    if (navigation_.film->waits_for != 0) {
+        if (!renders_.shown() || renders_.shown()->request.serial < navigation_.film->waits_for) return;
+        ++navigation_.film->next;
         redraw();
     }
-    if (film_->finished()) {
-        say("wrote " + std::to_string(film_->frames) + " pictures to " +
-            std::filesystem::absolute(film_->folder).string());
-        film_.reset();
-        done_ = startup_.film.has_value();
+    if (navigation_.film->finished()) {
+        say("wrote " + std::to_string(navigation_.film->frames) + " pictures to " +
+            std::filesystem::absolute(navigation_.film->folder).string());
+        navigation_.film.reset();
+        loop_.done = startup_.film.has_value();
         return;
     }
-    view_.stand({film_->camera(), view_.pivot(), view_.up(), view_.radius()});
-    film_->waits_for =
-        renders_.write(view_.camera(film_->size.width, film_->size.height), settings_.look, film_->file());
-}
-
-Film::Film(const std::vector<io::NamedView>& views, const std::filesystem::path& into, Size frame_size,
-           double seconds)
-    : folder(into), size(frame_size) {
-    for (const io::NamedView& view : views) keys.push_back(view.camera);
-    frames = int((double(keys.size()) - 1) * kRate * seconds + 0.5) + 1;
-}
-
-Camera Film::camera() const {
-    return along_path(keys, frames > 1 ? double(next) * double(keys.size() - 1) / (frames - 1) : 0);
-}
-
-std::filesystem::path Film::file() const {
-    char name[32];
-    std::snprintf(name, sizeof(name), "%05d.png", next);
-    return folder / name;
+    navigation_.view.stand({navigation_.film->camera(), navigation_.view.pivot(), navigation_.view.up(),
+                            navigation_.view.radius()});
+    navigation_.film->waits_for =
+        renders_.write(navigation_.view.camera(navigation_.film->size.width, navigation_.film->size.height),
+                       settings_.look, navigation_.film->file());
 }
 
 }  // namespace ewa::viewer

@@ -39,40 +39,40 @@ void App::adopt(OpenedScene scene, std::optional<int> frame) {
     settings_.look.sh_degree = scene_.sh_degree;
     message_.note.clear();
     if (!scene_.remark.empty()) say(scene_.remark);
-    framed_ = scene_.gaussians->size() > 0;
-    comparison_.forget_scene();
-    quality_.forget();
-    leave_camera();
-    start_frame_.reset();
+    navigation_.framed = scene_.gaussians->size() > 0;
+    shown_.comparison.forget_scene();
+    shown_.quality.forget();
+    navigation_.leave_camera();
+    navigation_.start_frame.reset();
     if (scene_.dataset) {
-        camera_size_ = camera_size(*scene_.dataset, view_.radius());
-        start_frame_ = at_camera_ = frame.value_or(0);
+        navigation_.camera_size = camera_size(*scene_.dataset, navigation_.view.radius());
+        navigation_.start_frame = navigation_.at_camera = frame.value_or(0);
     }
-    redraw(kRedraws);
+    redraw(Loop::kRedraws);
 }
 
 void App::show_opened(OpenedScene scene) {
-    search_failure_.clear();
-    view_.restart(start_view(scene, {}, picture_area().size()));
+    session_.search_failure.clear();
+    navigation_.view.restart(start_view(scene, {}, picture_area().size()));
     window_.set_title(window_title(scene));
     adopt(std::move(scene), {});
 }
 
 /// shown: what the files may add to; an empty scene if they are opened by themselves.
 void App::open(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown) {
-    if (opening_.valid()) return say("another file is being opened");
-    if (search_.running()) return say("cameras of photos are being found; Esc stops that");
+    if (session_.opening.valid()) return say("another file is being opened");
+    if (session_.search.running()) return say("cameras of photos are being found; Esc stops that");
     say("opening " + core::one_line(paths.front().string()));
-    opening_ = std::async(std::launch::async, [this, paths, shown] {
+    session_.opening = std::async(std::launch::async, [this, paths, shown] {
         const Wake wake{system_};
         return open_dropped(paths, shown);
     });
 }
 
 void App::take_opened() {
-    if (!opening_.valid() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+    if (!Session::finished(session_.opening)) return;
     try {
-        OpenedScene scene = opening_.get();
+        OpenedScene scene = session_.opening.get();
         if (!scene.photos.empty()) return find_cameras(scene.photos);
         const bool same_splats = scene.gaussians == scene_.gaussians;
         show_opened(std::move(scene));
@@ -80,7 +80,7 @@ void App::take_opened() {
             settings_.cameras = true;
             return;
         }
-        live_.stop();
+        session_.live.stop();
         if (!scene_.run.empty()) watch({scene_.run, {}, {}, scene_.splats_time}, nullptr);
     } catch (const std::exception& error) {
         say(error.what());
@@ -90,60 +90,60 @@ void App::take_opened() {
 /// What the file dialog has answered.
 void App::take_chosen() {
     try {
-        if (const auto path = dialog_.take()) open({*path}, {});
+        if (const auto path = session_.dialog.take()) open({*path}, {});
     } catch (const std::exception& error) {
         say(error.what());
     }
 }
 
 void App::find_cameras(const std::filesystem::path& photos) {
-    search_failure_.clear();
+    session_.search_failure.clear();
     message_.note.clear();
     const bool train = startup_.later && photos == startup_.scene.photos;
-    search_.start(photos, (train ? startup_.later->folder : folder_for_photos(photos)) / "dataset",
-                  train ? startup_.later->capture : CaptureOptions());
-    redraw(kRedraws);
+    session_.search.start(photos, (train ? startup_.later->folder : folder_for_photos(photos)) / "dataset",
+                          train ? startup_.later->capture : CaptureOptions());
+    redraw(Loop::kRedraws);
 }
 
 void App::take_found() {
-    if (!search_.running()) return;
+    if (!session_.search.running()) return;
     redraw();
-    if (!search_.ended()) return;
+    if (!session_.search.ended()) return;
     try {
-        std::optional<OpenedScene> scene = search_.take();
+        std::optional<OpenedScene> scene = session_.search.take();
         if (!scene) return say("stopped; opened again, the photos go on from here");
         const bool train = startup_.later && scene->photos == startup_.scene.photos;
-        live_.stop();
+        session_.live.stop();
         show_opened(std::move(*scene));
         settings_.cameras = true;
         if (train && !training()) start_training(startup_.later->options, startup_.later->folder);
     } catch (const std::exception& error) {
-        search_failure_ = error.what();
+        session_.search_failure = error.what();
         if (core::find_program("colmap").empty())
-            search_failure_ += "; or run ewa cameras where it is, and open the dataset that it makes";
-        say(search_failure_);
+            session_.search_failure += "; or run ewa cameras where it is, and open the dataset that it makes";
+        say(session_.search_failure);
     }
 }
 
 void App::watch(const live::WhatToWatch& what, TrainProcess* trainer) {
     // A run in a folder may have ended before the window reaches it. Its files then tell how it went.
-    live_failed_ = !what.folder.empty();
-    live_.watch(what, trainer);
+    session_.live_failed = !what.folder.empty();
+    session_.live.watch(what, trainer);
     redraw();
 }
 
 /// New splats of the run replace those that are shown.
 void App::take_live() {
-    if (const auto status = live_.failure(); status && message_.note.empty())
+    if (const auto status = session_.live.failure(); status && message_.note.empty())
         say("the training ended with status " + std::to_string(*status) +
             "; see the terminal for the reason");
     // A screenshot waits for its full frame, which new splats would start again.
-    if (capture_ && framed_) return;
-    const LiveRun::News news = live_.take();
+    if (loop_.capture && navigation_.framed) return;
+    const LiveRun::News news = session_.live.take();
     if (news.any) redraw();
-    const live::Update* run = live_.update();
-    if (run && !run->problem.empty() && run->status.steps == 0 && !live_failed_) {
-        live_failed_ = true;
+    const live::Update* run = session_.live.update();
+    if (run && !run->problem.empty() && run->status.steps == 0 && !session_.live_failed) {
+        session_.live_failed = true;
         std::fprintf(stderr, "ewa-view: %s\n", core::one_line(run->problem).c_str());
     }
     if (!news.splats) return;
@@ -153,9 +153,9 @@ void App::take_live() {
     renders_.set_scene(news.splats);
     if (settings_.look.sh_degree == degree_before) settings_.look.sh_degree = scene_.sh_degree;
     // The first splats tell what to look at, unless the user has moved the camera.
-    if (!framed_ && (!scene_.dataset || at_camera_ == start_frame_))
-        view_.restart(start_view(scene_, start_frame_, picture_area().size()));
-    framed_ = true;
+    if (!navigation_.framed && (!scene_.dataset || navigation_.at_camera == navigation_.start_frame))
+        navigation_.view.restart(start_view(scene_, navigation_.start_frame, picture_area().size()));
+    navigation_.framed = true;
 }
 
 bool App::training() {
@@ -180,7 +180,7 @@ void App::train() {
 void App::start_training(const std::vector<std::string>& options, const std::filesystem::path& folder) {
     try {
         const auto now = std::filesystem::file_time_type::clock::now();
-        live_.stop();
+        session_.live.stop();
         trainer_ = std::make_unique<TrainProcess>(options, folder);
         watch({folder, {}, {}, now, now}, trainer_.get());
         say("training into " + std::filesystem::absolute(folder).string());
@@ -190,16 +190,17 @@ void App::start_training(const std::vector<std::string>& options, const std::fil
 }
 
 bool App::empty() const {
-    return scene_.gaussians->size() == 0 && scene_.title.empty() && !scene_.dataset && !opening_.valid() &&
-           !search_.running() && !live_.update();
+    return scene_.gaussians->size() == 0 && scene_.title.empty() && !scene_.dataset &&
+           !session_.opening.valid() && !session_.search.running() && !session_.live.update();
 }
 
 /// What the middle of the picture says where there is nothing to see.
 std::optional<Headline> App::headline() const {
-    if (scene_.gaussians->size() > 0 || search_.running()) return std::nullopt;
-    if (!search_failure_.empty() && !scene_.dataset) return Headline{"no cameras", search_failure_};
-    if (opening_.valid()) return Headline{"opening ...", ""};
-    if (const live::Update* run = live_.update()) {
+    if (scene_.gaussians->size() > 0 || session_.search.running()) return std::nullopt;
+    if (!session_.search_failure.empty() && !scene_.dataset)
+        return Headline{"no cameras", session_.search_failure};
+    if (session_.opening.valid()) return Headline{"opening ...", ""};
+    if (const live::Update* run = session_.live.update()) {
         if (!run->problem.empty())
             return Headline{run->problem, "The window keeps trying, and shows the training once it answers."};
         return Headline{"waiting for the first splats", ""};
@@ -213,10 +214,11 @@ std::optional<Headline> App::headline() const {
 
 /// What the picture is, if it is no splats.
 std::string App::banner() const {
-    const live::Update* run = live_.update();
+    const live::Update* run = session_.live.update();
     if (!scene_.points || !run || scene_.gaussians->size() == 0) return "";
     std::string text = "These are the points of the dataset, not splats: the picture is of step 0.";
-    if (!run->connected && !live_.own()) text += " ewa train with --serve or --save-every lets it move.";
+    if (!run->connected && !session_.live.own())
+        text += " ewa train with --serve or --save-every lets it move.";
     return text;
 }
 
