@@ -3,8 +3,10 @@
 
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
+#include <imgui.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 #include "ewa/error.h"
@@ -12,187 +14,239 @@
 namespace ewa::viewer {
 namespace {
 
-constexpr double kHintSeconds = 15, kNoteSeconds = 10;
+using Clock = std::chrono::steady_clock;
+
 constexpr double kPollSeconds = 0.05;  // while a better frame, a file or a screenshot is on its way
+constexpr int kMostDevicesLost = 5;    // a device that is lost more often is broken
+constexpr float kScaleStep = 1.25f, kLeastScale = 0.05f, kMostScale = 2;
 
-/// The size of the new window. A screenshot keeps the camera's size, which is the size of its file.
-Size initial_size(const Startup& startup, const WindowSystem& system) {
-    if (startup.size) return *startup.size;
-    const Size picture = camera_size_or_usual(startup);
-    if (startup.picture || startup.film) return picture;
-    const Size desktop = system.work_area();
-    const double scale = double(system.scale());
-    if (startup.last_size) {
-        const auto side = [&](int last, int most) {
-            const int length = std::max(1, int(std::lround(last * scale)));
-            return most > 0 ? std::min(length, most) : length;
-        };
-        return {side(startup.last_size->width, desktop.width),
-                side(startup.last_size->height, desktop.height)};
-    }
-    const bool beside = startup.settings.comparison == Comparison::beside;
-    const double text = kTextHeight * scale * double(startup.settings.text_scale);
-    return window_size({(beside ? 2 : 1) * picture.width, picture.height}, int(kPanelWidth * text), desktop,
-                       scale);
-}
-
-std::chrono::steady_clock::time_point in(double seconds) {
-    using Clock = std::chrono::steady_clock;
-    return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
-}
-
-std::string reason(const std::exception_ptr& failure) {
-    try {
-        std::rethrow_exception(failure);
-    } catch (const std::exception& error) {
-        return error.what();
-    }
+void toggle(bool& setting) {
+    setting = !setting;
 }
 
 }  // namespace
 
-Size camera_size_or_usual(const Startup& startup) {
-    if (!startup.scene.dataset) return kUsualSize;
-    const Camera& camera = startup.scene.dataset->frames[size_t(startup.frame.value_or(0))].camera;
-    return {camera.width, camera.height};
-}
-
-Viewpoint start_view(const OpenedScene& scene, std::optional<int> frame, Size size) {
-    if (scene.dataset) return dataset_view(*scene.gaussians, *scene.dataset, frame.value_or(0));
-    return framing_view(*scene.gaussians, nullptr, size.width, size.height);
-}
-
-std::string window_title(const OpenedScene& scene) {
-    return scene.title.empty() ? "ewa" : scene.title + " - ewa";
-}
-
-std::filesystem::path free_name(const std::string& stem, const std::string& extension) {
-    for (int i = 1;; ++i) {
-        const std::filesystem::path path = stem + "-" + std::to_string(i) + extension;
-        if (!std::filesystem::exists(path)) return path;
-    }
-}
-
 App::App(const Startup& startup)
-    : startup_(startup),
-      window_(system_, window_title(startup.scene), initial_size(startup, system_), !startup.picture),
-      settings_(startup.settings),
-      device_name_(startup.device_name),
-      loop_{.capture = startup.picture.has_value(), .times = startup.times},
-      navigation_{
-          .view = ViewCamera(start_view(startup.scene, startup.frame, startup.size.value_or(kUsualSize))),
-          .views = startup.views},
-      shown_([this] { system_.wake(); }),
-      renders_(startup.open_device, [this] { system_.wake(); }),
-      session_([this] { system_.wake(); }) {
+    : state_(startup),
+      navigation_(state_),
+      shown_(state_, navigation_),
+      session_(state_, navigation_, shown_) {
     change_text();
-    loop_.last_frame = Clock::now();
-    message_.hint_until = in(kHintSeconds);
+    state_.loop.last_frame = Clock::now();
+    state_.message.hint();
     // A screenshot is framed as `ewa render` does.
-    if (!scripted())
-        navigation_.view.restart(start_view(startup.scene, startup.frame, picture_area().size()));
-    adopt(startup.scene, startup.frame);
-    settings_.look = startup.settings.look;
-    if (startup.film) start_film();
-    if (startup.watch) watch(*startup.watch, startup.trainer);
-    if (!startup.scene.photos.empty()) find_cameras(startup.scene.photos);
-    loop_.times.window_open = loop_.times.now();
+    if (!state_.scripted())
+        navigation_.view.restart(start_view(startup.scene, startup.frame, state_.picture_area().size()));
+    session_.start();
+    state_.loop.times.window_open = state_.loop.times.now();
 }
 
 KeptSettings App::kept() const {
     KeptSettings kept{.window = {},
-                      .text_scale = settings_.text_scale,
-                      .gain = settings_.gain,
-                      .film_seconds = settings_.film_seconds};
-    const double scale = double(window_.scale()) / double(window_.density());
-    const Size size = window_.size();
+                      .text_scale = state_.settings.text_scale,
+                      .gain = state_.settings.gain,
+                      .film_seconds = state_.settings.film_seconds};
+    const double scale = double(state_.window.scale()) / double(state_.window.density());
+    const Size size = state_.window.size();
     if (size.width > 0 && size.height > 0)
         kept.window = Size{int(std::lround(size.width / scale)), int(std::lround(size.height / scale))};
     return kept;
 }
 
 void App::run() {
-    while (!loop_.done && !window_.closed()) {
-        const auto keys = window_.wait(patience());
+    Loop& loop = state_.loop;
+    while (!loop.done && !state_.window.closed()) {
+        const auto keys = state_.window.wait(patience());
         const auto now = Clock::now();
-        const double seconds = std::chrono::duration<double>(now - loop_.last_frame).count();
-        loop_.last_frame = now;
-        if (window_.stirred()) loop_.redraws = Loop::kRedraws;
-        if (message_.expire(now)) redraw();
-        if (!scripted()) {
+        const double seconds = std::chrono::duration<double>(now - loop.last_frame).count();
+        loop.last_frame = now;
+        if (state_.window.stirred()) loop.redraws = Loop::kRedraws;
+        if (state_.message.expire(now)) state_.redraw();
+        if (!state_.scripted()) {
             for (const KeyPress& key : keys) handle_key(key);
-            move_by_itself(std::min(seconds, 0.1));
-            if (const auto dropped = window_.take_dropped(); !dropped.empty()) open(dropped, scene_);
-            take_chosen();
+            navigation_.move(std::min(seconds, 0.1));
+            if (const auto dropped = state_.window.take_dropped(); !dropped.empty())
+                session_.open(dropped, state_.scene);
+            session_.take_chosen();
             change_text();
         }
-        take_opened();
-        take_found();
-        take_renders();
-        take_comparison();
-        if (Session::finished(session_.saving)) say(session_.saving.get());
-        take_live();
-        if (navigation_.film) continue_film();
-        if (loop_.redraws > 0) draw();
-        if (const auto camera = requested_camera()) renders_.ask(*camera, settings_.look, scripted());
+        session_.take_opened();
+        session_.take_found();
+        shown_.take_renders();
+        shown_.take_comparison(screen_->presenter);
+        session_.take_saved();
+        session_.take_live();
+        if (navigation_.film) navigation_.continue_film(shown_.renders);
+        if (loop.redraws > 0) draw();
+        shown_.ask();
     }
-    if (startup_.verbose) loop_.times.print(renders_.shown().get());
-    if (scripted() && !loop_.done)
+    const Startup& startup = state_.startup;
+    if (startup.verbose) loop.times.print(shown_.renders.shown().get());
+    if (state_.scripted() && !loop.done)
         throw RunError("the window was closed before " +
-                       startup_.picture.value_or(startup_.film.value_or("")).string() + " was written");
+                       startup.picture.value_or(startup.film.value_or("")).string() + " was written");
 }
 
 /// How long to wait for input, in seconds.
 double App::patience() const {
-    if (loop_.redraws > 0 || flying() || settings_.turntable) return 1.0 / 60;
-    return renders_.reduced() || session_.opening.valid() || session_.saving.valid() ? kPollSeconds : 1.0;
+    if (state_.loop.redraws > 0 || navigation_.flying() || state_.settings.turntable) return 1.0 / 60;
+    return shown_.renders.reduced() || session_.waiting() ? kPollSeconds : 1.0;
 }
 
-void App::say(const std::string& note) {
-    message_.note = note;
-    message_.note_until = in(kNoteSeconds);
-    redraw(Loop::kRedraws);
+/// Opens the screen, also with another size of the text.
+void App::change_text() {
+    const double text = state_.text_height();
+    if (screen_ && screen_text_ == text) return;
+    screen_text_ = text;
+    screen_.reset();
+    screen_ = std::make_unique<Screen>(state_.system, state_.window, state_.device_name, text);
+    shown_.fill(screen_->presenter);
+    state_.redraw(Loop::kRedraws);
 }
 
-/// Empty while the window is minimised, and while a film has cameras of its own.
-std::optional<Camera> App::requested_camera() const {
-    const Size size = window_.framebuffer();
-    if (size.width == 0 || size.height == 0 || navigation_.film) return std::nullopt;
-    const Rectangle place = arrangement().rendering;
-    return navigation_.view.camera(place.width, place.height);
+void App::handle_key(const KeyPress& press) {
+    const int key = press.key;
+    PanelSettings& settings = state_.settings;
+    // A text field does not use these keys, so they act while one is edited. The other keys belong to the field.
+    if (key == GLFW_KEY_Q && press.control) return state_.window.close();
+    if (key == GLFW_KEY_O && press.control)
+        return session_.dialog.ask(press.shift ? Wanted::folder : Wanted::file);
+    if (key == GLFW_KEY_ESCAPE) session_.search.cancel();
+    if (key == GLFW_KEY_F1) state_.message.hint_until = {};
+    if (key == GLFW_KEY_F1) toggle(state_.help);
+    if (key == GLFW_KEY_F2) toggle(state_.panel_fits() ? state_.panel_beside : state_.panel_over);
+    if (key == GLFW_KEY_F12 && press.shift) shown_.write_exr();
+    if (key == GLFW_KEY_F12 && !press.shift) state_.loop.capture = true;
+    if (ImGui::GetIO().WantTextInput) return;
+    float& scale = settings.look.splat_scale;
+    if (key == GLFW_KEY_MINUS || key == GLFW_KEY_KP_SUBTRACT)
+        scale = std::max(kLeastScale, scale / kScaleStep);
+    if (key == GLFW_KEY_EQUAL || key == GLFW_KEY_KP_ADD) scale = std::min(kMostScale, scale * kScaleStep);
+    if (key == GLFW_KEY_C) toggle(settings.cameras);
+    if (key == GLFW_KEY_V) shown_.change_comparison();
+    navigation_.handle_key(press);
 }
 
-void App::take_renders() {
-    const Renders::News news = renders_.take();
-    if (news.device) device_name_ = *news.device;
-    if (news.failure) {
-        if (scripted() || !renders_.shown()) std::rethrow_exception(news.failure);
-        navigation_.film.reset();
-        if (message_.note != reason(news.failure)) say(reason(news.failure));
+void App::handle_mouse() {
+    const ImGuiIO& io = ImGui::GetIO();
+    if (io.WantCaptureMouse || state_.scripted()) return;
+    const Arrangement places = shown_.arrangement();
+    const bool at_wipe = shown_.wiping() && over_wipe(places.image, state_.settings.wipe);
+    if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) dragging_wipe_ = at_wipe;
+    if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) dragging_wipe_ = false;
+    if (dragging_wipe_ || at_wipe) ImGui::SetMouseCursor(ImGuiMouseCursor_ResizeEW);
+    const double x = io.MousePos.x * double(io.DisplayFramebufferScale.x);
+    const double y = io.MousePos.y * double(io.DisplayFramebufferScale.y);
+    if (dragging_wipe_) {
+        state_.settings.wipe = float(std::clamp((x - places.image.x) / places.image.width, 0.0, 1.0));
+        return;
     }
-    if (news.point_answered) {
-        if (news.point) {
-            navigation_.view.focus(*news.point);
-            navigation_.leave_camera();
-        } else {
-            say("no splat is opaque enough here to look at");
-        }
-        redraw(Loop::kRedraws);
+    if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0)
+        navigation_.drag(io.MouseDelta.x, io.MouseDelta.y, places.rendering.size());
+    if (io.MouseWheel != 0) {
+        navigation_.view.zoom(io.MouseWheel);
+        navigation_.leave_camera();
     }
-    for (const auto& file : news.written)
-        if (!navigation_.film) say("wrote " + std::filesystem::absolute(file).string());
-    shown_.quality.take(news.full);
-    if (news.frame) redraw();
+    if (ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left))
+        return shown_.ask_point({x - places.rendering.x, y - places.rendering.y});
+    if (navigation_.pointed_camera && ImGui::IsMouseReleased(ImGuiMouseButton_Left) &&
+        io.MouseDragMaxDistanceSqr[ImGuiMouseButton_Left] < kStillPixels * kStillPixels)
+        navigation_.go_to_camera(*navigation_.pointed_camera);
 }
 
-void App::take_comparison() {
-    if (navigation_.at_camera && shown_.quality.psnr(*navigation_.at_camera) != shown_.psnr) redraw();
-    const ImageComparison::News news = shown_.comparison.take();
-    if (news == ImageComparison::News::none) return;
-    if (news == ImageComparison::News::comparison) return redraw();
-    if (shown_.comparison.image()->failure.empty())
-        screen_->presenter.set_picture(Layer::image, shown_.comparison.image()->picture);
-    redraw(Loop::kRedraws);
+void App::panel() {
+    const std::optional<Film>& film = navigation_.film;
+    const PanelFacts facts{
+        .scene = state_.scene,
+        .device = state_.device_name,
+        .picture = shown_.renders.shown().get(),
+        .views = navigation_.views,
+        .run = session_.live_run.update(),
+        .drawing = !shown_.renders.settled(),
+        .note = state_.message.note,
+        .image_failure = shown_.image_failure(),
+        .psnr = shown_.psnr(),
+        .times = state_.loop.times,
+        .film = film ? std::optional(float(film->next) / float(film->frames)) : std::nullopt,
+        .up = navigation_.view.up(),
+        .at_camera = navigation_.at_camera,
+        .width = float(state_.panel_width()) / std::max(1e-3f, ImGui::GetIO().DisplayFramebufferScale.x),
+        .over_picture = !state_.panel_fits(),
+    };
+    obey(draw_panel(facts, state_.settings));
+}
+
+void App::obey(const PanelActions& actions) {
+    if (actions.screenshot) state_.loop.capture = true;
+    if (actions.exr) shown_.write_exr();
+    if (actions.open) session_.dialog.ask(*actions.open);
+    if (actions.train) session_.train();
+    if (actions.command) session_.live_run.command(*actions.command);
+    navigation_.obey(actions);
+}
+
+void App::draw_overlays() {
+    const Arrangement places = shown_.arrangement();
+    const PanelSettings& settings = state_.settings;
+    const OpenedScene& scene = state_.scene;
+    navigation_.pointed_camera.reset();
+    if (settings.cameras && scene.dataset)
+        navigation_.pointed_camera = draw_cameras({*scene.dataset, shown_.camera(), places.rendering,
+                                                   navigation_.camera_size, navigation_.at_camera});
+    if (shown_.comparing()) draw_comparison(settings.comparison, places, settings.wipe);
+    const Rectangle area = state_.picture_area();
+    const std::optional<Headline> words = session_.headline();
+    if (words) draw_headline(*words, area);
+    if (session_.empty())
+        if (const auto wanted = draw_open_buttons(area)) session_.dialog.ask(*wanted);
+    if (session_.search.running() && draw_search(session_.search.progress(), area)) session_.search.cancel();
+    if (const std::string text = session_.banner(); !text.empty()) draw_banner(text, area);
+    if (!words && state_.message.hinting(Clock::now()) && !state_.help)
+        draw_hint(scene.dataset != nullptr, state_.panel_shown(), area);
+}
+
+void App::draw() {
+    Loop& loop = state_.loop;
+    --loop.redraws;
+    shown_.load_image();
+    const Comparison before = state_.settings.comparison;
+    screen_->gui.begin_frame();
+    if (!state_.scripted()) draw_overlays();
+    if (state_.panel_shown()) panel();
+    if (state_.help) draw_help(state_.help);
+    if (!state_.scripted() && state_.message.noting(Clock::now()))
+        draw_note(state_.message.note, state_.picture_area());
+    handle_mouse();
+    ImDrawData* drawn = screen_->gui.end_frame();
+    if (state_.settings.comparison != before) state_.redraw(Loop::kRedraws);
+    shown_.choose_picture(screen_->presenter);
+    shown_.measure_view();
+
+    const bool capture = loop.capture && shown_.complete() && !navigation_.film && !session_.saving();
+    Image image;
+    if (!present(drawn, capture ? &image : nullptr)) {
+        // A minimised window shows nothing. Otherwise the window is changing: try again soon.
+        const Size size = state_.window.framebuffer();
+        if (size.width > 0 && size.height > 0) state_.redraw();
+        return;
+    }
+    loop.times.count(shown_.renders.shown());
+    if (capture) session_.save(without_left(image, state_.picture_area().x));
+}
+
+bool App::present(ImDrawData* drawn, Image* capture) {
+    int& lost = state_.loop.devices_lost;
+    try {
+        return screen_->presenter.draw(state_.window.framebuffer(), shown_.layers(), drawn, capture);
+    } catch (const vk::DeviceLostError&) {
+        if (++lost > kMostDevicesLost) throw;
+    } catch (const vk::SurfaceLostKHRError&) {
+        if (++lost > kMostDevicesLost) throw;
+    }
+    screen_.reset();
+    change_text();
+    state_.say("the device or surface of the window was lost and has been opened again");
+    return false;
 }
 
 }  // namespace ewa::viewer

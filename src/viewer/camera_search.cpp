@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "viewer/camera_search.h"
 
-#include <chrono>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -29,15 +28,16 @@ bool made_of_photos(const fs::path& dataset, const fs::path& photos) {
 
 }  // namespace
 
-fs::path folder_for_photos(const fs::path& photos) {
+fs::path free_run_folder(const fs::path& input, bool or_own_photos) {
     RunOptions run;
-    run.dataset = photos;
+    run.dataset = input;
     const fs::path usual = output_folder(run);
     for (int i = 1;; ++i) {
         fs::path folder = usual;
         if (i > 1) folder += "-" + std::to_string(i);
         std::error_code error;
-        if (!fs::exists(folder, error) || made_of_photos(folder / "dataset", photos)) return folder;
+        if (!fs::exists(folder, error)) return folder;
+        if (or_own_photos && made_of_photos(folder / "dataset", input)) return folder;
     }
 }
 
@@ -45,10 +45,7 @@ void CameraSearch::start(const fs::path& photos, const fs::path& folder, const C
     stop_ = false;
     progress_ = {};
     found_ = std::async(std::launch::async, [=, this]() -> std::optional<OpenedScene> {
-        struct AtEnd {
-            const std::function<void()>& wake;
-            ~AtEnd() { wake(); }
-        } const at_end{wake_};
+        const Wake at_end{wake_};
         const Capture capture =
             make_dataset(photos, folder, options, [this](const CaptureProgress& now) { return note(now); });
         if (capture.interrupted) return std::nullopt;
@@ -58,10 +55,6 @@ void CameraSearch::start(const fs::path& photos, const fs::path& folder, const C
         for (const std::string& remark : capture.remarks) scene.remark = remark + "; " + scene.remark;
         return scene;
     });
-}
-
-bool CameraSearch::ended() const {
-    return found_.valid() && found_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
 }
 
 CaptureProgress CameraSearch::progress() const {

@@ -9,13 +9,14 @@
 #include <optional>
 
 #include "ewa/capture.h"
+#include "viewer/latest.h"
 #include "viewer/opening.h"
 
 namespace ewa::viewer {
 
-/// The folder of the run that `ewa train` of these photos would write, or the first with a number behind it that does
-/// not belong to others. The dataset is in its folder `dataset`.
-std::filesystem::path folder_for_photos(const std::filesystem::path& photos);
+/// The folder of the run that `ewa train` of this input would write, or the first with a number behind it that does not
+/// exist. or_own_photos: or whose folder `dataset` was made, or begun, of these photos.
+std::filesystem::path free_run_folder(const std::filesystem::path& input, bool or_own_photos = false);
 
 class CameraSearch {
   public:
@@ -30,7 +31,7 @@ class CameraSearch {
     void start(const std::filesystem::path& photos, const std::filesystem::path& folder,
                const CaptureOptions& options);
     bool running() const { return found_.valid(); }
-    bool ended() const;
+    bool ended() const { return finished(found_); }
     void cancel() { stop_ = true; }
     CaptureProgress progress() const;
 

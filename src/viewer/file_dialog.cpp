@@ -2,13 +2,13 @@
 #include "viewer/file_dialog.h"
 
 #include <algorithm>
-#include <chrono>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/process.h"
 #include "ewa/error.h"
+#include "viewer/latest.h"
 
 namespace ewa::viewer {
 namespace {
@@ -51,18 +51,14 @@ fs::path ask_program(Wanted wanted, const std::atomic<bool>& stop) {
 void FileDialog::ask(Wanted wanted) {
     if (open()) return;
     answer_ = std::async(std::launch::async, [this, wanted] {
-        struct AtEnd {
-            const std::function<void()>& wake;
-            ~AtEnd() { wake(); }
-        } const at_end{wake_};
+        const Wake at_end{wake_};
         fs::path chosen;
         return ask_portal(wanted, stop_, chosen) ? chosen : ask_program(wanted, stop_);
     });
 }
 
 std::optional<fs::path> FileDialog::take() {
-    if (!open() || answer_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
-        return std::nullopt;
+    if (!finished(answer_)) return std::nullopt;
     fs::path chosen = answer_.get();
     if (chosen.empty()) return std::nullopt;
     return chosen;

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Work that takes long, on a thread of its own.
 #pragma once
+#include <chrono>
 #include <condition_variable>
 #include <functional>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -10,6 +12,17 @@
 #include <utility>
 
 namespace ewa::viewer {
+
+/// Calls `wake` where it ends.
+struct Wake {
+    const std::function<void()>& wake;
+    ~Wake() { wake(); }
+};
+
+template <class Result>
+bool finished(const std::future<Result>& future) {
+    return future.valid() && future.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+}
 
 /// Work on a thread of its own, of which only the last request matters.
 template <class Request, class Result>

@@ -38,8 +38,11 @@ constexpr int kLargestSide = 16384;  // px
 
 struct Arguments {
     std::filesystem::path path, cameras, picture, views, film, output;
-    std::filesystem::path token_file;
-    std::string connect, token, size, background, frame;
+    struct {
+        std::string address, token;
+        std::filesystem::path token_file;
+    } connect;
+    std::string size, background, frame;
     bool train = false, antialias = false;
     std::vector<std::string> train_options;
     DeviceOptions device{.selector = {}, .own_queue = false};  // the window shows what this queue renders
@@ -105,13 +108,14 @@ CaptureOptions capture_of(const Arguments& arguments) {
 }
 
 OpenedScene open_what(const Arguments& arguments, Startup& startup) {
-    if (!arguments.connect.empty()) {
-        startup.watch = live::WhatToWatch{{},
-                                          live::parse_address(arguments.connect),
-                                          live::find_token(arguments.token, arguments.token_file)};
+    if (!arguments.connect.address.empty()) {
+        startup.watch =
+            live::WhatToWatch{{},
+                              live::parse_address(arguments.connect.address),
+                              live::find_token(arguments.connect.token, arguments.connect.token_file)};
         const std::filesystem::path& what = arguments.path.empty() ? arguments.cameras : arguments.path;
         OpenedScene scene = what.empty() ? OpenedScene() : open_scene(what, {});
-        scene.title = arguments.connect;
+        scene.title = arguments.connect.address;
         return scene;
     }
     if (arguments.path.empty()) {
@@ -182,7 +186,7 @@ Startup open(const Arguments& arguments) {
         startup.film = arguments.film;
     }
     startup.scene = open_what(arguments, startup);
-    startup.device = arguments.device.selector;
+    startup.device.selector = arguments.device.selector;
     startup.frame = frame_of(arguments.frame, startup.scene.dataset.get());
     startup.settings.cameras = startup.scene.gaussians->size() == 0;
     Look& look = startup.settings.look;
@@ -253,13 +257,13 @@ void add_options(CLI::App& app, Arguments& arguments) {
     option("-o,--output", arguments.output, "DIR",
            "With --train: folder of the run [out/<name of the dataset>]")
         ->needs(train);
-    option("--connect", arguments.connect, "HOST:PORT", "Show a training that runs with --serve")
+    option("--connect", arguments.connect.address, "HOST:PORT", "Show a training that runs with --serve")
         ->excludes(train);
     option(
-        "--token", arguments.token, "TEXT",
+        "--token", arguments.connect.token, "TEXT",
         "With --connect: allows pause and save. live.json in the folder of the run holds it. Other users see "
         "it in the list of processes; --token-file and the variable EWA_TOKEN do not show it");
-    option("--token-file", arguments.token_file, "FILE",
+    option("--token-file", arguments.connect.token_file, "FILE",
            "With --connect: a file with the token, such as a copy of live.json")
         ->excludes("--token");
     option("--cameras", arguments.cameras, "DATASET", "Dataset whose cameras to show and to look through");
@@ -328,7 +332,7 @@ int run(const Arguments& arguments) {
             if (!startup.later) startup.trainer = &trainer.emplace(options, output_of(arguments));
         }
         const auto first = std::make_shared<std::shared_ptr<gpu::Device>>(opening.get());
-        startup.device_name = device_info(**first).name;
+        startup.device.name = device_info(**first).name;
         startup.times.device_open = startup.times.now();
         startup.open_device = [options = arguments.device, first] {
             return *first ? std::exchange(*first, nullptr) : open_device(options);

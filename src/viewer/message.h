@@ -11,6 +11,11 @@ struct Message {
     std::string note;  // the last one; the panel keeps showing it
     Clock::time_point note_until{}, hint_until{};
 
+    void say(const std::string& text) {
+        note = text;
+        note_until = Clock::now() + std::chrono::seconds(10);
+    }
+    void hint() { hint_until = Clock::now() + std::chrono::seconds(15); }
     /// Whether the note is over the picture. An empty one never is.
     bool noting(Clock::time_point now) const { return !note.empty() && now < note_until; }
     bool hinting(Clock::time_point now) const { return now < hint_until; }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Screenshots and films where no window can be opened.
 #pragma once
-#include "viewer/app.h"
+#include "viewer/navigation.h"
 
 namespace ewa::viewer {
 

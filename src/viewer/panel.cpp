@@ -159,8 +159,8 @@ void show_times(const PanelFacts& facts) {
     for (const PassTime& time : facts.picture->pass_times)
         if (time.milliseconds >= 0.005) cells(time.pass.c_str(), "%.2f ms", time.milliseconds);
     cells("request to frame", "%.2f ms", facts.picture->milliseconds);
-    if (facts.pictures_a_second > 0) cells("moving, per second", "%.1f", facts.pictures_a_second);
-    if (facts.first_picture) cells("first frame", "%.0f ms", 1000 * *facts.first_picture);
+    if (const double rate = facts.times.rate(); rate > 0) cells("moving, per second", "%.1f", rate);
+    if (const auto first = facts.times.first_frame()) cells("first frame", "%.0f ms", 1000 * *first);
     ImGui::EndTable();
 }
 

@@ -11,6 +11,7 @@
 #include "viewer/comparison.h"
 #include "viewer/file_dialog.h"
 #include "viewer/opening.h"
+#include "viewer/renders.h"
 
 namespace ewa::viewer {
 
@@ -20,14 +21,13 @@ struct PanelFacts {
     const std::string& device;
     const RenderedFrame* picture;  // null: none yet
     const std::vector<io::NamedView>& views;
-    const live::Update* run;              // null: no training run
-    bool drawing;                         // a better frame follows
-    const std::string& note;              // the last message
-    std::string image_failure;            // why there is no image
-    std::optional<double> psnr;           // of this view against the image
-    double pictures_a_second;             // of the moving camera; else 0
-    std::optional<double> first_picture;  // seconds after the start
-    std::optional<float> film;            // share of the film that is written; empty: no film
+    const live::Update* run;     // null: no training run
+    bool drawing;                // a better frame follows
+    const std::string& note;     // the last message
+    std::string image_failure;   // why there is no image
+    std::optional<double> psnr;  // of this view against the image
+    const SessionTimes& times;
+    std::optional<float> film;  // share of the film that is written; empty: no film
     glm::dvec3 up;
     std::optional<int> at_camera;  // the camera that the view is at
     float width;                   // of the panel, in ImGui's coordinates

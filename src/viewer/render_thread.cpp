@@ -52,9 +52,9 @@ RenderThread::RenderThread(OpenDevice open, std::function<void()> on_news)
 
 uint64_t RenderThread::set_scene(std::shared_ptr<const Gaussians> gaussians) {
     const std::lock_guard lock(mutex_);
-    next_scene_ = std::move(gaussians);
+    next_.scene = std::move(gaussians);
     wake_.notify_one();
-    return ++scene_number_;
+    return ++next_.scene_number;
 }
 
 void RenderThread::ask(const RenderRequest& request) {
@@ -66,14 +66,14 @@ void RenderThread::ask(const RenderRequest& request) {
 
 uint64_t RenderThread::ask_point(const Camera& camera, const glm::dvec2& pixel) {
     const std::lock_guard lock(mutex_);
-    probe_ = Probe{camera, pixel, ++probes_};
+    next_.probe = Probe{camera, pixel, ++probes_};
     wake_.notify_one();
     return probes_;
 }
 
 uint64_t RenderThread::ask_full(const Camera& camera, const Look& look) {
     const std::lock_guard lock(mutex_);
-    full_ = Full{camera, look, ++fulls_};
+    next_.full = Full{camera, look, ++fulls_};
     wake_.notify_one();
     return fulls_;
 }
@@ -95,16 +95,16 @@ void RenderThread::report(const std::function<void(News&)>& change) {
 
 bool RenderThread::next(const std::stop_token& stop, Work& work) {
     std::unique_lock lock(mutex_);
-    wake_.wait(lock, stop, [this] { return probe_ || full_ || !waiting_.empty() || next_scene_; });
+    wake_.wait(lock, stop, [this] { return next_.probe || next_.full || !waiting_.empty() || next_.scene; });
     if (stop.stop_requested()) return false;
-    work.scene = std::exchange(next_scene_, nullptr);
-    work.scene_number = scene_number_;
-    work.probe = std::exchange(probe_, std::nullopt);
+    work.scene = std::exchange(next_.scene, nullptr);
+    work.scene_number = next_.scene_number;
+    work.probe = std::exchange(next_.probe, std::nullopt);
     if (!waiting_.empty()) {
         work.request = waiting_.front();
         waiting_.erase(waiting_.begin());
     } else {
-        work.full = std::exchange(full_, std::nullopt);  // what the window shows comes first
+        work.full = std::exchange(next_.full, std::nullopt);  // what the window shows comes first
     }
     return true;
 }

@@ -100,7 +100,7 @@ class RenderThread {
         std::optional<RenderRequest> request;
         std::optional<Probe> probe;
         std::optional<Full> full;
-        uint64_t scene_number = 0;
+        uint64_t scene_number = 0;  // of the last set_scene()
     };
     void work(const std::stop_token& stop);
     bool next(const std::stop_token& stop, Work& work);
@@ -125,10 +125,8 @@ class RenderThread {
     mutable std::mutex mutex_;
     std::condition_variable_any wake_;
     std::vector<RenderRequest> waiting_;  // in order; only the last may have no file
-    std::optional<Probe> probe_;
-    std::optional<Full> full_;
-    std::shared_ptr<const Gaussians> next_scene_;
-    uint64_t scene_number_ = 0, probes_ = 0, fulls_ = 0;
+    Work next_;                           // but for `request`
+    uint64_t probes_ = 0, fulls_ = 0;
     News news_;
     std::jthread thread_;
 };

@@ -37,12 +37,6 @@ struct KeyPress {
     bool shift = false, control = false;
 };
 
-/// Wakes the window system at its destruction.
-struct Wake {
-    const WindowSystem& system;
-    ~Wake() { system.wake(); }
-};
-
 class Window {
   public:
     /// resizable: false also asks the window manager to keep the size. Throws RunError.

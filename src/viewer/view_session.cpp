@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "viewer/view_session.h"
+
+#include <cstdio>
+
+#include "core/process.h"
+#include "core/text.h"
+#include "ewa/error.h"
+#include "live/run_folder.h"
+#include "run/earlier_run.h"
+#include "scene/names.h"
+
+namespace ewa::viewer {
+
+ViewSession::ViewSession(ViewState& state, Navigation& navigation, Shown& shown)
+    : search(state.wake),
+      dialog(state.wake),
+      live_run(state.wake),
+      state_(state),
+      navigation_(navigation),
+      shown_(shown) {}
+
+void ViewSession::start() {
+    const Startup& startup = state_.startup;
+    adopt(startup.scene, startup.frame);
+    state_.settings.look = startup.settings.look;
+    if (startup.film) navigation_.start_film();
+    if (startup.watch) watch(*startup.watch, startup.trainer);
+    if (!startup.scene.photos.empty()) find_cameras(startup.scene.photos);
+}
+
+void ViewSession::adopt(OpenedScene opened, std::optional<int> frame) {
+    OpenedScene& scene = state_.scene = std::move(opened);
+    scene.set_gaussians(scene.gaussians);
+    Look& look = state_.settings.look;
+    look.kernel = scene.look.kernel;
+    look.points = scene.look.points;
+    look.nearest = scene.look.nearest;
+    look.background = scene.look.background;
+    look.sh_degree = scene.sh_degree;
+    state_.message.note.clear();
+    if (!scene.remark.empty()) state_.say(scene.remark);
+    shown_.enter_scene();
+    navigation_.enter_scene(frame);
+    state_.redraw(Loop::kRedraws);
+}
+
+void ViewSession::show_opened(OpenedScene scene) {
+    search_failure_.clear();
+    navigation_.view.restart(start_view(scene, {}, state_.picture_area().size()));
+    state_.window.set_title(window_title(scene));
+    adopt(std::move(scene), {});
+}
+
+void ViewSession::open(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown) {
+    if (opening_.valid()) return state_.say("another file is being opened");
+    if (search.running()) return state_.say("cameras of photos are being found; Esc stops that");
+    state_.say("opening " + core::one_line(paths.front().string()));
+    opening_ = std::async(std::launch::async, [this, paths, shown] {
+        const Wake at_end{state_.wake};
+        return open_dropped(paths, shown);
+    });
+}
+
+void ViewSession::take_opened() {
+    if (!finished(opening_)) return;
+    try {
+        OpenedScene scene = opening_.get();
+        if (!scene.photos.empty()) return find_cameras(scene.photos);
+        const bool same_splats = scene.gaussians == state_.scene.gaussians;
+        show_opened(std::move(scene));
+        if (same_splats) {
+            state_.settings.cameras = true;
+            return;
+        }
+        live_run.stop();
+        if (!state_.scene.run.empty()) watch({state_.scene.run, {}, {}, state_.scene.splats_time}, nullptr);
+    } catch (const std::exception& error) {
+        state_.say(error.what());
+    }
+}
+
+void ViewSession::take_chosen() {
+    try {
+        if (const auto path = dialog.take()) open({*path}, {});
+    } catch (const std::exception& error) {
+        state_.say(error.what());
+    }
+}
+
+void ViewSession::find_cameras(const std::filesystem::path& photos) {
+    search_failure_.clear();
+    state_.message.note.clear();
+    const auto& later = state_.startup.later;
+    const bool train = later && photos == state_.startup.scene.photos;
+    search.start(photos, (train ? later->folder : free_run_folder(photos, true)) / "dataset",
+                 train ? later->capture : CaptureOptions());
+    state_.redraw(Loop::kRedraws);
+}
+
+void ViewSession::take_found() {
+    if (!search.running()) return;
+    state_.redraw();
+    if (!search.ended()) return;
+    try {
+        std::optional<OpenedScene> scene = search.take();
+        if (!scene) return state_.say("stopped; opened again, the photos go on from here");
+        const auto& later = state_.startup.later;
+        const bool train = later && scene->photos == state_.startup.scene.photos;
+        live_run.stop();
+        show_opened(std::move(*scene));
+        state_.settings.cameras = true;
+        if (train && !training()) start_training(later->options, later->folder);
+    } catch (const std::exception& error) {
+        search_failure_ = error.what();
+        if (core::find_program("colmap").empty())
+            search_failure_ += "; or run ewa cameras where it is, and open the dataset that it makes";
+        state_.say(search_failure_);
+    }
+}
+
+void ViewSession::watch(const live::WhatToWatch& what, TrainProcess* trainer) {
+    // A run in a folder may have ended before the window reaches it. Its files then tell how it went.
+    live_failed_ = !what.folder.empty();
+    live_run.watch(what, trainer);
+    state_.redraw();
+}
+
+void ViewSession::take_live() {
+    if (const auto status = live_run.failure(); status && state_.message.note.empty())
+        state_.say("the training ended with status " + std::to_string(*status) +
+                   "; see the terminal for the reason");
+    // A screenshot waits for its full frame, which new splats would start again.
+    if (state_.loop.capture && navigation_.framed) return;
+    const LiveRun::News news = live_run.take();
+    if (news.any) state_.redraw();
+    const live::Update* run = live_run.update();
+    if (run && !run->problem.empty() && run->status.steps == 0 && !live_failed_) {
+        live_failed_ = true;
+        std::fprintf(stderr, "ewa-view: %s\n", core::one_line(run->problem).c_str());
+    }
+    if (!news.splats) return;
+    OpenedScene& scene = state_.scene;
+    int& degree = state_.settings.look.sh_degree;
+    const bool highest = degree == scene.sh_degree;
+    scene.set_gaussians(news.splats);
+    scene.points = false;
+    shown_.renders.set_scene(news.splats);
+    if (highest) degree = scene.sh_degree;
+    navigation_.take_splats();
+}
+
+bool ViewSession::training() const {
+    const auto running = [](TrainProcess* trainer) { return trainer && !trainer->status(); };
+    return running(state_.trainer.get()) || running(state_.startup.trainer);
+}
+
+void ViewSession::train() {
+    if (training()) return state_.say("a training that this window has started still runs");
+    const OpenedScene& scene = state_.scene;
+    const std::string& device = state_.startup.device.selector;
+    // Photos have their dataset in the folder of the run.
+    const std::filesystem::path made_in = scene.path.parent_path();
+    const std::filesystem::path& named = scene.photos.empty() ? scene.path : scene.photos;
+    const bool first = !scene.photos.empty() && !live::find_run(made_in);
+    std::vector<std::string> options{(first ? named : scene.path).string(), "--steps",
+                                     std::to_string(state_.settings.train_steps), "--quiet"};
+    if (!device.empty()) options.insert(options.end(), {"--device", device});
+    start_training(options, first ? made_in : free_run_folder(named));
+}
+
+void ViewSession::start_training(const std::vector<std::string>& options,
+                                 const std::filesystem::path& folder) {
+    try {
+        const auto now = std::filesystem::file_time_type::clock::now();
+        live_run.stop();
+        state_.trainer = std::make_unique<TrainProcess>(options, folder);
+        watch({folder, {}, {}, now, now}, state_.trainer.get());
+        state_.say("training into " + std::filesystem::absolute(folder).string());
+    } catch (const std::exception& error) {
+        state_.say(error.what());
+    }
+}
+
+void ViewSession::save(Image&& image) {
+    state_.loop.capture = false;
+    if (const auto& picture = state_.startup.picture) {
+        save_image(*picture, image);
+        state_.loop.done = true;
+        return;
+    }
+    saving_ = std::async(std::launch::async, [this, image = std::move(image)]() -> std::string {
+        const Wake at_end{state_.wake};
+        try {
+            const std::filesystem::path path = free_name("ewa-view", ".png");
+            save_image(path, image);
+            return "wrote " + std::filesystem::absolute(path).string();
+        } catch (const std::exception& error) {
+            return error.what();
+        }
+    });
+}
+
+void ViewSession::take_saved() {
+    if (finished(saving_)) state_.say(saving_.get());
+}
+
+bool ViewSession::empty() const {
+    return state_.scene.gaussians->size() == 0 && state_.scene.title.empty() && !state_.scene.dataset &&
+           !opening_.valid() && !search.running() && !live_run.update();
+}
+
+std::optional<Headline> ViewSession::headline() const {
+    const OpenedScene& scene = state_.scene;
+    if (scene.gaussians->size() > 0 || search.running()) return std::nullopt;
+    if (!search_failure_.empty() && !scene.dataset) return Headline{"no cameras", search_failure_};
+    if (opening_.valid()) return Headline{"opening ...", ""};
+    if (const live::Update* run = live_run.update()) {
+        if (!run->problem.empty())
+            return Headline{run->problem, "The window keeps trying, and shows the training once it answers."};
+        return Headline{"waiting for the first splats", ""};
+    }
+    if (scene.dataset) return std::nullopt;
+    if (!scene.title.empty()) return Headline{scene.title + " has no splats", "Drop another file here."};
+    return Headline{"drop a file here",
+                    "splats, photos, a video, a dataset, or the folder of a training run"};
+}
+
+std::string ViewSession::banner() const {
+    const live::Update* run = live_run.update();
+    if (!state_.scene.points || !run || state_.scene.gaussians->size() == 0) return "";
+    std::string text = "These are the points of the dataset, not splats: the picture is of step 0.";
+    if (!run->connected && !live_run.own()) text += " ewa train with --serve or --save-every lets it move.";
+    return text;
+}
+
+}  // namespace ewa::viewer

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the parts of the window share: the window itself, what is open in it, its settings, and what the command line
+// asked for.
+#pragma once
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ewa/capture.h"
+#include "io/datasets/view_list.h"
+#include "viewer/layout.h"
+#include "viewer/message.h"
+#include "viewer/opening.h"
+#include "viewer/panel.h"
+#include "viewer/renders.h"
+#include "viewer/training.h"
+#include "viewer/view_camera.h"
+#include "viewer/window.h"
+
+namespace ewa::viewer {
+
+/// A training on photos, which starts once they have cameras.
+struct LaterTraining {
+    std::vector<std::string> options;  // of ewa train, with the photos
+    std::filesystem::path folder;      // of the run
+    CaptureOptions capture;
+};
+
+/// What the command line asks for.
+struct Startup {
+    OpenedScene scene;
+    std::optional<int> frame;                      // of the dataset
+    std::optional<Size> size;                      // of the window, px
+    std::optional<Size> last_size;                 // of the last session's window, as KeptSettings::window
+    std::optional<std::filesystem::path> picture;  // write this screenshot, then exit
+    std::optional<std::filesystem::path> film;     // write a film through `views` into this folder, then exit
+    std::vector<io::NamedView> views;
+    PanelSettings settings;
+    OpenDevice open_device;
+    struct {
+        std::string name;
+        std::string selector;  // of the command line
+    } device;
+    std::optional<live::WhatToWatch> watch;  // a training run
+    TrainProcess* trainer = nullptr;         // the viewer's own; outlives the window
+    std::optional<LaterTraining> later;      // if the scene is photos
+    bool verbose = false;                    // print times on standard error
+    SessionTimes times;
+};
+
+/// The size of the dataset's camera that the window starts from, or the usual one.
+Size camera_size_or_usual(const Startup& startup);
+/// The first view: of the dataset's camera `frame`, or of the whole scene for an image of this size.
+Viewpoint start_view(const OpenedScene& scene, std::optional<int> frame, Size size);
+std::string window_title(const OpenedScene& scene);
+/// The first of <stem>-1<extension>, <stem>-2<extension>, ... that does not exist.
+std::filesystem::path free_name(const std::string& stem, const std::string& extension);
+
+/// What the loop of the window has still to do.
+struct Loop {
+    static constexpr int kRedraws = 3;  // frames that ImGui needs to answer input
+    std::chrono::steady_clock::time_point last_frame = std::chrono::steady_clock::now();
+    int redraws = kRedraws;  // frames that are still to draw
+    bool capture = false;    // write a screenshot as soon as the full frame is shown
+    bool done = false;
+    int devices_lost = 0;
+    SessionTimes times;
+};
+
+struct ViewState {
+    /// Opens the window. Throws RunError.
+    explicit ViewState(const Startup& startup);
+    ViewState(const ViewState&) = delete;
+    ViewState& operator=(const ViewState&) = delete;
+
+    bool scripted() const { return startup.picture || startup.film; }
+    void redraw(int frames = 1) { loop.redraws = std::max(loop.redraws, frames); }
+    void say(const std::string& note);
+    double text_height() const;  // px of the framebuffer
+    int panel_width() const;     // px of the framebuffer, also while it is hidden
+    bool panel_fits() const;     // beside the picture
+    bool panel_shown() const { return !scripted() && (panel_fits() ? panel_beside : panel_over); }
+    /// The part of the window that the panel leaves to the pictures.
+    Rectangle picture_area() const;
+
+    const Startup& startup;
+    std::unique_ptr<TrainProcess> trainer;  // started by the window, which is closed before it ends
+    WindowSystem system;
+    Window window;
+    std::function<void()> wake = [this] { system.wake(); };  // any thread may call it, while the state lives
+    OpenedScene scene;
+    PanelSettings settings;
+    std::string device_name;
+    Message message;
+    Loop loop;
+    bool panel_beside = true;  // in a window with room for the panel
+    bool panel_over = false;   // in a narrow window, where the panel lies over the picture
+    bool help = false;
+};
+
+}  // namespace ewa::viewer
