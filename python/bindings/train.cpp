@@ -25,6 +25,7 @@
 #include "run/resume.h"
 #include "run/run_input.h"
 #include "run/run_options.h"
+#include "train/appearance_choice.h"
 #include "train/checkpoint.h"
 #include "train_options.h"
 
@@ -46,6 +47,8 @@ struct TrainerStart {
     bool own_start = false;  // the first splats are an argument
 
     void resolve_options() {
+        if (run.train.appearance == AppearanceModel::automatic)
+            run.train.appearance = train::choose_appearance(train::disagreement_of(*dataset, frames)).model;
         run.train = resolve(run.train, *dataset);
         run.train.render.sh_degree = run.train.sh_degree;
     }

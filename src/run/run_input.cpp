@@ -22,6 +22,7 @@
 #include "scene/dense_points.h"
 #include "scene/names.h"
 #include "shared/constants.h"
+#include "train/appearance_choice.h"
 #include "train/needs.h"
 #include "train/schedule.h"
 
@@ -337,6 +338,12 @@ RunInput load_run(const RunOptions& options) {
                         "the image " + frame.name);
     }
     TrainOptions& train = input.options.train;
+    if (train.appearance == AppearanceModel::automatic) {
+        const AppearanceChoice choice = choose_appearance(disagreement_of(input.dataset, input.split.train));
+        train.appearance = choice.model;
+        input.notes.push_back(fmt::format(
+            "appearance {}: {}", choice.model == AppearanceModel::none ? "none" : "ppisp", choice.reason));
+    }
     train = resolve(train, input.dataset);
     train.render.sh_degree = train.sh_degree;
     input.options.output = output_folder(options);

@@ -33,7 +33,8 @@ const core::Words<DenseStart> kDenseStarts = {
 const core::Words<AppearanceModel> kAppearances = {{"none", AppearanceModel::none},
                                                    {"affine", AppearanceModel::affine},
                                                    {"ppisp", AppearanceModel::ppisp},
-                                                   {"grid", AppearanceModel::grid}};
+                                                   {"grid", AppearanceModel::grid},
+                                                   {"auto", AppearanceModel::automatic}};
 
 RunOption frames_option() {
     RunOption option =
@@ -268,7 +269,8 @@ RunOption appearance_option() {
         "What to learn of the colours of each training image, for captures in which the exposure varies. "
         "affine: a map of colours. ppisp: exposure and colours of each image, vignette and response of each "
         "camera. "
-        "grid: maps that vary over the image",
+        "grid: maps that vary over the image. auto: ppisp if the images disagree on the colours of the "
+        "points",
         [](RunOptions& o) -> AppearanceModel& { return o.train.appearance; }, kAppearances);
     option.before = "none";
     return option;

@@ -6,10 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
+#include <vector>
 
 #include "ewa/error.h"
 #include "ewa/training_needs.h"
 #include "scene/looks.h"
+#include "train/appearance_choice.h"
 #include "train/exclusions.h"
 
 namespace ewa::train {
@@ -210,6 +213,11 @@ TrainOptions resolve(TrainOptions options, const Dataset& dataset) {
         options.strategy = adc_asked_for ? Strategy::adc : strategy_for(options.steps);
     if (options.sh_degree == kAutomaticShDegree)
         options.sh_degree = dataset.color_depends_on_view ? kMaxShDegree : 0;
+    if (options.appearance == AppearanceModel::automatic) {
+        std::vector<int> all(dataset.frames.size());
+        std::iota(all.begin(), all.end(), 0);
+        options.appearance = train::choose_appearance(train::disagreement_of(dataset, all)).model;
+    }
     return options;
 }
 

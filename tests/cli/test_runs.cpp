@@ -165,6 +165,9 @@ TEST_F(Runs, EvalAndRenderUseTheAppearances) {
     expect_failure(
         run_ewa({"train", folder / "data", "-o", folder / "t", "--appearance", "grid", "--exposure"}), 2,
         "--exposure is --appearance affine: name one of them");
+    const Outcome chosen =
+        run_ewa({"train", folder / "data", "-o", folder / "auto", "--steps", "2", "--appearance", "auto"});
+    EXPECT_NE((chosen.out + chosen.err).find("appearance none: "), std::string::npos) << chosen.out;
     write_file(folder / "bad.json", "{\"model\": \"ppisp\", \"images\": 3}");
     expect_failure(run_ewa({"eval", run, "--exposures", folder / "bad.json"}), 2, "bad.json");
 }

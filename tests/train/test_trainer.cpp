@@ -2,6 +2,7 @@
 // Training as a whole: it learns, it repeats itself byte by byte, and it stays within its bounds.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -12,6 +13,7 @@
 #include "gpu/test_device.h"
 #include "shared/layouts.h"
 #include "support/shared_by_tests.h"
+#include "train/appearance_choice.h"
 #include "train/synthetic.h"
 
 namespace ewa::test {
@@ -444,6 +446,51 @@ TEST(Trainer, LearnsTheAppearanceOfEachImageAndResumes) {
            psnr[AppearanceModel::grid], psnr[AppearanceModel::none]);
     EXPECT_GT(psnr[AppearanceModel::ppisp], psnr[AppearanceModel::none] + 3);
     EXPECT_GT(psnr[AppearanceModel::grid], psnr[AppearanceModel::none] + 3);
+}
+
+/// Eight images of one colour that differ by 2^stops, and points of the usual colour.
+Dataset in_stops(Synthetic& made, const std::array<double, 8>& stops, double red = 1) {
+    make_synthetic(made, 40, 8, 48, 36, 7);
+    for (size_t i = 0; i < stops.size(); ++i) {
+        Image image(48, 36, 3);
+        for (size_t k = 0; k < image.pixels.size(); ++k)
+            image.pixels[k] = float(0.4 * std::exp2(stops[i]) * (k % 3 == 0 && i % 2 == 0 ? red : 1));
+        save_image(made.dataset.frames[i].image_path, image);
+    }
+    Dataset dataset = load_dataset(made.folder.path(), {});
+    dataset.points.colors.assign(dataset.points.positions.size(), {102, 102, 102});
+    return dataset;
+}
+
+TEST(AppearanceChoice, IsAModelWhereImagesDisagreeOnThePoints) {
+    Synthetic made;
+    const auto found = [](const Dataset& dataset) {
+        return train::disagreement_of(dataset, all_frames(dataset));
+    };
+    const auto model = [](const train::Disagreement& d) { return train::choose_appearance(d).model; };
+    const train::Disagreement same = found(in_stops(made, {}));
+    EXPECT_EQ(same.images, 8);
+    EXPECT_NEAR(same.exposure, 0, 0.01);
+    EXPECT_EQ(model(same), AppearanceModel::none);
+
+    const Dataset brighter = in_stops(made, {0.3, -0.3, 0.3, -0.3, 0.3, -0.3, 0.3, -0.3});
+    EXPECT_NEAR(found(brighter).exposure, 0.3, 0.01);
+    EXPECT_NEAR(found(brighter).color, 0, 0.01);
+    EXPECT_EQ(model(found(brighter)), AppearanceModel::ppisp);
+    TrainOptions options;
+    options.appearance = AppearanceModel::automatic;
+    EXPECT_EQ(resolve(options, brighter).appearance, AppearanceModel::ppisp);
+
+    const train::Disagreement redder = found(in_stops(made, {}, 1.15));
+    EXPECT_NEAR(redder.color, std::log2(1.15) / 2, 0.01);
+    EXPECT_LT(redder.exposure, 0.04);
+    EXPECT_EQ(model(redder), AppearanceModel::ppisp);
+
+    Dataset pointless = brighter;
+    pointless.points = {};
+    EXPECT_EQ(train::choose_appearance(found(pointless)).reason,
+              "there are no points on which images could agree");
+    EXPECT_EQ(model(found(pointless)), AppearanceModel::none);
 }
 
 /// A run on halves and quarters first ends at the whole resolution, and resumes to the byte in the middle of
