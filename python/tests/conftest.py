@@ -24,7 +24,8 @@ def pytest_runtest_logreport(report):
     if report.when == "call" and report.passed:
         print(f"\n[       OK ] {report.nodeid} ({report.duration * 1000:.0f} ms)")
     elif report.skipped:
-        print(f"\n[  SKIPPED ] {report.nodeid} ({report.duration * 1000:.0f} ms)")
+        reason = report.longrepr[-1] if isinstance(report.longrepr, tuple) else ""
+        print(f"\n[  SKIPPED ] {report.nodeid} ({report.duration * 1000:.0f} ms): {reason}")
     elif report.failed:
         print(f"\n[  FAILED  ] {report.nodeid} ({report.duration * 1000:.0f} ms)")
 

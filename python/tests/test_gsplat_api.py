@@ -3,8 +3,10 @@
 
 import importlib
 import inspect
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -357,3 +359,15 @@ def test_export_writes_a_file(tmp_path):
     assert path.read_bytes() == data
     found = ewa.load(str(path))
     torch.testing.assert_close(torch.from_numpy(found.means), call[0])
+
+
+def test_comparisons_are_skipped_one_by_one_where_gsplat_is_missing():
+    code = """
+import sys, pytest
+sys.modules["gsplat"] = None
+sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", *sys.argv[1:]]))
+"""
+    file = Path(__file__).with_name("test_gsplat_functions.py")
+    done = run("-c", code, str(file), "-k", "test_world_to_cam")
+    skipped = r"\[  SKIPPED \] .*test_world_to_cam .*: gsplat, to compare with, is not installed"
+    assert re.search(skipped, done.stdout) and done.returncode == 0, done.stdout
