@@ -10,7 +10,7 @@
 namespace ewa::operators {
 
 /// Features are blended 4 channels at a time: a record holds that many.
-inline constexpr uint32_t kChunk = 4;
+inline constexpr uint32_t kGroup = 4;
 
 struct BlendFrame {
     std::shared_ptr<gpu::Device> device;  // outlives the buffers below
@@ -29,7 +29,7 @@ struct BlendFrame {
     pipeline::FrameBuffers frame;
     Array means{"means"}, conics{"conics"}, opacities{"opacities"}, features{"features"}, depths{"depths"},
         radii{"radii"};
-    std::vector<gpu::Buffer> more_planes;  // of the second and later chunks
+    std::vector<gpu::Buffer> more_planes;  // of the second and later groups
     std::vector<float> transmittances;     // [H, W]
 
     // The gradient.
@@ -38,9 +38,9 @@ struct BlendFrame {
         absolute_gradient{"absolute gradient"};
     Array pixel_gradients{"pixel gradients", gpu::Texel::rgba32f};
 
-    uint32_t chunks() const { return (channels + kChunk - 1) / kChunk; }
-    const gpu::Buffer& planes(uint32_t chunk) const {
-        return chunk == 0 ? frame.planes : more_planes[chunk - 1];
+    uint32_t groups() const { return (channels + kGroup - 1) / kGroup; }
+    const gpu::Buffer& planes(uint32_t group) const {
+        return group == 0 ? frame.planes : more_planes[group - 1];
     }
     bool drawn(uint32_t x, uint32_t y) const {
         if (tile_mask.empty()) return true;

@@ -101,11 +101,11 @@ FrameRequest request_of(const BlendFrame& f, const BlendOptions& options, uint32
             .overlaid = options.gradients};
 }
 
-bool has_fourth(const BlendFrame& f, uint32_t chunk) {
-    return f.channels > kChunk * chunk + 3;
+bool has_fourth(const BlendFrame& f, uint32_t group) {
+    return f.channels > kGroup * group + 3;
 }
 
-void record_collect(const passes::Recorder& on, const BlendFrame& f, uint32_t chunk, uint32_t mode) {
+void record_collect(const passes::Recorder& on, const BlendFrame& f, uint32_t group, uint32_t mode) {
     if (f.whiteners) mode |= shared::SHAPE_WHITENERS;
     // A binding that a mode does not use gets the records.
     const auto or_records = [&](const Array& array) -> const gpu::Buffer& {
@@ -123,17 +123,17 @@ void record_collect(const passes::Recorder& on, const BlendFrame& f, uint32_t ch
                                      .counts = f.frame.counts},
               {.splats = f.splats,
                .channels = f.channels,
-               .first_channel = kChunk * chunk,
+               .first_channel = kGroup * group,
                .size = {f.width, f.height}},
               {{shared::SPEC_MODE, mode}});
 }
 
-/// The buffers of blending a chunk.
-passes::BlendBuffers buffers_of(const BlendFrame& f, uint32_t chunk) {
+/// The buffers of blending a group.
+passes::BlendBuffers buffers_of(const BlendFrame& f, uint32_t group) {
     return {.records = f.frame.records,
             .splats = f.frame.instance_splats[1],
             .tile_starts = f.frame.tile_starts,
-            .planes = f.planes(chunk)};
+            .planes = f.planes(group)};
 }
 
 /// The background is added on the host.
@@ -141,19 +141,19 @@ shared::BlendPush push_of(const passes::Recorder& on, const BlendFrame& f) {
     return pipeline::blend_push(on.cache.config(), f.frame, {0, 0, 0});
 }
 
-/// Blends all chunks. mode: of the first chunk's collection.
+/// Blends all groups. mode: of the first group's collection.
 void record_blend(const passes::Recorder& on, const BlendFrame& f, uint32_t mode) {
-    for (uint32_t chunk = 0; chunk < f.chunks(); ++chunk) {
-        if (chunk > 0) record_collect(on, f, chunk, mode | shared::COLLECT_FEATURES);
-        on.record(passes::Blend{buffers_of(f, chunk)}, push_of(on, f),
-                  blend_variant(f, has_fourth(f, chunk) ? shared::BLEND_DEPTH : shared::BLEND_COLOR));
+    for (uint32_t group = 0; group < f.groups(); ++group) {
+        if (group > 0) record_collect(on, f, group, mode | shared::COLLECT_FEATURES);
+        on.record(passes::Blend{buffers_of(f, group)}, push_of(on, f),
+                  blend_variant(f, has_fourth(f, group) ? shared::BLEND_DEPTH : shared::BLEND_COLOR));
     }
 }
 
 void reserve_planes(Context& context, BlendFrame& f) {
-    f.more_planes.resize(std::max<size_t>(f.more_planes.size(), f.chunks() - 1));
-    for (uint32_t chunk = 1; chunk < f.chunks(); ++chunk) {
-        gpu::Buffer& planes = f.more_planes[chunk - 1];
+    f.more_planes.resize(std::max<size_t>(f.more_planes.size(), f.groups() - 1));
+    for (uint32_t group = 1; group < f.groups(); ++group) {
+        gpu::Buffer& planes = f.more_planes[group - 1];
         if (planes && planes.bytes() >= f.frame.sizes.planes) continue;
         planes = gpu::Buffer();
         planes = gpu::Buffer(*context.device, "planes", f.frame.sizes.planes, gpu::Texel::rgba32f);
@@ -165,8 +165,8 @@ void upload_splats(Context& context, BlendFrame& f, const ScreenSplats& splats) 
     f.means.lend(device, splats.means2d);
     f.conics.lend(device, splats.conics);
     f.opacities.lend(device, splats.opacities);
-    // The gradient reads the features of the other chunks again, when the caller's array may be gone.
-    if (f.chunks() > 1)
+    // The gradient reads the features of the other groups again, when the caller's array may be gone.
+    if (f.groups() > 1)
         f.features.upload(device, splats.features);
     else
         f.features.lend(device, splats.features);
@@ -177,7 +177,7 @@ void give_back_splats(BlendFrame& f) {
         array->give_back();
 }
 
-/// Plane of channel c of a chunk: red, green, blue, and depth.
+/// Plane of channel c of a group: red, green, blue, and depth.
 uint32_t plane_of(uint32_t c) {
     return c < 3 ? shared::PLANE_R + c : shared::PLANE_DEPTH;
 }
@@ -189,9 +189,9 @@ BlendedImage image_of(BlendFrame& f) {
     image.features.resize(pixels * channels);
     image.alphas.resize(pixels);
     f.transmittances.resize(pixels);
-    for (uint32_t chunk = 0; chunk < f.chunks(); ++chunk) {
-        const std::vector<float> planes = f.planes(chunk).download<float>(s.planes / sizeof(float));
-        const uint32_t first = kChunk * chunk, count = std::min(f.channels - first, kChunk);
+    for (uint32_t group = 0; group < f.groups(); ++group) {
+        const std::vector<float> planes = f.planes(group).download<float>(s.planes / sizeof(float));
+        const uint32_t first = kGroup * group, count = std::min(f.channels - first, kGroup);
         for (uint32_t y = 0; y < f.height; ++y) {
             const size_t row = size_t(y) * s.stride, at = size_t(y) * f.width;
             const float* left = &planes[size_t(shared::PLANE_T) * s.plane_floats + row];
@@ -201,7 +201,7 @@ BlendedImage image_of(BlendFrame& f) {
                 float* to = &image.features[at * channels + first + c];
                 for (uint32_t x = 0; x < f.width; ++x) to[x * channels] = from[x] + left[x] * background;
             }
-            if (chunk == 0) std::copy_n(left, f.width, &f.transmittances[at]);
+            if (group == 0) std::copy_n(left, f.width, &f.transmittances[at]);
         }
     }
     if (!f.tile_mask.empty())
@@ -217,15 +217,15 @@ BlendedImage image_of(BlendFrame& f) {
 }
 
 /// A plane of an image gradient, with zeros where the tile mask has none.
-void fill_gradient(const BlendFrame& f, uint32_t chunk, std::span<const float> features,
+void fill_gradient(const BlendFrame& f, uint32_t group, std::span<const float> features,
                    std::span<const float> alphas, std::vector<float>& planes) {
     const Sizes& s = f.frame.sizes;
     planes.assign(size_t(s.plane_floats) * 5, 0.0f);
-    const uint32_t first = kChunk * chunk, count = std::min(f.channels - first, kChunk);
+    const uint32_t first = kGroup * group, count = std::min(f.channels - first, kGroup);
     for (uint32_t y = 0; y < f.height; ++y) {
         const size_t row = size_t(y) * s.stride, at = size_t(y) * f.width;
         float* left = &planes[size_t(shared::PLANE_T) * s.plane_floats + row];
-        if (chunk == 0 && !alphas.empty())
+        if (group == 0 && !alphas.empty())
             for (uint32_t x = 0; x < f.width; ++x) left[x] = -alphas[at + x];
         for (uint32_t c = 0; c < count; ++c) {
             float* to = &planes[size_t(plane_of(c)) * s.plane_floats + row];
@@ -243,18 +243,18 @@ void fill_gradient(const BlendFrame& f, uint32_t chunk, std::span<const float> f
     }
 }
 
-/// What blend_absolute.comp reads of the pixels: texels of 4 channels, chunk by chunk, and one of the light behind all splats.
+/// What blend_absolute.comp reads of the pixels: texels of 4 channels, group by group, and one of the light behind all splats.
 std::vector<float> absolute_inputs(const BlendFrame& f, std::span<const float> features,
                                    std::span<const float> alphas) {
     const Sizes& s = f.frame.sizes;
-    const size_t pixels = size_t(f.width) * f.height, chunks = f.chunks();
-    std::vector<float> texels(4 * pixels * (chunks + 1));
-    float* const rest = &texels[4 * pixels * chunks];
+    const size_t pixels = size_t(f.width) * f.height, groups = f.groups();
+    std::vector<float> texels(4 * pixels * (groups + 1));
+    float* const rest = &texels[4 * pixels * groups];
     std::vector<float> gradient;
-    for (uint32_t chunk = 0; chunk < chunks; ++chunk) {
-        fill_gradient(f, chunk, features, alphas, gradient);
-        const std::vector<float> image = f.planes(chunk).download<float>(s.planes / sizeof(float));
-        const uint32_t count = std::min(f.channels - kChunk * chunk, kChunk);
+    for (uint32_t group = 0; group < groups; ++group) {
+        fill_gradient(f, group, features, alphas, gradient);
+        const std::vector<float> image = f.planes(group).download<float>(s.planes / sizeof(float));
+        const uint32_t count = std::min(f.channels - kGroup * group, kGroup);
         for (size_t i = 0; i < pixels; ++i) {
             const size_t at = i / f.width * s.stride + i % f.width;
             const auto add = [&](uint32_t plane) {
@@ -262,7 +262,7 @@ std::vector<float> absolute_inputs(const BlendFrame& f, std::span<const float> f
                 rest[4 * i] += gradient[k] * image[k];
                 return gradient[k];
             };
-            for (uint32_t c = 0; c < count; ++c) texels[4 * (chunk * pixels + i) + c] = add(plane_of(c));
+            for (uint32_t c = 0; c < count; ++c) texels[4 * (group * pixels + i) + c] = add(plane_of(c));
             add(shared::PLANE_T);
         }
     }
@@ -294,23 +294,23 @@ void record_gather(const passes::Recorder& on, const BlendFrame& f, uint32_t fir
               {{shared::SPEC_MODE, mode}});
 }
 
-void record_gradient(const passes::Recorder& on, const BlendFrame& f, uint32_t chunk, bool absolute) {
-    uint32_t blend = shared::BLEND_BACKWARD_ALPHA, gather = chunk > 0 ? shared::GATHER_ADD : 0;
+void record_gradient(const passes::Recorder& on, const BlendFrame& f, uint32_t group, bool absolute) {
+    uint32_t blend = shared::BLEND_BACKWARD_ALPHA, gather = group > 0 ? shared::GATHER_ADD : 0;
     if (absolute) {
         blend |= shared::BLEND_BACKWARD_ABSOLUTE;
         gather |= shared::GATHER_ABSOLUTE;
     }
-    if (has_fourth(f, chunk)) {
+    if (has_fourth(f, group)) {
         blend |= shared::BLEND_BACKWARD_FOURTH;
         gather |= shared::GATHER_FOURTH;
     }
-    if (f.chunks() > 1) record_collect(on, f, chunk, shared::COLLECT_FEATURES);
-    on.record(passes::BlendBackward{{buffers_of(f, chunk), f.frame.image_gradient, f.frame.slots}},
+    if (f.groups() > 1) record_collect(on, f, group, shared::COLLECT_FEATURES);
+    on.record(passes::BlendBackward{{buffers_of(f, group), f.frame.image_gradient, f.frame.slots}},
               push_of(on, f), blend_variant(f, blend));
-    record_gather(on, f, kChunk * chunk, gather);
+    record_gather(on, f, kGroup * group, gather);
 }
 
-/// The absolute gradients of an image with several chunks. The other gradients stay: their sums in the slots are 0.
+/// The absolute gradients of an image with several groups. The other gradients stay: their sums in the slots are 0.
 void record_absolute(const passes::Recorder& on, const BlendFrame& f) {
     on.recording.fill(f.absolute_gradient.buffer(), 0, 0, uint64_t(f.splats) * 8);
     on.record(passes::BlendAbsolute{.records = f.frame.records,
@@ -422,13 +422,13 @@ ScreenGradient Operators::blend_backward(const BlendRecord& record, std::span<co
     f.opacities_gradient.reserve(device, n * 4);
     f.features_gradient.reserve(device, n * 4 * f.channels);
     f.absolute_gradient.reserve(device, absolute ? n * 8 : 16);
-    const bool apart = absolute && f.chunks() > 1 && n > 0;
+    const bool apart = absolute && f.groups() > 1 && n > 0;
     std::vector<float> planes;
-    for (uint32_t chunk = 0; chunk < f.chunks(); ++chunk) {
-        fill_gradient(f, chunk, features_gradient, alphas_gradient, planes);
+    for (uint32_t group = 0; group < f.groups(); ++group) {
+        fill_gradient(f, group, features_gradient, alphas_gradient, planes);
         f.frame.image_gradient.upload(std::span<const float>(planes));
         gpu::Recording recording(device.limits());
-        record_gradient({recording, context.cache}, f, chunk, absolute && !apart);
+        record_gradient({recording, context.cache}, f, group, absolute && !apart);
         context.executor.run(recording);
     }
     if (apart) {
