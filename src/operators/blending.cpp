@@ -182,6 +182,14 @@ uint32_t plane_of(uint32_t c) {
     return c < 3 ? shared::PLANE_R + c : shared::PLANE_DEPTH;
 }
 
+/// The planes of a group: the device's memory itself where the host reads it fast, or `copy`.
+const float* read_planes(const BlendFrame& f, uint32_t group, std::vector<float>& copy) {
+    if (const std::byte* in_place = f.planes(group).readable())
+        return reinterpret_cast<const float*>(in_place);
+    copy = f.planes(group).download<float>(f.frame.sizes.planes / sizeof(float));
+    return copy.data();
+}
+
 BlendedImage image_of(BlendFrame& f) {
     const Sizes& s = f.frame.sizes;
     const size_t pixels = size_t(f.width) * f.height, channels = f.channels;
@@ -189,14 +197,15 @@ BlendedImage image_of(BlendFrame& f) {
     image.features.resize(pixels * channels);
     image.alphas.resize(pixels);
     f.transmittances.resize(pixels);
+    std::vector<float> copy;
     for (uint32_t group = 0; group < f.groups(); ++group) {
-        const std::vector<float> planes = f.planes(group).download<float>(s.planes / sizeof(float));
+        const float* planes = read_planes(f, group, copy);
         const uint32_t first = kGroup * group, count = std::min(f.channels - first, kGroup);
         for (uint32_t y = 0; y < f.height; ++y) {
             const size_t row = size_t(y) * s.stride, at = size_t(y) * f.width;
-            const float* left = &planes[size_t(shared::PLANE_T) * s.plane_floats + row];
+            const float* left = planes + size_t(shared::PLANE_T) * s.plane_floats + row;
             for (uint32_t c = 0; c < count; ++c) {
-                const float* from = &planes[size_t(plane_of(c)) * s.plane_floats + row];
+                const float* from = planes + size_t(plane_of(c)) * s.plane_floats + row;
                 const float background = f.background[first + c];
                 float* to = &image.features[at * channels + first + c];
                 for (uint32_t x = 0; x < f.width; ++x) to[x * channels] = from[x] + left[x] * background;
@@ -216,19 +225,21 @@ BlendedImage image_of(BlendFrame& f) {
     return image;
 }
 
-/// A plane of an image gradient, with zeros where the tile mask has none.
+constexpr size_t kGradientPlanes = 5;
+
+/// The planes of an image gradient, with zeros where the tile mask has none.
 void fill_gradient(const BlendFrame& f, uint32_t group, std::span<const float> features,
-                   std::span<const float> alphas, std::vector<float>& planes) {
+                   std::span<const float> alphas, float* planes) {
     const Sizes& s = f.frame.sizes;
-    planes.assign(size_t(s.plane_floats) * 5, 0.0f);
+    std::fill_n(planes, kGradientPlanes * s.plane_floats, 0.0f);
     const uint32_t first = kGroup * group, count = std::min(f.channels - first, kGroup);
     for (uint32_t y = 0; y < f.height; ++y) {
         const size_t row = size_t(y) * s.stride, at = size_t(y) * f.width;
-        float* left = &planes[size_t(shared::PLANE_T) * s.plane_floats + row];
+        float* left = planes + size_t(shared::PLANE_T) * s.plane_floats + row;
         if (group == 0 && !alphas.empty())
             for (uint32_t x = 0; x < f.width; ++x) left[x] = -alphas[at + x];
         for (uint32_t c = 0; c < count; ++c) {
-            float* to = &planes[size_t(plane_of(c)) * s.plane_floats + row];
+            float* to = planes + size_t(plane_of(c)) * s.plane_floats + row;
             const float* from = &features[at * f.channels + first + c];
             const float background = f.background[first + c];
             for (uint32_t x = 0; x < f.width; ++x) {
@@ -239,8 +250,19 @@ void fill_gradient(const BlendFrame& f, uint32_t group, std::span<const float> f
         if (f.tile_mask.empty()) continue;
         for (uint32_t x = 0; x < f.width; ++x)
             if (!f.drawn(x, y))
-                for (uint32_t p = 0; p < 5; ++p) planes[size_t(p) * s.plane_floats + row + x] = 0;
+                for (size_t p = 0; p < kGradientPlanes; ++p) planes[p * s.plane_floats + row + x] = 0;
     }
+}
+
+/// Writes a group of an image gradient to the device: in place, or through `copy` where the host cannot.
+void upload_image_gradient(BlendFrame& f, uint32_t group, std::span<const float> features,
+                           std::span<const float> alphas, std::vector<float>& copy) {
+    gpu::Buffer& buffer = f.frame.image_gradient;
+    if (buffer.readable())
+        return fill_gradient(f, group, features, alphas, reinterpret_cast<float*>(buffer.mapped()));
+    copy.resize(kGradientPlanes * f.frame.sizes.plane_floats);
+    fill_gradient(f, group, features, alphas, copy.data());
+    buffer.upload(std::span<const float>(copy));
 }
 
 /// What blend_absolute.comp reads of the pixels: texels of 4 channels, group by group, and one of the light behind all splats.
@@ -250,10 +272,10 @@ std::vector<float> absolute_inputs(const BlendFrame& f, std::span<const float> f
     const size_t pixels = size_t(f.width) * f.height, groups = f.groups();
     std::vector<float> texels(4 * pixels * (groups + 1));
     float* const rest = &texels[4 * pixels * groups];
-    std::vector<float> gradient;
+    std::vector<float> gradient(kGradientPlanes * s.plane_floats), copy;
     for (uint32_t group = 0; group < groups; ++group) {
-        fill_gradient(f, group, features, alphas, gradient);
-        const std::vector<float> image = f.planes(group).download<float>(s.planes / sizeof(float));
+        fill_gradient(f, group, features, alphas, gradient.data());
+        const float* image = read_planes(f, group, copy);
         const uint32_t count = std::min(f.channels - kGroup * group, kGroup);
         for (size_t i = 0; i < pixels; ++i) {
             const size_t at = i / f.width * s.stride + i % f.width;
@@ -423,10 +445,9 @@ ScreenGradient Operators::blend_backward(const BlendRecord& record, std::span<co
     f.features_gradient.reserve(device, n * 4 * f.channels);
     f.absolute_gradient.reserve(device, absolute ? n * 8 : 16);
     const bool apart = absolute && f.groups() > 1 && n > 0;
-    std::vector<float> planes;
+    std::vector<float> copy;
     for (uint32_t group = 0; group < f.groups(); ++group) {
-        fill_gradient(f, group, features_gradient, alphas_gradient, planes);
-        f.frame.image_gradient.upload(std::span<const float>(planes));
+        upload_image_gradient(f, group, features_gradient, alphas_gradient, copy);
         gpu::Recording recording(device.limits());
         record_gradient({recording, context.cache}, f, group, absolute && !apart);
         context.executor.run(recording);
