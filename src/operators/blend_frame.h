@@ -2,15 +2,18 @@
 // The buffers of one blended image. They live as long as its record, and are then used for another image.
 #pragma once
 #include <cstdint>
+#include <memory>
 #include <vector>
 
-#include "operators/context.h"
+#include "operators/array.h"
 #include "pipeline/frame_buffers.h"
 
 namespace ewa::operators {
 
 /// Features are blended 4 channels at a time: a record holds that many.
 inline constexpr uint32_t kGroup = 4;
+
+struct Context;
 
 struct BlendFrame {
     std::shared_ptr<gpu::Device> device;  // outlives the buffers below

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "operators/blend_frame.h"
+#include "operators/context.h"
 #include "operators/device_lists.h"
 #include "passes/passes.h"
 #include "pipeline/forward.h"
@@ -349,6 +350,10 @@ void record_absolute(const passes::Recorder& on, const BlendFrame& f) {
 }  // namespace operators
 
 using namespace operators;
+
+Operators::Operators(std::shared_ptr<gpu::Device> device)
+    : context_(std::make_shared<Context>(std::move(device))) {}
+Operators::~Operators() = default;
 
 BlendRecord::BlendRecord(std::unique_ptr<BlendFrame> frame) : frame_(std::move(frame)) {}
 

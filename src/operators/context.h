@@ -1,92 +1,57 @@
 // SPDX-License-Identifier: Apache-2.0
-// What all operators of a device share, and how arrays of the host reach it.
+// What all operators of a device share. Buffers are kept from call to call.
 #pragma once
-#include <algorithm>
 #include <memory>
 #include <mutex>
-#include <optional>
-#include <span>
-#include <string>
+#include <utility>
 #include <vector>
 
-#include "ewa/error.h"
 #include "ewa/operators.h"
 #include "gpu/executor.h"
+#include "operators/array.h"
+#include "operators/blend_frame.h"
 #include "passes/pass.h"
 
 namespace ewa::operators {
 
-/// A buffer that is kept from call to call and grows as needed. A large array of the host takes its place for one call where
-/// the device can read it as it is.
-class Array {
-  public:
-    explicit Array(const char* name, gpu::Texel texel = gpu::Texel::none, bool uniform = false)
-        : name_(name), texel_(texel), uniform_(uniform) {}
+struct ProjectionBuffers {
+    Array views{"views"}, means{"means"}, shapes{"shapes"}, scales{"scales"}, opacities{"opacities"};
+    Array radii{"radii"}, means2d{"means2d"}, depths{"depths"}, conics{"conics"},
+        compensations{"compensations"};
+    Array means_gradient{"means gradient"}, shapes_gradient{"shapes gradient"},
+        scales_gradient{"scales gradient"};
+    Array view_sums{"view sums"}, reduced{"reduced view sums"}, counts{"unused counts"};
 
-    /// Room for `bytes` bytes, whose contents are undefined.
-    const gpu::Buffer& reserve(gpu::Device& device, uint64_t bytes) {
-        host_.reset();
-        if (!buffer_ || buffer_.bytes() < bytes) {
-            buffer_ = gpu::Buffer();
-            buffer_ = gpu::Buffer(device, name_, bytes + bytes / 4, texel_, uniform_);
-        }
-        return buffer_;
+    /// The caller's arrays, at the end of a call.
+    void give_back() {
+        for (Array* array :
+             {&means, &shapes, &scales, &opacities, &radii, &means2d, &depths, &conics, &compensations})
+            array->give_back();
     }
-    template <class T>
-    const gpu::Buffer& upload(gpu::Device& device, std::span<const T> values) {
-        reserve(device, values.size_bytes());
-        buffer_.upload(values);
-        return buffer_;
-    }
-    /// upload, for values that stay where they are until the last use of the buffer in this call.
-    template <class T>
-    const gpu::Buffer& lend(gpu::Device& device, std::span<const T> values) {
-        constexpr size_t kWorthIt = size_t(64) << 10;  // bytes; fewer are copied in the time that this takes
-        host_.reset();
-        if (values.size_bytes() >= kWorthIt)
-            host_ = gpu::Buffer::in_host_memory(device, name_, std::as_bytes(values));
-        return host_ ? *host_ : upload(device, values);
-    }
-    /// The end of the call.
-    void give_back() { host_.reset(); }
-    template <class T>
-    std::vector<T> download(size_t count) const {
-        return buffer_.download<T>(count);
-    }
-    const gpu::Buffer& buffer() const { return host_ ? *host_ : buffer_; }
-
-  private:
-    const char* name_;
-    gpu::Texel texel_;
-    bool uniform_;
-    gpu::Buffer buffer_;
-    std::optional<gpu::Buffer> host_;
 };
 
-/// Buffers of the projection and of spherical harmonics, by use.
-struct ProjectionBuffers;
-struct HarmonicsBuffers;
+struct HarmonicsBuffers {
+    Array directions{"directions"}, coefficients{"coefficients"}, masks{"masks"}, colors{"colors"};
+    Array coefficients_gradient{"coefficients gradient"}, directions_gradient{"directions gradient"};
+
+    void give_back() {
+        for (Array* array : {&directions, &coefficients, &masks, &colors}) array->give_back();
+    }
+};
 
 struct Context {
-    explicit Context(std::shared_ptr<gpu::Device> device);
-    ~Context();
+    explicit Context(std::shared_ptr<gpu::Device> d)
+        : device(std::move(d)), cache(*device), executor(*device) {}
 
     std::shared_ptr<gpu::Device> device;
     passes::PassCache cache;
     gpu::Executor executor;
     std::mutex mutex;  // held by each operator while it uses the device or one of the members below
 
-    std::unique_ptr<ProjectionBuffers> projection;
-    std::unique_ptr<HarmonicsBuffers> harmonics;
+    ProjectionBuffers projection;
+    HarmonicsBuffers harmonics;
     std::vector<std::unique_ptr<BlendFrame>> free_frames;
     std::mutex frames_mutex;  // of free_frames
 };
-
-/// Throws InputError unless an array has the size that its shape says. shape: for the text, such as "[N, 3]".
-inline void check_size(const char* argument, size_t size, size_t expected, const char* shape) {
-    if (size != expected)
-        throw InputError(std::string(argument) + " has " + std::to_string(size) + " values; its shape " +
-                         shape + " needs " + std::to_string(expected));
-}
 
 }  // namespace ewa::operators

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "operators/context.h"
+#include "operators/array.h"
 
 namespace ewa::operators {
 namespace {

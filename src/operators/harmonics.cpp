@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The operators of spherical harmonics.
-#include "operators/splat_buffers.h"
+#include "operators/context.h"
 #include "passes/passes.h"
 
 namespace ewa {
@@ -57,7 +57,7 @@ std::vector<float> Operators::spherical_harmonics(const HarmonicsArrays& h) {
     if (count == 0) return {};
     const std::lock_guard lock(context_->mutex);
     gpu::Device& device = *context_->device;
-    operators::HarmonicsBuffers& b = *context_->harmonics;
+    operators::HarmonicsBuffers& b = context_->harmonics;
     upload_harmonics(device, b, h);
     b.colors.reserve(device, 4 * count);
     gpu::Recording recording(device.limits());
@@ -85,7 +85,7 @@ HarmonicsGradient Operators::spherical_harmonics_backward(const HarmonicsArrays&
     }
     const std::lock_guard lock(context_->mutex);
     gpu::Device& device = *context_->device;
-    operators::HarmonicsBuffers& b = *context_->harmonics;
+    operators::HarmonicsBuffers& b = context_->harmonics;
     upload_harmonics(device, b, h);
     b.colors.lend(device, colors_gradient);
     b.coefficients_gradient.reserve(device, h.coefficients.size_bytes());

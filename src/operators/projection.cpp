@@ -2,7 +2,7 @@
 // The operators of projection: arguments are checked and uploaded, a pass runs, results are downloaded.
 #include <cmath>
 
-#include "operators/splat_buffers.h"
+#include "operators/context.h"
 #include "passes/passes.h"
 
 namespace ewa {
@@ -105,7 +105,7 @@ void upload_gradient(gpu::Device& device, gpu::Recording& recording, operators::
 /// Adds the items of each row, in blocks and then blocks of blocks. Returns the buffer that holds the sums.
 operators::Array& reduce_rows(const passes::Recorder& on, operators::Context& context, uint32_t items,
                               uint32_t rows) {
-    ProjectionBuffers& b = *context.projection;
+    ProjectionBuffers& b = context.projection;
     operators::Array *from = &b.view_sums, *to = &b.reduced;
     const uint32_t most = (items + kReduceBlock - 1) / kReduceBlock;
     b.reduced.reserve(*context.device, uint64_t(4) * rows * most);
@@ -145,7 +145,7 @@ ProjectedSplats Operators::project(const SplatArrays& splats, const ViewArrays& 
     if (pairs == 0) return {};
     const std::lock_guard lock(context_->mutex);
     gpu::Device& device = *context_->device;
-    ProjectionBuffers& b = *context_->projection;
+    ProjectionBuffers& b = context_->projection;
     upload_splats(device, b, splats, views, options);
     b.radii.reserve(device, 8 * pairs);
     b.means2d.reserve(device, 8 * pairs);
@@ -194,7 +194,7 @@ SplatGradient Operators::project_backward(const SplatArrays& splats, const ViewA
     }
     const std::lock_guard lock(context_->mutex);
     gpu::Device& device = *context_->device;
-    ProjectionBuffers& b = *context_->projection;
+    ProjectionBuffers& b = context_->projection;
     gpu::Recording recording(device.limits());
     upload_splats(device, b, splats, views, options);
     b.radii.lend(device, radii);

@@ -56,7 +56,7 @@ const std::map<std::string, Modules>& allowed() {
 }
 
 /// Modules whose files have an order: each includes only files before it.
-const Modules kOrdered = {"src/train", "src/viewer"};
+const Modules kOrdered = {"src/operators", "src/train", "src/viewer"};
 
 /// The module whose promises a public header declares; those not named here are plain values that any module may
 /// use.
