@@ -74,10 +74,12 @@ struct SplatGradient {
     std::vector<float> view_matrices;  // [C, 4, 4]; the last row is 0; empty unless asked for
 };
 
+inline constexpr uint32_t kMaxHarmonicsDegree = 4;
+
 /// Spherical harmonics of N splats, shared by C views: colour = sum over k of coefficient k times Y_k(direction), with neither
 /// an offset nor a clamp. Y_k has INRIA's order and signs (3DGS, utils/sh_utils.py), and to degree 4 gsplat's.
 struct HarmonicsArrays {
-    uint32_t degree = 0;                  // 0 to 4; higher coefficients are not read
+    uint32_t degree = 0;                  // to kMaxHarmonicsDegree; higher coefficients are not read
     uint32_t coefficient_count = 1;       // K, at least (degree + 1)^2
     uint32_t channels = 3;                // D, at least 1
     std::span<const float> directions;    // [C, N, 3], of any length

@@ -13,6 +13,7 @@
 #include "errors.h"
 #include "ewa/error.h"
 #include "shared/constants.h"
+#include "shared/layouts.h"
 
 namespace ewa::python {
 namespace {
@@ -304,10 +305,20 @@ void bind_operators(nb::module_& module) {
                                            "include/ewa/operators.h has the formulas.");
     own.attr("ALPHA_MIN") = shared::ALPHA_MIN;
     own.attr("ALPHA_MAX") = shared::ALPHA_MAX;
-    own.attr("TRANSMITTANCE_STOP") = shared::TRANSMITTANCE_STOP;
+    own.attr("COLOR_OFFSET") = shared::COLOR_OFFSET;
+    own.attr("FAR_PLANE") = ProjectionOptions().far;
+    own.attr("JACOBIAN_MARGIN") = shared::JACOBIAN_MARGIN;
+    own.attr("LOW_PASS") = shared::LOW_PASS;
+    own.attr("MAX_SH_DEGREE") = kMaxHarmonicsDegree;
+    own.attr("MCMC_GATE_OPACITY") = shared::MCMC_GATE_OPACITY;
+    own.attr("MCMC_GATE_SLOPE") = shared::MCMC_GATE_SLOPE;
+    own.attr("NEAR_PLANE") = shared::NEAR_PLANE;
+    own.attr("PART_SIZE") = shared::PART_SIZE;
     own.attr("RADIUS_SIGMAS") = shared::RADIUS_SIGMAS;
-    own.attr("SPLIT_SCALE") = shared::SPLIT_SCALE;
     own.attr("SH_C0") = shared::SH_C0;
+    own.attr("SPLIT_SCALE") = shared::SPLIT_SCALE;
+    own.attr("TILE_SIZE") = TileLists().tile_size;
+    own.attr("TRANSMITTANCE_STOP") = shared::TRANSMITTANCE_STOP;
     nb::class_<BlendHandle>(own, "BlendHandle",
                             "What blend_backward needs of an image. It holds device memory.");
     own.def("project", project, nb::arg("means"), nb::arg("quats").none(), nb::arg("scales").none(),

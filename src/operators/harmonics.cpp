@@ -14,8 +14,9 @@ struct HarmonicsShape {
 };
 
 HarmonicsShape check_harmonics(const HarmonicsArrays& h) {
-    if (h.degree > 4)
-        throw InputError("spherical harmonics of degree " + std::to_string(h.degree) + "; the highest is 4");
+    if (h.degree > kMaxHarmonicsDegree)
+        throw InputError("spherical harmonics of degree " + std::to_string(h.degree) + "; the highest is " +
+                         std::to_string(kMaxHarmonicsDegree));
     if (h.coefficient_count < (h.degree + 1) * (h.degree + 1))
         throw InputError(std::to_string(h.coefficient_count) + " coefficients; degree " +
                          std::to_string(h.degree) + " needs " +

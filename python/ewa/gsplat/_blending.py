@@ -6,6 +6,7 @@ import math
 import numpy as np
 from torch import Tensor
 
+from .._native import operators
 from ._arguments import array, check, integer, mismatch, shape, tensor
 from ._autograd import Blend, ByLists, attach_absgrad, needs_gradient
 
@@ -54,7 +55,8 @@ def rasterize_to_pixels(
         shape("backgrounds", backgrounds, dims + (channels,))
     if masks is not None:
         shape("masks", masks, isect_offsets.shape)
-    check(tile_size % 4 == 0, f"tile_size is {tile_size}; expected a multiple of 4")
+    part = operators.PART_SIZE
+    check(tile_size % part == 0, f"tile_size is {tile_size}; expected a multiple of {part}")
     check(rows * tile_size >= image_height, f"{rows} rows of tiles do not cover {image_height} px")
     check(columns * tile_size >= image_width, f"{columns} tiles do not cover {image_width} px")
     ranges, offsets, ids = _lists(isect_offsets, flatten_ids, lead[-1], packed)

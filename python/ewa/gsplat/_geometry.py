@@ -116,8 +116,9 @@ def _rows(first, second):
 
 def _pinhole(means, fx, fy, cx, cy, width, height):
     x, y, z = means.unbind(-1)
-    # The slope is held within 1.3 image sizes, where the linear approximation still holds.
-    margin_x, margin_y = 0.15 * width / fx, 0.15 * height / fy
+    # Beyond this share of the half image, the linear approximation does not hold.
+    margin = operators.JACOBIAN_MARGIN / 2
+    margin_x, margin_y = margin * width / fx, margin * height / fy
     u = _within(x / z, -cx / fx - margin_x, (width - cx) / fx + margin_x)
     v = _within(y / z, -cy / fy - margin_y, (height - cy) / fy + margin_y)
     zero = torch.zeros_like(z)

@@ -93,7 +93,7 @@ def _from_views(
 
 def evaluate(degree, dirs, coeffs, masks):
     """Directions [..., 3] with coefficients [..., K, D], or [N, K, D] for every leading dim."""
-    degree = integer("degrees_to_use", degree, 0, 4)
+    degree = integer("degrees_to_use", degree, 0, operators.MAX_SH_DEGREE)
     if coeffs.dim() < 2 or not coeffs.shape[-1]:
         raise mismatch("coeffs", coeffs, "[..., K, D] with at least one channel")
     lead, (bands, channels) = dirs.shape[:-1], coeffs.shape[-2:]

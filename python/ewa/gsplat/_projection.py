@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from . import _dialect
+from .._native import operators
 from ._arguments import check, full_precision, integer, mismatch, shape, tensor, unavailable
 from ._autograd import Project, ProjectOptions, ProjectPacked
 from ._geometry import footprint, full_matrix, project_rows, quat_scale_to_covar_preci, radii_of
@@ -21,9 +22,9 @@ def fully_fused_projection(
     Ks: Tensor,
     width: int,
     height: int,
-    eps2d: float = 0.3,
-    near_plane: float = 0.01,
-    far_plane: float = 10000000000.0,
+    eps2d: float = operators.LOW_PASS,
+    near_plane: float = operators.NEAR_PLANE,
+    far_plane: float = operators.FAR_PLANE,
     radius_clip: float = 0.0,
     packed: bool = False,
     sparse_grad: bool = False,

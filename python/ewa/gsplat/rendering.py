@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from . import _dialect
+from .._native import operators
 from ._arguments import check, integer, mismatch, refusal, shape, tensor, unavailable
 from ._autograd import Blend, ByDepth, ProjectOptions, attach_absgrad, needs_gradient
 from ._geometry import camera_offsets, upper_triangle
@@ -80,10 +81,10 @@ def rasterization(
     Ks: Tensor,
     width: int,
     height: int,
-    near_plane: float = 0.01,
-    far_plane: float = 10000000000.0,
+    near_plane: float = operators.NEAR_PLANE,
+    far_plane: float = operators.FAR_PLANE,
     radius_clip: float = 0.0,
-    eps2d: float = 0.3,
+    eps2d: float = operators.LOW_PASS,
     sh_degree: int | None = None,
     packed: bool = True,
     tile_size: int | None = None,
@@ -160,11 +161,12 @@ def rasterization(
     )
     check(packed or not sparse_grad, "sparse_grad needs packed=True")
     width, height = integer("width", width), integer("height", height)
-    tile_size = 16 if tile_size is None else integer("tile_size", tile_size)
+    tile_size = operators.TILE_SIZE if tile_size is None else integer("tile_size", tile_size)
+    most = operators.MAX_SH_DEGREE
     if sh_degree is not None:
-        sh_degree = integer("sh_degree", sh_degree, 0, 4)
+        sh_degree = integer("sh_degree", sh_degree, 0, most)
     if extra_signals_sh_degree is not None:
-        extra_signals_sh_degree = integer("extra_signals_sh_degree", extra_signals_sh_degree, 0, 4)
+        extra_signals_sh_degree = integer("extra_signals_sh_degree", extra_signals_sh_degree, 0, most)
     scene = _Scene(means, quats, scales, covars, opacities, viewmats, Ks)
     options = ProjectOptions(
         width,
@@ -346,10 +348,12 @@ def _features(scene, ids, radii, depths, color, extra, with_depth, backgrounds):
     parts = []
     if color is not None:
         values = _channels(scene, ids, radii, "colors", *color)
-        parts.append(torch.clamp_min(values + 0.5, 0.0) if color[1] is not None else values)
+        if color[1] is not None:
+            values = torch.clamp_min(values + operators.COLOR_OFFSET, 0.0)
+        parts.append(values)
     if extra is not None:
         values = _channels(scene, ids, radii, "extra_signals", *extra)
-        parts.append(values + 0.5 if extra[1] is not None else values)
+        parts.append(values if extra[1] is None else values + operators.COLOR_OFFSET)
     counts = [p.shape[-1] for p in parts]
     if with_depth:
         parts.append(depths.unsqueeze(-1))

@@ -7,6 +7,7 @@ from typing import Any
 
 import torch
 
+from ..._native import operators
 from .base import Optimizers, Parameters, Strategy
 from .ops import inject_noise_to_position, relocate, sample_add
 
@@ -27,8 +28,8 @@ class MCMCStrategy(Strategy):
     refine_every: int = 100
     min_opacity: float = 0.005
     verbose: bool = False
-    noise_opacity_t: float = 0.005
-    noise_opacity_k: float = 100.0
+    noise_opacity_t: float = operators.MCMC_GATE_OPACITY
+    noise_opacity_k: float = operators.MCMC_GATE_SLOPE
 
     def initialize_state(self) -> dict[str, Any]:
         """The table of binomial coefficients that relocation needs."""

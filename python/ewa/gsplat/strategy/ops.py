@@ -230,8 +230,8 @@ def inject_noise_to_position(
     optimizers: Optimizers,
     state: dict[str, Any],
     scaler: float,
-    t: float = 0.005,
-    k: float = 100.0,
+    t: float = operators.MCMC_GATE_OPACITY,
+    k: float = operators.MCMC_GATE_SLOPE,
 ) -> None:
     """Moves each mean by noise of its own covariance; splats more opaque than `t` barely move."""
     opacities = torch.sigmoid(params["opacities"].flatten())
