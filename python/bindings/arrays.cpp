@@ -2,6 +2,7 @@
 #include "arrays.h"
 
 #include <algorithm>
+#include <span>
 
 namespace ewa::python {
 namespace {
@@ -15,11 +16,18 @@ std::string shape_text(const std::vector<std::string>& lengths) {
 std::string expected_text(const Shape& shape) {
     std::vector<std::string> lengths;
     for (const ptrdiff_t length : shape)
-        lengths.push_back(length < 0 ? std::string(1, char(-length)) : std::to_string(length));
+        lengths.push_back(length == kLeading ? "..."
+                          : length < 0       ? std::string(1, char(-length))
+                                             : std::to_string(length));
     return shape_text(lengths);
 }
 
-bool fits(const std::vector<ptrdiff_t>& lengths, const Shape& shape) {
+bool fits(std::span<const ptrdiff_t> lengths, std::span<const ptrdiff_t> shape) {
+    if (!shape.empty() && shape[0] == kLeading) {
+        shape = shape.subspan(1);
+        if (lengths.size() < shape.size()) return false;
+        lengths = lengths.last(shape.size());
+    }
     return std::equal(lengths.begin(), lengths.end(), shape.begin(), shape.end(),
                       [](ptrdiff_t is, ptrdiff_t expected) { return expected < 0 || is == expected; });
 }

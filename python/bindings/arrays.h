@@ -21,6 +21,9 @@ constexpr ptrdiff_t any(char letter) {
     return -ptrdiff_t(letter);
 }
 
+/// The first length of an expected shape: any number of lengths, "..." in messages.
+constexpr ptrdiff_t kLeading = any('.');
+
 using Shape = std::vector<ptrdiff_t>;
 
 /// The argument as a numpy array of numbers, C-contiguous, of this dtype ("float32"). A copy only where it must be one.
@@ -42,7 +45,7 @@ template <class T>
 class Array {
   public:
     Array(nb::handle value, const std::string& name, std::initializer_list<Shape> shapes)
-        : array_(nb::cast<View>(numpy_argument(value, name, dtype_of<T>(), shapes))) {}
+        : numpy_(numpy_argument(value, name, dtype_of<T>(), shapes)), array_(nb::cast<View>(numpy_)) {}
     Array(nb::handle value, const std::string& name, const Shape& shape) : Array(value, name, {shape}) {}
 
     const T* data() const { return array_.data(); }
@@ -50,9 +53,15 @@ class Array {
     size_t dimensions() const { return array_.ndim(); }
     size_t length(size_t dimension) const { return array_.shape(dimension); }
     std::vector<T> values() const { return std::vector<T>(data(), data() + size()); }
+    /// The shape without its last `count` lengths.
+    Shape leading(size_t count) const {
+        return Shape(array_.shape_ptr(), array_.shape_ptr() + dimensions() - count);
+    }
+    const nb::object& numpy() const { return numpy_; }
 
   private:
     using View = nb::ndarray<const T, nb::c_contig, nb::device::cpu>;
+    nb::object numpy_;
     View array_;
 };
 

@@ -298,21 +298,15 @@ def test_install_comes_before_gsplat(monkeypatch):
         ours.install()
 
 
-def test_import_is_quick_and_loads_no_operators():
+def test_import_is_quick():
     code = """
 import sys, time
 import torch
 start = time.perf_counter()
 import ewa.gsplat
 print(time.perf_counter() - start)
-print(ewa.gsplat._device._operators)
 """
-    times = []
-    for _ in range(2):
-        out = run("-c", code).stdout.split()
-        assert out[1:] == ["None"]
-        times.append(float(out[0]))
-    assert min(times) < 0.5
+    assert min(float(run("-c", code).stdout) for _ in range(2)) < 0.5
 
 
 def test_threads_of_torch_wait_without_spinning():

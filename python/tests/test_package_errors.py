@@ -73,8 +73,8 @@ def calls(data):
         (lambda: setattr(SPLATS, "density", "x"), "an attribute of Splats takes a bool, not a str"),
         (lambda: ewa.Splats(means=0), "Splats lacks quats, log_scales, opacity_logits and sh"),
         (
-            lambda: operators.project(1),
-            "project lacks quats, scales, covars, opacities, viewmats, Ks, width, "
+            lambda: operators.Projection(1),
+            "Projection lacks quats, scales, covars, opacities, viewmats, Ks, width, "
             "height, eps2d, near, far, radius_clip and compensations",
         ),
     ]
@@ -264,10 +264,49 @@ def test_numbers_that_are_not_whole_are_refused(still_life):
     with pytest.raises(ValueError, match="colors holds .* uint8"):
         ewa.Splats.from_points(np.zeros((1, 3)), [[0, 256, 0]])
     assert len(ewa.Splats.from_points(np.zeros((1, 3)), [[0.0, 255.0, 1.0]])) == 1
-    f = np.float32
-    arrays = f([[4, 4]]), f([[1, 0, 1]]), f([0.5]), f([[1]])
     with pytest.raises(ValueError, match="offsets holds numbers that are not whole"):
-        _native.operators.blend_lists(*arrays, 8, 8, None, None, 8, [0, 0.9], [0], False)
+        _native.operators.Blending(footprints(), [(0, 1)], 8, 8, 8, lists=[([0, 0.9], [0])])
+
+
+def footprints(**changes):
+    """Footprints of one splat."""
+    arrays = dict(
+        means2d=[[4, 4]], conics=[[1, 0, 1]], opacities=[0.5], features=[[1]], depths=[1]
+    )
+    return _native.operators.Footprints(**{**arrays, **changes})
+
+
+@pytest.mark.parametrize(
+    "change, text",
+    [
+        (dict(conics=[[1, 0]]), r"conics has the shape \(1, 2\); expected \(1, 3\)"),
+        (dict(radii=[[3, 3], [3, 3]]), r"radii has the shape \(2, 2\); expected \(1, 2\)"),
+        (dict(depths=[[1]]), r"depths has the shape \(1, 1\); expected \(1,\)"),
+        (dict(means2d=4), r"means2d has the shape \(\); expected \(..., 2\)"),
+    ],
+)
+def test_footprints_have_one_shape(change, text):
+    with pytest.raises(ValueError, match=text):
+        footprints(**change)
+
+
+def test_wrong_images_of_footprints_are_named():
+    def blending(rows=((0, 1),), lists=(), **changes):
+        return _native.operators.Blending(footprints(**changes), rows, 8, 8, 8, lists=lists)
+
+    for wrong, text in (
+        (dict(rows=[(0, 2)]), "rows from 0 to 2 of 1 footprints"),
+        (dict(rows=[(1, 0)]), "rows from 1 to 0 of 1 footprints"),
+        (dict(lists=[([0, 1], [0])] * 2), "2 lists of 1 images"),
+        (dict(depths=None), "footprints without depths"),
+        (dict(features=None), "footprints without features"),
+    ):
+        with pytest.raises(ewa.InputError, match=text):
+            blending(**wrong)
+    images = blending()
+    images.blend(keep=False)
+    with pytest.raises(ewa.InputError, match="images whose gradients were not kept"):
+        images.gradients(None, None, absolute=False)
 
 
 def test_a_render_that_shows_nothing_is_warned_of():

@@ -80,8 +80,8 @@ def full_precision(function):
 
 
 def array(value):
-    """The numpy view of a tensor."""
-    return value.detach().numpy()
+    """The numpy view of a tensor, or None."""
+    return None if value is None else value.detach().numpy()
 
 
 def bytes_of(mask):

@@ -3,17 +3,14 @@
 
 import functools
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from torch.autograd import Function
 
+from .._native import operators
 from ._arguments import array, bytes_of, check
-from ._device import operators
-
-
-def _numpy_or_none(value):
-    return None if value is None else array(value)
 
 
 def _tensor_or_none(value):
@@ -50,136 +47,93 @@ def first_derivatives(backward):
     return run
 
 
-class ProjectOptions:
+class ProjectOptions(NamedTuple):
     """What a projection takes beside tensors."""
 
-    __slots__ = ("width", "height", "eps2d", "near", "far", "radius_clip", "compensations")
-
-    def __init__(self, width, height, eps2d, near, far, radius_clip, compensations):
-        check(eps2d >= 0, f"eps2d is {eps2d}; expected 0 or more")
-        self.width, self.height = width, height
-        self.eps2d, self.near, self.far = float(eps2d), float(near), float(far)
-        self.radius_clip, self.compensations = float(radius_clip), bool(compensations)
-
-
-def _scenes(tensors, batch):
-    """For each scene of a batch, the arrays of that scene."""
-    arrays = [_numpy_or_none(t) for t in tensors]
-    if not batch:
-        return [arrays]
-    count = math.prod(batch)
-    arrays = [None if a is None else a.reshape((count,) + a.shape[len(batch) :]) for a in arrays]
-    return [[None if a is None else a[i] for a in arrays] for i in range(count)]
+    width: int
+    height: int
+    eps2d: float
+    near: float
+    far: float
+    radius_clip: float
+    compensations: bool
 
 
-def _joined(parts, batch):
-    """One array a result from the results of each scene."""
-    if not batch:
-        return parts[0]
-    return [
-        None if p[0] is None else np.stack(p).reshape(tuple(batch) + p[0].shape)
-        for p in zip(*parts)
-    ]
+def project_options(width, height, eps2d, *floats, compensations):
+    check(eps2d >= 0, f"eps2d is {eps2d}; expected 0 or more")
+    return ProjectOptions(width, height, float(eps2d), *map(float, floats), bool(compensations))
 
 
-def _project(means, quats, scales, covars, opacities, viewmats, Ks, options):
-    batch = means.shape[:-2]
-    scenes = _scenes((means, quats, scales, covars, opacities, viewmats, Ks), batch)
-    o = options
-    project = operators().project
-    return _joined(
-        [
-            project(
-                *scene,
-                o.width,
-                o.height,
-                o.eps2d,
-                o.near,
-                o.far,
-                o.radius_clip,
-                o.compensations,
-            )
-            for scene in scenes
-        ],
-        batch,
-    )
+_FOOTPRINT = ("radii", "means2d", "depths", "conics", "compensations")
 
 
-def _project_backward(tensors, options, radii, gradients, need_viewmats):
+def _project(ctx, means, quats, scales, covars, viewmats, opacities, Ks, options):
+    """The arrays of the footprints. Their gradient needs what stays in ctx."""
+    tensors = (means, quats, scales, covars, opacities, viewmats, Ks)
+    ctx.projection = operators.Projection(*map(array, tensors), *options)
+    ctx.set_materialize_grads(False)
+    footprints = ctx.projection.footprints()
+    ctx.radii = footprints.radii
+    return [getattr(footprints, name) for name in _FOOTPRINT]
+
+
+def _save(ctx, means, quats, scales, covars, viewmats, _opacities, Ks, _options, *radii):
+    """For first_derivatives, and for torch's check that none changes before the backward pass."""
+    ctx.save_for_backward(means, quats, scales, covars, viewmats, Ks, *radii)
+
+
+def _project_backward(ctx, *gradients):
     """The gradients of means, quats, scales, covars and viewmats as tensors."""
-    batch = tensors[0].shape[:-2]
-    count = len(batch)
-    scenes = _scenes(tensors, batch)
-    flat = [radii] + list(gradients)
-    if count:
-        size = math.prod(batch)
-        flat = [None if a is None else a.reshape((size,) + a.shape[count:]) for a in flat]
-    backward = operators().project_backward
-    parts = []
-    for index, scene in enumerate(scenes):
-        own = [a if a is None or not count else a[index] for a in flat]
-        parts.append(
-            backward(*scene, options.width, options.height, options.eps2d, *own, need_viewmats)
-        )
-    return [_tensor_or_none(a) for a in _joined(parts, batch)]
+    ctx.saved_tensors  # torch raises here when the graph is already freed
+    by = operators.Footprints(**dict(zip(_FOOTPRINT, (ctx.radii, *gradients))))
+    return [_tensor_or_none(a) for a in ctx.projection.gradients(by, ctx.needs_input_grad[4])]
 
 
 class Project(Function):
     """Splats to footprints: radii, means2d, depths, conics and compensations [..., C, N, ...]."""
 
     @staticmethod
-    def forward(ctx, means, quats, scales, covars, viewmats, opacities, Ks, options):
-        out = _project(means, quats, scales, covars, opacities, viewmats, Ks, options)
-        out = [_tensor_or_none(a) for a in out]
-        ctx.set_materialize_grads(False)
-        ctx.options = options
-        ctx.save_for_backward(means, quats, scales, covars, viewmats, Ks, out[0])
+    def forward(ctx, *arguments):
+        out = tuple(_tensor_or_none(a) for a in _project(ctx, *arguments))
+        _save(ctx, *arguments, out[0])
         ctx.mark_non_differentiable(out[0])
-        return tuple(out)
+        return out
 
     @staticmethod
     @first_derivatives
-    def backward(ctx, _radii, v_means2d, v_depths, v_conics, v_compensations):
-        *tensors, radii = ctx.saved_tensors
-        gradients = [_numpy_or_none(v) for v in (v_means2d, v_depths, v_conics, v_compensations)]
-        need_viewmats = ctx.needs_input_grad[4]
-        out = _project_backward(tensors, ctx.options, array(radii), gradients, need_viewmats)
-        return (*out, None, None, None)
+    def backward(ctx, _radii, *gradients):
+        return (*_project_backward(ctx, *map(array, gradients)), None, None, None)
 
 
 class ProjectPacked(Function):
     """Splats to the footprints of those that reach an image, one row each [nnz, ...]."""
 
     @staticmethod
-    def forward(ctx, means, quats, scales, covars, viewmats, opacities, Ks, options, sparse):
-        dense = _project(means, quats, scales, covars, opacities, viewmats, Ks, options)
-        images = math.prod(viewmats.shape[:-2])
-        splats = means.shape[-2]
-        radii = dense[0].reshape(-1, 2)
-        rows = np.flatnonzero(radii[:, 0])
-        image, splat = np.divmod(rows, max(splats, 1))
-        batch, camera = np.divmod(image, viewmats.shape[-3])
-        indptr = np.searchsorted(image, np.arange(images + 1)).astype(np.int32)
+    def forward(ctx, *arguments):
+        *arguments, ctx.sparse = arguments
+        arrays = _project(ctx, *arguments)
+        _save(ctx, *arguments)
+        *dims, splats = ctx.radii.shape[:-1]
+        ctx.rows = np.flatnonzero(ctx.radii[..., 0])
+        image, splat = np.divmod(ctx.rows, max(splats, 1))
+        batch, camera = np.divmod(image, dims[-1])
+        indptr = np.searchsorted(image, np.arange(math.prod(dims) + 1)).astype(np.int32)
         ids = [torch.from_numpy(a) for a in (batch, camera, splat, indptr)]
-        depth = dense[0].ndim - 1
+        depth = len(dims) + 1
         packed = [
-            None if a is None else torch.from_numpy(a.reshape((-1,) + a.shape[depth:])[rows])
-            for a in dense
+            None if a is None else torch.from_numpy(a.reshape((-1,) + a.shape[depth:])[ctx.rows])
+            for a in arrays
         ]
-        ctx.set_materialize_grads(False)
-        ctx.options, ctx.sparse, ctx.rows, ctx.radii = options, sparse, rows, dense[0]
-        ctx.save_for_backward(means, quats, scales, covars, viewmats, Ks)
         ctx.mark_non_differentiable(*ids, packed[0])
         return (*ids, *packed)
 
     @staticmethod
     @first_derivatives
     def backward(ctx, _batch, _camera, _splat, _indptr, _radii, *packed):
-        tensors = ctx.saved_tensors
         shape = ctx.radii.shape[:-1]
         widths = ((2,), (), (3,), ())
         gradients = [_spread(v, ctx.rows, shape, w) for v, w in zip(packed, widths)]
-        out = _project_backward(tensors, ctx.options, ctx.radii, gradients, ctx.needs_input_grad[4])
+        out = _project_backward(ctx, *gradients)
         if ctx.sparse:
             out[:4] = _sparse(out[:4], ctx.rows, shape)
         return (*out, None, None, None, None)
@@ -219,14 +173,14 @@ class Harmonics(Function):
     def forward(ctx, dirs, coeffs, masks, degree):
         ctx.degree, ctx.masks = degree, masks
         ctx.save_for_backward(dirs, coeffs)
-        out = operators().spherical_harmonics(degree, array(dirs), array(coeffs), masks)
+        out = operators.spherical_harmonics(degree, array(dirs), array(coeffs), masks)
         return torch.from_numpy(out)
 
     @staticmethod
     @first_derivatives
     def backward(ctx, v_colors):
         dirs, coeffs = ctx.saved_tensors
-        v_coeffs, v_dirs = operators().spherical_harmonics_backward(
+        v_coeffs, v_dirs = operators.spherical_harmonics_backward(
             ctx.degree,
             array(dirs),
             array(coeffs),
@@ -237,70 +191,23 @@ class Harmonics(Function):
         return _tensor_or_none(v_dirs), torch.from_numpy(v_coeffs), None, None
 
 
-class Images:
-    """The images of a blend call: their size, their rows of splats and what orders them.
+class Images(NamedTuple):
+    """The images of a blend call, their ranges of splats, and what orders these.
 
-    `rows[i]` is the range of image i in the flattened tensors of splats. `absgrad` is the tensor
-    that each backward pass fills with absolute gradients, or None.
+    Image i draws the range `rows[i]` of the flattened tensors of splats, by depth or by the lists of
+    its tiles, `lists[i]`. Each backward pass fills `absgrad` with absolute gradients.
     """
 
-    def __init__(self, dims, width, height, tile_size, rows, absgrad=None, masks=None):
-        self.dims, self.width, self.height = tuple(dims), width, height
-        self.tile_size, self.rows, self.absgrad = tile_size, rows, absgrad
-        self.masks = None
-        if masks is not None:
-            self.masks = bytes_of(masks).reshape((-1,) + masks.shape[-2:])
-
-    def mask(self, i):
-        return None if self.masks is None else self.masks[i]
-
-
-class ByDepth(Images):
-    """Each image draws its splats in order of depth."""
-
-    def order(self, depths, radii):
-        self.depths, self.radii = array(depths).reshape(-1), array(radii).reshape(-1, 2)
-        return self
-
-    def blend(self, i, part, means2d, conics, opacities, features, background, keep):
-        return operators().blend(
-            means2d,
-            conics,
-            self.depths[part],
-            opacities,
-            features,
-            self.radii[part],
-            self.width,
-            self.height,
-            background,
-            self.mask(i),
-            self.tile_size,
-            keep,
-        )
-
-
-class ByLists(Images):
-    """Each tile draws the splats of its own list, in the order of the list."""
-
-    def order(self, offsets, ids):
-        self.offsets, self.ids = offsets, ids
-        return self
-
-    def blend(self, i, part, means2d, conics, opacities, features, background, keep):
-        return operators().blend_lists(
-            means2d,
-            conics,
-            opacities,
-            features,
-            self.width,
-            self.height,
-            background,
-            self.mask(i),
-            self.tile_size,
-            self.offsets[i],
-            self.ids[i],
-            keep,
-        )
+    dims: tuple
+    rows: list
+    width: int
+    height: int
+    tile_size: int
+    absgrad: Any = None
+    depths: Any = None
+    radii: Any = None
+    masks: Any = None
+    lists: list = []
 
 
 class Blend(Function):
@@ -308,83 +215,45 @@ class Blend(Function):
 
     @staticmethod
     def forward(ctx, means2d, conics, opacities, features, backgrounds, images, keep):
-        channels = features.shape[-1]
-        splats = [
-            array(means2d).reshape(-1, 2),
-            array(conics).reshape(-1, 3),
-            array(opacities).reshape(-1),
-            array(features).reshape(-1, channels),
-        ]
-        if backgrounds is not None:
-            backgrounds = array(backgrounds).reshape(-1, channels)
-        colors, alphas, ctx.handles = [], [], []
-        for i, (start, stop) in enumerate(images.rows):
-            part = slice(start, stop)
-            background = None if backgrounds is None else backgrounds[i]
-            own = [a[part] for a in splats]
-            color, alpha, handle = images.blend(i, part, *own, background, keep)
-            colors.append(color)
-            alphas.append(alpha)
-            ctx.handles.append(handle)
-        size = images.dims + (images.height, images.width)
-        ctx.images, ctx.channels, ctx.count = images, channels, len(splats[0])
-        ctx.shapes = [t.shape for t in (means2d, conics, opacities, features)]
+        splats = dict(means2d=means2d, conics=conics, opacities=opacities, features=features)
+        splats.update(depths=images.depths, radii=images.radii)
+        ctx.blending = operators.Blending(
+            operators.Footprints(**{name: array(v) for name, v in splats.items()}),
+            images.rows,
+            images.width,
+            images.height,
+            images.tile_size,
+            array(backgrounds),
+            None if images.masks is None else bytes_of(images.masks),
+            images.lists,
+        )
+        out = ctx.blending.blend(keep)
+        ctx.background_shape, ctx.absgrad = images.dims + features.shape[-1:], images.absgrad
         ctx.set_materialize_grads(False)
         # For first_derivatives alone: the device keeps the values that the backward pass reads.
         ctx.save_for_backward(means2d, conics, opacities, features)
-        return _stack(colors, size + (channels,)), _stack(alphas, size + (1,))
+        return tuple(torch.from_numpy(a.reshape(images.dims + a.shape[1:])) for a in out)
 
     @staticmethod
     @first_derivatives
     def backward(ctx, v_colors, v_alphas):
         ctx.saved_tensors  # torch raises here when the graph is already freed
-        images = ctx.images
-        size = (len(images.rows), images.height, images.width)
-        if v_colors is None:
-            v_colors = np.zeros(size + (ctx.channels,), np.float32)
-        else:
-            v_colors = array(v_colors).reshape(size + (ctx.channels,))
-        v_alphas = [None] * size[0] if v_alphas is None else array(v_alphas).reshape(size)
-        parts = [
-            operators().blend_backward(handle, v_colors[i], v_alphas[i], images.absgrad is not None)
-            for i, handle in enumerate(ctx.handles)
-        ]
-        results = zip(*parts) if parts else [()] * 6  # there may be no camera
-        v_means2d, v_conics, v_opacities, v_features, v_backgrounds, absolute = results
-        joined = [
-            torch.from_numpy(_gather(v, images.rows, ctx.count)).reshape(s) if v else torch.zeros(s)
-            for v, s in zip((v_means2d, v_conics, v_opacities, v_features), ctx.shapes)
-        ]
-        if images.absgrad is not None and parts:
-            absolute = torch.from_numpy(_gather(absolute, images.rows, ctx.count))
-            images.absgrad.copy_(absolute.reshape(ctx.shapes[0]))
+        v, backgrounds, absolute = ctx.blending.gradients(
+            array(v_colors), array(v_alphas), ctx.absgrad is not None
+        )
+        if ctx.absgrad is not None:
+            ctx.absgrad.copy_(torch.from_numpy(absolute))
         v_background = None
         if ctx.needs_input_grad[4]:
-            v_background = _stack(v_backgrounds, images.dims + (ctx.channels,))
-        return (*joined, v_background, None, None)
+            v_background = torch.from_numpy(backgrounds.reshape(ctx.background_shape))
+        splats = (torch.from_numpy(a) for a in (v.means2d, v.conics, v.opacities, v.features))
+        return (*splats, v_background, None, None)
 
 
 def attach_absgrad(means2d):
     """Gives means2d its attribute `absgrad`: zeros, which each backward pass fills (gsplat 1.6)."""
     means2d.absgrad = torch.zeros_like(means2d, requires_grad=False)
     return means2d.absgrad
-
-
-def _stack(arrays, shape):
-    if not arrays:
-        return torch.zeros(shape)
-    joined = arrays[0] if len(arrays) == 1 else np.stack(arrays)
-    return torch.from_numpy(joined.reshape(shape))
-
-
-def _gather(parts, rows, count):
-    """The rows of each image added up in one array of `count` rows."""
-    if len(parts) == 1 and len(parts[0]) == count:
-        return parts[0]
-    out = np.zeros((count,) + parts[0].shape[1:], np.float32)
-    for (start, stop), part in zip(rows, parts):
-        out[start:stop] += part
-    return out
 
 
 def needs_gradient(*tensors):

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from .._native import operators
 from ._arguments import array, check, integer, mismatch, shape, tensor
-from ._autograd import Blend, ByLists, attach_absgrad, needs_gradient
+from ._autograd import Blend, Images, attach_absgrad, needs_gradient
 
 
 def rasterize_to_pixels(
@@ -59,11 +59,11 @@ def rasterize_to_pixels(
     check(tile_size % part == 0, f"tile_size is {tile_size}; expected a multiple of {part}")
     check(rows * tile_size >= image_height, f"{rows} rows of tiles do not cover {image_height} px")
     check(columns * tile_size >= image_width, f"{columns} tiles do not cover {image_width} px")
-    ranges, offsets, ids = _lists(isect_offsets, flatten_ids, lead[-1], packed)
+    rows, lists = _lists(isect_offsets, flatten_ids, lead[-1], packed)
     holder = attach_absgrad(given) if absgrad else None
-    images = ByLists(dims, image_width, image_height, tile_size, ranges, holder, masks)
+    size = (image_width, image_height, tile_size)
+    images = Images(dims, rows, *size, absgrad=holder, masks=masks, lists=lists)
     keep = needs_gradient(means2d, conics, colors, opacities, backgrounds)
-    images.order(offsets, ids)
     return Blend.apply(means2d, conics, opacities, colors, backgrounds, images, keep)
 
 
@@ -80,13 +80,13 @@ def _range(name, values, low, high):
 
 
 def _lists(isect_offsets, flatten_ids, count, packed):
-    """For each image: its range of splats, and its lists counted from the start of that range."""
+    """For each image: its range of splats, and offsets and lists from the start of that range."""
     images = math.prod(isect_offsets.shape[:-2])
     ids = array(flatten_ids)
     _range("isect_offsets", array(isect_offsets), 0, len(ids) + 1)
     starts = array(isect_offsets).astype(np.int32, copy=False).reshape(images, -1)
     ends = np.append(starts[1:, 0], len(ids)).astype(np.int32)
-    ranges, offsets, lists = [], [], []
+    ranges, lists = [], []
     for i in range(images):
         first = starts[i, 0]
         own = ids[first : ends[i]]
@@ -95,6 +95,6 @@ def _lists(isect_offsets, flatten_ids, count, packed):
         if packed:
             low, high = used
         ranges.append((low, high))
-        offsets.append(np.append(starts[i] - first, len(own)).astype(np.int32))
-        lists.append(np.ascontiguousarray(own - low, np.int32))
-    return ranges, offsets, lists
+        offsets = np.append(starts[i] - first, len(own)).astype(np.int32)
+        lists.append((offsets, np.ascontiguousarray(own - low, np.int32)))
+    return ranges, lists

@@ -9,7 +9,7 @@ from torch import Tensor
 from . import _dialect
 from .._native import operators
 from ._arguments import check, full_precision, integer, mismatch, shape, tensor, unavailable
-from ._autograd import Project, ProjectOptions, ProjectPacked
+from ._autograd import Project, ProjectPacked, project_options
 from ._geometry import footprint, full_matrix, project_rows, quat_scale_to_covar_preci, radii_of
 
 
@@ -41,9 +41,8 @@ def fully_fused_projection(
     tensors = _checked(means, covars, quats, scales, viewmats, Ks, opacities)
     check(packed or not sparse_grad, "sparse_grad needs packed=True")
     width, height = integer("width", width), integer("height", height)
-    options = ProjectOptions(
-        width, height, eps2d, near_plane, far_plane, radius_clip, calc_compensations
-    )
+    floats = (eps2d, near_plane, far_plane, radius_clip)
+    options = project_options(width, height, *floats, compensations=calc_compensations)
     out = project(tensors, options, packed, sparse_grad, camera_model)
     if _dialect.dialect() == "1.6":
         return out

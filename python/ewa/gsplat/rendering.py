@@ -11,7 +11,7 @@ from torch import Tensor
 from . import _dialect
 from .._native import operators
 from ._arguments import check, integer, mismatch, refusal, shape, tensor, unavailable
-from ._autograd import Blend, ByDepth, ProjectOptions, attach_absgrad, needs_gradient
+from ._autograd import Blend, Images, attach_absgrad, needs_gradient, project_options
 from ._geometry import camera_offsets, upper_triangle
 from ._harmonics import evaluate
 from ._projection import cameras_of, project
@@ -168,15 +168,9 @@ def rasterization(
     if extra_signals_sh_degree is not None:
         extra_signals_sh_degree = integer("extra_signals_sh_degree", extra_signals_sh_degree, 0, most)
     scene = _Scene(means, quats, scales, covars, opacities, viewmats, Ks)
-    options = ProjectOptions(
-        width,
-        height,
-        eps2d,
-        near_plane,
-        far_plane,
-        radius_clip,
-        rasterize_mode == "antialiased",
-    )
+    floats = (eps2d, near_plane, far_plane, radius_clip)
+    antialiased = rasterize_mode == "antialiased"
+    options = project_options(width, height, *floats, compensations=antialiased)
     prints = project(scene.tensors, options, packed, sparse_grad, camera_model)
     ids, (radii, means2d, depths, conics, factors) = (
         (prints[:4], prints[4:]) if packed else ((None,) * 4, prints)
@@ -195,11 +189,10 @@ def rasterization(
         backgrounds,
     )
     holder = attach_absgrad(means2d) if absgrad else None
-    images = ByDepth(scene.dims, width, height, tile_size, scene.rows(ids), holder)
+    rows = scene.rows(ids)
+    images = Images(scene.dims, rows, width, height, tile_size, holder, depths, radii)
     keep = needs_gradient(means2d, conics, opacities, features, backgrounds)
-    image, alpha = Blend.apply(
-        means2d, conics, opacities, features, backgrounds, images.order(depths, radii), keep
-    )
+    image, alpha = Blend.apply(means2d, conics, opacities, features, backgrounds, images, keep)
     meta = _Meta(
         batch_ids=ids[0],
         camera_ids=ids[1],
