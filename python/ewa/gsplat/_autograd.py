@@ -59,9 +59,10 @@ class ProjectOptions(NamedTuple):
     compensations: bool
 
 
-def project_options(width, height, eps2d, *floats, compensations):
+def project_options(width, height, eps2d, near, far, radius_clip, compensations):
     check(eps2d >= 0, f"eps2d is {eps2d}; expected 0 or more")
-    return ProjectOptions(width, height, float(eps2d), *map(float, floats), bool(compensations))
+    floats = map(float, (eps2d, near, far, radius_clip))
+    return ProjectOptions(width, height, *floats, bool(compensations))
 
 
 _FOOTPRINT = ("radii", "means2d", "depths", "conics", "compensations")
@@ -194,8 +195,8 @@ class Harmonics(Function):
 class Images(NamedTuple):
     """The images of a blend call, their ranges of splats, and what orders these.
 
-    Image i draws the range `rows[i]` of the flattened tensors of splats, by depth or by the lists of
-    its tiles, `lists[i]`. Each backward pass fills `absgrad` with absolute gradients.
+    Image i draws the range `rows[i]` of the flattened tensors of splats: by depth, or by the lists
+    of its tiles, `lists[i]`. Each backward pass fills `absgrad` with absolute gradients.
     """
 
     dims: tuple

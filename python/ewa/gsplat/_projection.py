@@ -41,8 +41,9 @@ def fully_fused_projection(
     tensors = _checked(means, covars, quats, scales, viewmats, Ks, opacities)
     check(packed or not sparse_grad, "sparse_grad needs packed=True")
     width, height = integer("width", width), integer("height", height)
-    floats = (eps2d, near_plane, far_plane, radius_clip)
-    options = project_options(width, height, *floats, compensations=calc_compensations)
+    options = project_options(
+        width, height, eps2d, near_plane, far_plane, radius_clip, calc_compensations
+    )
     out = project(tensors, options, packed, sparse_grad, camera_model)
     if _dialect.dialect() == "1.6":
         return out

@@ -22,7 +22,6 @@ _DEPTH_MODES = {"D", "ED", "RGB+D", "RGB+ED"}
 _HIT_MODES = {"d", "Ed", "RGB-d", "RGB-Ed"}
 _EXPECTED_MODES = {"ED", "RGB+ED", "Ed", "RGB-Ed"}
 
-
 RenderMode = Literal["RGB", "D", "ED", "RGB+D", "RGB+ED", "d", "Ed", "RGB-d", "RGB-Ed"]
 
 
@@ -161,16 +160,17 @@ def rasterization(
     )
     check(packed or not sparse_grad, "sparse_grad needs packed=True")
     width, height = integer("width", width), integer("height", height)
-    tile_size = operators.TILE_SIZE if tile_size is None else integer("tile_size", tile_size)
-    most = operators.MAX_SH_DEGREE
+    tile_size = integer("tile_size", operators.TILE_SIZE if tile_size is None else tile_size)
     if sh_degree is not None:
-        sh_degree = integer("sh_degree", sh_degree, 0, most)
+        sh_degree = integer("sh_degree", sh_degree, 0, operators.MAX_SH_DEGREE)
     if extra_signals_sh_degree is not None:
-        extra_signals_sh_degree = integer("extra_signals_sh_degree", extra_signals_sh_degree, 0, most)
+        extra_signals_sh_degree = integer(
+            "extra_signals_sh_degree", extra_signals_sh_degree, 0, operators.MAX_SH_DEGREE
+        )
     scene = _Scene(means, quats, scales, covars, opacities, viewmats, Ks)
-    floats = (eps2d, near_plane, far_plane, radius_clip)
-    antialiased = rasterize_mode == "antialiased"
-    options = project_options(width, height, *floats, compensations=antialiased)
+    options = project_options(
+        width, height, eps2d, near_plane, far_plane, radius_clip, rasterize_mode == "antialiased"
+    )
     prints = project(scene.tensors, options, packed, sparse_grad, camera_model)
     ids, (radii, means2d, depths, conics, factors) = (
         (prints[:4], prints[4:]) if packed else ((None,) * 4, prints)
@@ -322,10 +322,7 @@ class _Scene:
         if per_view:
             return values
         values = values.unsqueeze(depth)
-        return values if self.cameras == 1 else values.expand(self._per_camera(values, depth))
-
-    def _per_camera(self, values, depth):
-        return values.shape[:depth] + (self.cameras,) + values.shape[depth + 1 :]
+        return values.expand(values.shape[:depth] + (self.cameras,) + values.shape[depth + 1 :])
 
     def directions(self, ids):
         """From each camera to each footprint's splat."""
@@ -341,12 +338,9 @@ def _features(scene, ids, radii, depths, color, extra, with_depth, backgrounds):
     parts = []
     if color is not None:
         values = _channels(scene, ids, radii, "colors", *color)
-        if color[1] is not None:
-            values = torch.clamp_min(values + operators.COLOR_OFFSET, 0.0)
-        parts.append(values)
+        parts.append(values if color[1] is None else torch.clamp_min(values, 0.0))
     if extra is not None:
-        values = _channels(scene, ids, radii, "extra_signals", *extra)
-        parts.append(values if extra[1] is None else values + operators.COLOR_OFFSET)
+        parts.append(_channels(scene, ids, radii, "extra_signals", *extra))
     counts = [p.shape[-1] for p in parts]
     if with_depth:
         parts.append(depths.unsqueeze(-1))
@@ -371,7 +365,7 @@ def _background(scene, backgrounds, colors, signals, channels):
 
 
 def _channels(scene, ids, radii, name, values, degree):
-    """Colours or signals of footprints, by harmonics where a degree is given."""
+    """Colours or signals of footprints, where a degree is given by harmonics and their offset."""
     values = tensor(name, values)
     batch, splats, cameras = scene.batch, scene.splats, scene.cameras
     own, per_view = batch + (splats,), batch + (cameras, splats)
@@ -389,16 +383,25 @@ def _channels(scene, ids, radii, name, values, degree):
         (degree + 1) ** 2 <= bands[0],
         f"{name} has shape {tuple(values.shape)}; degree {degree} needs {(degree + 1) ** 2} bands",
     )
-    dirs = scene.directions(ids)
-    masks = radii[..., 0] > 0 if ids[0] is None else None
-    if values.shape[:-2] == (splats,):
-        if ids[0] is not None:
-            return evaluate(degree, dirs, values.index_select(0, ids[2]), None)
-        return evaluate(degree, dirs, values, masks)
-    viewed = values.shape[:-2] == per_view
-    if not viewed:
+    shared, viewed = values.shape[:-2] == (splats,), values.shape[:-2] == per_view
+    if not shared and not viewed:
         shape(name, values, own + bands)
-    return evaluate(degree, dirs, scene.spread(values, ids, viewed), masks)
+    one = ids[0] is not None and scene.batches * cameras == 1
+    if one:
+        # The coefficients stay where they are: a copy of some takes longer than the colours of all.
+        values = values.reshape((splats,) + bands)
+        masks = torch.zeros(splats, dtype=torch.bool).index_fill_(0, ids[2], True)
+        # Selected, so that its gradient adds up row by row, as that of several images does.
+        offset = camera_offsets(scene.viewmats).reshape(1, 3)
+        dirs = scene.means.reshape(splats, 3) + offset.index_select(0, ids[2].new_zeros(splats))
+    else:
+        dirs, masks = scene.directions(ids), radii[..., 0] > 0 if ids[0] is None else None
+        if not shared:
+            values = scene.spread(values, ids, viewed)
+        elif ids[0] is not None:
+            values = values.index_select(0, ids[2])
+    colors = evaluate(degree, dirs, values, masks) + operators.COLOR_OFFSET
+    return colors.index_select(0, ids[2]) if one else colors
 
 
 def _outputs(image, alpha, channels, mode, meta):
