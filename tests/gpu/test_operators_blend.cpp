@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <thread>
 
 #include "ewa/error.h"
 #include "ewa/operators.h"
+#include "gpu/memory.h"
 #include "gpu/test_device.h"
 #include "support/gradient_check.h"
 #include "support/screen_splats.h"
@@ -576,6 +578,27 @@ TEST(OperatorBlend, WhitenersKeepTheDigitsThatConicsLose) {
     printf("    alpha: %.1e by conics, %.1e by whiteners\n", by_conics, by_whiteners);
     EXPECT_LT(by_whiteners, 1e-5);
     EXPECT_GT(by_conics, 20 * by_whiteners);
+}
+
+/// Where the host can read the planes of an image, it does so in place.
+TEST(OperatorBlend, MemoryOfAGpuChangesNoByte) {
+    const ScreenScene s = screen_scene(55, 200, SplatKind::mixed, 5, false, 61, 47);
+    const Arrays arrays(s);
+    const BlendedImage expected = arrays.blend();
+    const ScreenGradient gradient = arrays.backward(expected, true);
+    for (const auto access : {gpu::HostAccess::none, gpu::HostAccess::write}) {
+        const std::shared_ptr<gpu::Device> other = open_test_device(true);
+        other->limit_host_access(access);
+        Operators own(other);
+        const BlendedImage image = own.blend(arrays.splats(), arrays.order(), arrays.options());
+        EXPECT_EQ(image.features, expected.features);
+        EXPECT_EQ(image.alphas, expected.alphas);
+        const ScreenGradient again =
+            own.blend_backward(*image.record, arrays.features_gradient, arrays.alphas_gradient, true);
+        EXPECT_EQ(again.means2d, gradient.means2d);
+        EXPECT_EQ(again.features, gradient.features);
+        EXPECT_EQ(again.absolute, gradient.absolute);
+    }
 }
 
 TEST(OperatorBlend, FourThreadsGetTheBytesOfOne) {
