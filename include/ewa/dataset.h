@@ -13,28 +13,6 @@
 
 namespace ewa {
 
-/// Lens models. src/scene/lens.h has the formulas.
-enum class Lens {
-    brown,       // radial (a quotient of polynomials) and tangential: OpenCV's perspective model
-    fisheye,     // radial in the angle, tangential, thin prism: OpenCV's fisheye, COLMAP's THIN_PRISM_FISHEYE
-    fisheye624,  // six radial terms, then tangential and thin prism: COLMAP's RAD_TAN_THIN_PRISM_FISHEYE
-    fov,         // Devernay and Faugeras 2001; k1 is omega (radians)
-    division,    // Fitzgibbon 2001; k1
-    unified      // enhanced unified camera model, Khomutenko et al. 2016; k1 is alpha, k2 is beta
-};
-
-/// The distortion of a lens relative to a pinhole. Names and signs are OpenCV's (calib3d, "Detailed
-/// Description"). Parameters that a lens does not have are zero.
-struct Distortion {
-    double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0, k4 = 0, k5 = 0, k6 = 0;
-    /// Thin prism: s1 and s3 of the squared radius, s2 and s4 of its square.
-    double s1 = 0, s2 = 0, s3 = 0, s4 = 0;
-    Lens lens = Lens::brown;
-    bool operator==(const Distortion&) const = default;
-    /// Whether the lens is a pinhole.
-    bool none() const { return *this == Distortion{}; }
-};
-
 /// The use of masks. A mask is white where the image counts. There are three sources of masks:
 /// - A file in masks/ (beside images/) with the image's name. Its extension may be replaced by .png or followed
 ///   by .png.

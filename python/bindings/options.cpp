@@ -9,7 +9,7 @@
 #include "core/words.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
-#include "run/run_options.h"
+#include "run/option_table.h"
 #include "scene/looks.h"
 
 namespace ewa::python {

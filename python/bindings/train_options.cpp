@@ -14,7 +14,7 @@
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "options.h"
-#include "run/run_options.h"
+#include "run/option_table.h"
 
 namespace ewa::python {
 namespace {

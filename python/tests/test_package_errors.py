@@ -168,7 +168,7 @@ COMMAND_LINE = {
 
 
 def test_every_option_in_an_error_of_libewa_is_an_argument():
-    """Rows of src/run/run_options.cpp name the arguments that Python spells otherwise."""
+    """Rows of src/run/option_table.cpp name the arguments that Python spells otherwise."""
     known = set(inspect.signature(spelled).parameters)
     for function in (
         ewa.render,

@@ -17,7 +17,7 @@
 #include "ewa/render_options.h"
 #include "ewa/synthetic_dataset.h"
 #include "io/datasets/refined_cameras.h"
-#include "run/run_options.h"
+#include "run/option_table.h"
 
 namespace ewa::cli {
 

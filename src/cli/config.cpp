@@ -14,7 +14,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "report/summary.h"
-#include "run/run_options.h"
+#include "run/option_table.h"
 
 namespace ewa::cli {
 namespace {

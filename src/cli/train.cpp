@@ -26,8 +26,8 @@
 #include "ranks/open.h"
 #include "report/chart.h"
 #include "run/earlier_run.h"
+#include "run/option_table.h"
 #include "run/run_input.h"
-#include "run/run_options.h"
 #include "run/share_machine.h"
 
 namespace ewa::cli {

@@ -54,7 +54,7 @@ class TrainObserver : public RunObserver {
     std::unique_ptr<Served> served_;  // null without --serve
     std::unique_ptr<Progress> progress_;
     std::optional<train::Forecast> forecast_;
-    int first_step_ = 0;      // of this process; 0 before it
+    int first_step_ = 0;         // of this process; 0 before it
     bool printed_time_ = false;  // how long the run takes
     // Training PSNR of the steps since the progress was last shown; steps differ much, since each has another view.
     double psnr_sum_ = 0;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/typing.h"
-#include "run/run_options.h"
+#include "run/option_table.h"
 
 namespace ewa::cli {
 namespace {

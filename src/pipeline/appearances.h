@@ -7,9 +7,12 @@
 #include <vector>
 
 #include "ewa/appearance.h"
-#include "pipeline/forward.h"
+#include "gpu/buffer.h"
+#include "passes/pass.h"
 
 namespace ewa::pipeline {
+
+struct FrameBuffers;
 
 /// The values of all training images and their cameras, with Adam's moments: shared/layouts.h.
 struct Appearances {

@@ -10,7 +10,11 @@
 // are not used. The backward pass has dalpha/dmean2d.x = 2 (x - mean2d.x) / radius.x^2, dalpha/d(ln radius.x) = 2 u^2 with
 // u = (x - mean2d.x) / radius.x, and dln radius.x/dln s = (fx s / z)^2 / ((fx s / z)^2 + LOW_PASS) = -dln radius.x/dln z.
 #pragma once
-#include "reference/render.h"
+#include "ewa/camera.h"
+#include "ewa/image.h"
+#include "ewa/render_options.h"
+#include "reference/rendered.h"
+#include "reference/values.h"
 
 namespace ewa::reference {
 

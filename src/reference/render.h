@@ -1,45 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // The whole chain of an image: project, sort, list, blend, then the loss and the backward pass.
 #pragma once
-#include <cstdint>
-#include <vector>
-
 #include "ewa/camera.h"
 #include "ewa/image.h"
 #include "ewa/render_options.h"
-#include "reference/blend.h"
-#include "reference/loss.h"
+#include "reference/rendered.h"
 #include "reference/values.h"
 
 namespace ewa::reference {
 
-/// Options of the CPU reference. The tile size changes only the lists and the speed, not the model.
-struct ReferenceOptions {
-    int tile_width = 16, tile_height = 16;  // px
-    Smoothing smoothing;
-};
-
-struct Rendered {
-    std::vector<Projected> projected;  // per splat
-    std::vector<uint32_t> order;       // visible splats, nearest first
-    Instances instances;
-    Blended blended;
-    uint32_t skipped_nonfinite = 0;
-};
-
 /// With an integrator along rays, there is no order and there are no instances.
 Rendered render(const Values& values, const Camera& camera, const RenderOptions& options,
                 const ReferenceOptions& reference = {});
-
-struct ReferenceGradient {
-    double loss = 0, l1 = 0, ssim = 0;
-    Values gradient;               // dL/d(stored value) for each stored value
-    CameraMotion camera;           // dL/d(each value of the camera's motion), for no motion
-    std::vector<uint8_t> in_view;  // per splat: it had a tile
-    Raster image_gradient;         // dL/d(colour)
-    BlendGradients blend;          // gradients of each splat, and moments of each instance
-    Rendered rendered;
-};
 
 /// `target` is RGB of the camera's size. Further channels are ignored.
 ReferenceGradient loss_gradient(const Values& values, const Camera& camera, const Image& target,

@@ -3,7 +3,7 @@
 #pragma once
 #include <vector>
 
-#include "run/run_options.h"
+#include "run/run_option.h"
 
 namespace ewa::train {
 

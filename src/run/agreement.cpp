@@ -8,8 +8,8 @@
 #include "gpu/device.h"
 #include "passes/kernel_config.h"
 #include "portions/collect.h"
+#include "run/option_table.h"
 #include "run/resume.h"
-#include "run/run_options.h"
 
 namespace ewa::train {
 namespace {

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "ewa/run.h"
+#include "ewa/run_observer.h"
 #include "report/html.h"
 #include "run/evaluation.h"
 #include "run/run_cameras.h"

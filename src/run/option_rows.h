@@ -9,7 +9,7 @@
 #include "core/typing.h"
 #include "core/words.h"
 #include "ewa/error.h"
-#include "run/run_options.h"
+#include "run/run_option.h"
 
 namespace ewa::train {
 

@@ -7,7 +7,7 @@
 #include "core/hash.h"
 #include "core/json.h"
 #include "ewa/error.h"
-#include "run/run_options.h"
+#include "run/option_table.h"
 #include "train/schedule.h"
 
 namespace ewa::train {

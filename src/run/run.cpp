@@ -28,11 +28,11 @@
 #include "run/evaluation.h"
 #include "run/final_evaluation.h"
 #include "run/inria_files.h"
+#include "run/option_table.h"
 #include "run/resume.h"
 #include "run/run_cameras.h"
 #include "run/run_files.h"
 #include "run/run_input.h"
-#include "run/run_options.h"
 #include "run/run_saves.h"
 #include "run/run_times.h"
 #include "scene/dataset_files.h"
@@ -43,21 +43,16 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// What training a scene without view-dependent colour skips, besides what its plan says.
-PlanLine skipped_sh_degrees(uint32_t splats, int moment_bits) {
-    // Parameters and both of Adam's moments.
-    const uint64_t bytes =
-        (1 + 2 * uint64_t(moment_bits) / 32) *
-        (pipeline::parameter_bytes(splats, kMaxShDegree) - pipeline::parameter_bytes(splats, 0));
-    return {fmt::format("SH degrees 1 to {}", kMaxShDegree),
-            "the dataset says that no colour depends on the view", bytes};
-}
-
 /// What the trainer skips, and what the choice of the SH degree saved before.
 std::vector<PlanLine> plan_of(const Trainer& trainer, const train::RunInput& input) {
     std::vector<PlanLine> plan = trainer.plan();
-    if (input.without_view_dependence())
-        plan.push_back(skipped_sh_degrees(trainer.splats(), input.options.train.moment_bits));
+    if (!input.without_view_dependence()) return plan;
+    const auto bytes = [&](int degree) { return pipeline::parameter_bytes(trainer.splats(), degree); };
+    // Of the parameters and both of Adam's moments.
+    const uint64_t copies = 1 + 2 * uint64_t(input.options.train.moment_bits) / 32;
+    plan.push_back({fmt::format("SH degrees 1 to {}", kMaxShDegree),
+                    "the dataset says that no colour depends on the view",
+                    copies * (bytes(kMaxShDegree) - bytes(0))});
     return plan;
 }
 
@@ -165,6 +160,7 @@ void Run::read_checkpoint(Strategy asked) {
 /// Called as late as possible, since it ends an earlier run that is replaced.
 void Run::begin_files() {
     folder_.begin(train::to_config(options()), earlier_.has_value());
+    if (!earlier_) train::remove_inria_splats(folder_.path());
     files_.emplace(MetricsFiles{report::MetricsLog(folder_.metrics(), progress_.metrics), {}});
     if (options().tensorboard)
         files_->events.emplace(

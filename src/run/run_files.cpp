@@ -18,7 +18,6 @@
 #include "report/run_file_names.h"
 #include "report/summary.h"
 #include "report/tensorboard.h"
-#include "run/inria_files.h"
 #include "scene/lens.h"
 
 namespace ewa::train {
@@ -68,7 +67,6 @@ void RunFolder::begin(const nlohmann::ordered_json& config, bool continues) cons
         fs::remove(path_ / result, absent);
     for (const char* result : report::kCameraModelFiles) fs::remove(path_ / result, absent);
     for (const auto& [step, file] : kept_splats(path_)) fs::remove(file, absent);
-    remove_inria_splats(path_);
 }
 
 void RunFolder::remove_links() const {

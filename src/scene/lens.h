@@ -15,7 +15,6 @@
 #include <optional>
 
 #include "ewa/camera.h"
-#include "ewa/dataset.h"
 #include "ewa/image.h"
 
 namespace ewa::scene {

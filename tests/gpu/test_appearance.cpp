@@ -12,6 +12,7 @@
 #include "gpu/guarded.h"
 #include "gpu/reference_inputs.h"
 #include "pipeline/appearances.h"
+#include "pipeline/forward.h"
 #include "pipeline/frame_inputs.h"
 #include "reference/appearance.h"
 #include "reference/loss.h"

@@ -13,7 +13,7 @@
 #include "core/json.h"
 #include "ewa/error.h"
 #include "run/advanced_options.h"
-#include "run/run_options.h"
+#include "run/option_table.h"
 #include "train/synthetic.h"
 
 namespace ewa::test {

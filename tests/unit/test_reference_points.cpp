@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "reference/points.h"
+#include "reference/render.h"
 #include "shared/constants.h"
 #include "support/gradient_check.h"
 #include "support/random_scene.h"

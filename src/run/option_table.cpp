@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "run/run_options.h"
+#include "run/option_table.h"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -12,6 +12,7 @@
 #include "core/typing.h"
 #include "core/words.h"
 #include "ewa/error.h"
+#include "ewa/metrics.h"
 #include "run/advanced_options.h"
 #include "run/option_rows.h"
 #include "scene/looks.h"

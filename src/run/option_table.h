@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// The options of a training run under their names: the one table behind the command line, config.json and the
+// settings in a checkpoint.
+#pragma once
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "run/run_option.h"
+
+namespace ewa::train {
+
+/// In the order of config.json.
+const std::vector<RunOption>& run_options();
+/// The option with this name, which must exist.
+const RunOption& run_option(std::string_view name);
+
+/// The value as the command line takes it.
+std::string value_text(const RunOption& option, const RunOptions& options);
+
+/// Whether files list the option: an advanced one only if its value is not the usual one.
+bool is_listed(const RunOption& option, const RunOptions& options);
+/// The options that are listed, under their names: what config.json holds.
+nlohmann::ordered_json to_config(const RunOptions& options);
+
+/// "none", "adc", "mcmc" or "auto".
+std::string name_of(Strategy strategy);
+
+}  // namespace ewa::train
