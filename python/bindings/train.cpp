@@ -385,6 +385,7 @@ void bind_train(nb::module_& module) {
     bind_results(module);
     bind_trainer(module);
     module.attr("_argument_names") = argument_names();
+    module.attr("_value_words") = value_words();
     module.def(
         "evaluate", evaluate_splats, "splats"_a, "dataset"_a, "frames"_a = nb::none(), nb::kw_only(),
         "background"_a = nb::make_tuple(0, 0, 0), "antialias"_a = nb::none(), "kernel"_a = nb::none(),

@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <vector>
 
 #include "bindings.h"
@@ -185,6 +186,18 @@ nb::dict argument_names() {
     for (const RunOption& row : train::run_options())
         if (!row.python.empty()) names[row.name.c_str()] = row.python;
     return names;
+}
+
+nb::set value_words() {
+    nb::set words;
+    for (const RunOption& row : train::run_options()) {
+        for (const std::string& choice : row.choices) words.add(nb::str(choice.c_str()));
+        std::istringstream parts(row.value);
+        for (std::string word; std::getline(parts, word, '|');)
+            if (word.find_first_not_of("abcdefghijklmnopqrstuvwxyz") == std::string::npos)
+                words.add(nb::str(word.c_str()));
+    }
+    return words;
 }
 
 std::string option_parameters() {

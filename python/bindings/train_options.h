@@ -19,6 +19,9 @@ std::string option_parameters();
 /// The arguments whose names are not those of the command line, under the names there.
 nanobind::dict argument_names();
 
+/// The words that are values of options of the command line.
+nanobind::set value_words();
+
 /// All options under their names.
 nanobind::dict options_dict(const RunOptions& options);
 

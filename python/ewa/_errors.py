@@ -30,8 +30,7 @@ _ADVICE = (
     ("a larger --test-every leaves more of them", "name some as train_frames="),
     ("with --transform move=", "by their means and origin"),
 )
-_VALUES = "adc|mcmc|none|auto|on|off|random|sfm|splat|ray|march|peak|antialias|density"
-_OPTION = re.compile(rf"--([a-z][a-z-]*[a-z])(?: (?:(\d[\d.]*(?<!\.))|({_VALUES}))(?![\w-]))?")
+_OPTION = re.compile(r"--([a-z][a-z-]*[a-z])(?: (?:(\d[\d.]*(?<!\.))|([a-z]+))(?![\w-]))?")
 
 
 def spelled(text: str) -> str:
@@ -39,14 +38,16 @@ def spelled(text: str) -> str:
 
     `--bands 2` becomes `bands=2`, and `--max-splats` becomes `max_splats=`.
     """
-    names = vars(sys.modules["ewa._native"])["_argument_names"]  # that module imports this one
+    native = vars(sys.modules["ewa._native"])  # that module imports this one
+    names, values = native["_argument_names"], native["_value_words"]
     for words, advice in _ADVICE:
         text = text.replace(words, advice)
 
     def argument(found: re.Match[str]) -> str:
         option, number, word = found.groups()
         name = names.get(option, option.replace("-", "_"))
-        return f"{name}=" + (number or (f'"{word}"' if word else ""))
+        value = number or (f'"{word}"' if word in values else "")
+        return f"{name}={value}" + (f" {word}" if word and not value else "")
 
     return _OPTION.sub(argument, text)
 
