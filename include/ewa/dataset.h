@@ -92,7 +92,7 @@ Image load_frame_image(const Frame& frame);
 
 /// The frame's image in the form that a render is compared with.
 struct TrainingImage {
-    Image picture;  // RGB, composited over the background if masks cut
+    Image image;    // RGB, composited over the background if masks cut
     Image weights;  // one channel, the weight of each pixel; empty if all count
 };
 TrainingImage load_training_image(const Frame& frame, const std::array<float, 3>& background);

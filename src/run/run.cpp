@@ -48,7 +48,7 @@ std::vector<PlanLine> plan_of(const Trainer& trainer, const train::RunInput& inp
     std::vector<PlanLine> plan = trainer.plan();
     if (!input.without_view_dependence()) return plan;
     const auto bytes = [&](int degree) { return pipeline::parameter_bytes(trainer.splats(), degree); };
-    // Of the parameters and both of Adam's moments.
+    // The parameters and both of Adam's moments.
     const uint64_t copies = 1 + 2 * uint64_t(input.options.train.moment_bits) / 32;
     plan.push_back({fmt::format("SH degrees 1 to {}", kMaxShDegree),
                     "the dataset says that no colour depends on the view",

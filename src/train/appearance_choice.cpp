@@ -22,7 +22,7 @@ constexpr double kStopsToLearn = 0.12, kColorToLearn = 0.06;
 
 /// Medians over the points of log2(image / point) for red, green and blue. NaN if the image shows too few of them.
 std::array<double, 3> ratios_of(const Dataset& dataset, const Frame& frame) {
-    const Image image = load_training_image(frame, {}).picture;
+    const Image image = load_training_image(frame, {}).image;
     const PointCloud& points = dataset.points;
     const size_t stride = std::max<size_t>(1, points.positions.size() / kMostPoints);
     std::array<std::vector<double>, 3> ratios;

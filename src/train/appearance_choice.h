@@ -11,9 +11,9 @@ namespace ewa::train {
 
 /// How far images disagree on the colours of the points that they show.
 struct Disagreement {
-    int images = 0;         // that were compared; 0: there are no points
-    double exposure = 0;    // root mean square over the images, stops
-    double color = 0;       // the same of red and blue against green
+    int images = 0;       // that were compared; 0: there are no points
+    double exposure = 0;  // root mean square over the images, stops
+    double color = 0;     // the same of red and blue against green
 };
 
 /// Compares each image with the colours of the dataset's points. An image's value is the median over the points in its

@@ -182,8 +182,8 @@ TEST(Masks, AreFoundByThePicturesName) {
         const Frame cut = with_masks(capture, MaskUse::cut).frames[0];
         const auto over = load_training_image(cut, {0.25f, 0.5f, 1});
         EXPECT_TRUE(over.weights.pixels.empty());
-        EXPECT_EQ(over.picture.at(0, 0)[1], 0.5f);
-        EXPECT_EQ(over.picture.at(5, 3)[1], ramp(8, 6).at(5, 3)[1]);
+        EXPECT_EQ(over.image.at(0, 0)[1], 0.5f);
+        EXPECT_EQ(over.image.at(5, 3)[1], ramp(8, 6).at(5, 3)[1]);
 
         const Frame none = with_masks(capture, MaskUse::none).frames[0];
         EXPECT_EQ(load_frame_image(none).channels, 3);
@@ -196,11 +196,11 @@ TEST(Masks, MayBeAlphaAndOfAnotherSize) {
     for (int y = 0; y < 6; ++y)
         for (int x = 0; x < 8; ++x) picture.at(x, y)[3] = y < 3 ? 1.0f : 0.0f;
     save_image(capture.folder / "images/a.png", picture);
-    EXPECT_EQ(load_training_image(capture.load().frames[0], {1, 0, 0}).picture.at(2, 4)[0], 1);
+    EXPECT_EQ(load_training_image(capture.load().frames[0], {1, 0, 0}).image.at(2, 4)[0], 1);
     const auto ignored = load_training_image(with_masks(capture, MaskUse::ignore).frames[0], {1, 0, 0});
     EXPECT_EQ(*ignored.weights.at(2, 4), 0);
     EXPECT_EQ(*ignored.weights.at(2, 2), 1);
-    EXPECT_EQ(ignored.picture.at(2, 4)[0], picture.at(2, 4)[0]);
+    EXPECT_EQ(ignored.image.at(2, 4)[0], picture.at(2, 4)[0]);
     EXPECT_EQ(load_frame_image(with_masks(capture, MaskUse::none).frames[0]).channels, 3);
 
     // The mask of a picture twice as large; what counts is what both let through. It shrinks with the
