@@ -22,7 +22,7 @@
 #define FIRST_SPLAT 0u
 #endif
 
-// This invocation's counts. They are added to the total once: lavapipe runs an atomic of each texel as a loop over the lanes.
+// Counts of this invocation, added to the total once at the end: lavapipe runs every atomic as a loop over the lanes.
 uint dropped_updates = 0u, limited_steps = 0u;
 
 void count_updates() {

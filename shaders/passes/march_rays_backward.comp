@@ -1,11 +1,11 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
 // Gradient of march_rays, front to back, with the borders of the intervals held fixed. With f(x) = (1 - exp(-x)) / x, E_j the
-// emitted colour of interval j, d_j its depth, and R_j = (what comes from behind it) . dL/dC, splat i has
+// emitted colour of interval j, d_j its optical depth, T_j the transmittance before it, and R_j = (light from behind it) . dL/dC, splat i has
 //   dL/d(d_ij) = (T_j f(d_j) c_i + T_j f'(d_j) E_j) . dL/dC - R_j
 // One workgroup is one subgroup and owns a strip of one tile, push.strip. It reads the tile's sorted splats, how rays meet them, the image planes and
 // dL/d(image). It adds to the gradient slots of the tile's instances, which are zero before.
-// SPEC_MODE: intervals evaluated together.
+// SPEC_MODE: the number of intervals evaluated together.
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_CAMERA 7
 #include "lib/prelude.glsl"

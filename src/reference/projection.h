@@ -121,12 +121,12 @@ struct ScreenGradient {
 // The backward pass of the projection, with G = dL/dSigma as a symmetric matrix:
 //   dL/dM  = 2 G M, plus the kernel factor's share through det0 and det:
 //            ddet0/drow0 = 2 row1 x n, ddet0/drow1 = 2 n x row0 with n = row0 x row1; dtrace/dM = 2 M
-//   with Footprint::density also d ln A / d log s_k = 1 - (A_k / A)^2 / 3, A_k the product of the other scales,
-//            d ln|J| / dz = -2 / z and d ln|J| / dtx = tx / (1 + tx^2 + ty^2), not through a slope that is clamped
+//   with Footprint::density also d ln A / d log s_k = 1 - (A_k / A)^2 / 3, A_k the product of the other scales, A^2 the mean of A_k^2,
+//            d ln|J| / dz = -2 / z and d ln|J| / dtx = tx / (1 + tx^2 + ty^2), without a gradient where tx or ty is clamped
 //   dL/dJ  = dL/dM (W R S)^T;  dL/d(R S) = (J W)^T dL/dM
 //   dL/dlog s_k = s_k sum_i R_ik dL/d(R S)_ik
 //   dL/dq  = (I - q^ q^T) dL/dq^ / |q|, q^ = q / |q|
-// The mean moves mean2d, J (not through a slope that is clamped) and the direction of the colour.
+// The mean moves mean2d, J (unless tx or ty is clamped) and the direction of the colour.
 // A channel of the colour that max(0, .) clamps to zero has no gradient.
 
 /// dL/d(stored value). Zero for an invisible splat, and for coefficients above the degree in use.

@@ -61,8 +61,8 @@ struct SceneBounds {
 };
 SceneBounds scene_bounds(const Gaussians& gaussians);
 
-/// Shows the whole scene from the front and slightly above, as `ewa render` does. dataset: tells up and the front; null:
-/// none.
+/// Shows the whole scene from the front and slightly above, as `ewa render` does. dataset: gives up and the front; may be
+/// null.
 Viewpoint framing_view(const Gaussians& gaussians, const Dataset* dataset, int width, int height);
 
 /// The frame whose camera is closest in position and direction; -1 without frames. A turn of 90 degrees
