@@ -35,7 +35,9 @@ struct RunOptions {
     std::filesystem::path dataset;  // folder or file, as load_dataset takes it
     std::filesystem::path scene;    // mesh scene, photos or video that the dataset was made from; empty: none
     std::filesystem::path output;   // the run's folder; empty: see output_folder
-    TrainOptions train{.strategy = Strategy::automatic, .sh_degree = kAutomaticShDegree};
+    TrainOptions train{.strategy = Strategy::automatic,
+                       .sh_degree = kAutomaticShDegree,
+                       .appearance = AppearanceModel::automatic};
     std::string init =
         "sfm";  // first splats: "sfm" (the dataset's points), "random", or a file of splats or points
     std::filesystem::path

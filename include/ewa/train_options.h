@@ -67,7 +67,7 @@ struct TrainOptions {
     /// each photo 60 times and has fewer than 30,000 steps, the rates of its splats fade.
     int few_photos = 16;
 
-    /// Learns the appearance of each training image, from one that changes no colour (docs/training.md).
+    /// Learns the appearance of each training image (docs/training.md).
     AppearanceModel appearance = AppearanceModel::none;
     bool exposure = false;  // AppearanceModel::affine; not with another model
     double exposure_rate = 0.01, exposure_rate_final = 0.001;

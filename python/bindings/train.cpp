@@ -48,7 +48,7 @@ struct TrainerStart {
 
     void resolve_options() {
         if (run.train.appearance == AppearanceModel::automatic)
-            run.train.appearance = train::choose_appearance(train::disagreement_of(*dataset, frames)).model;
+            run.train.appearance = train::choose_appearance(run.train, *dataset, frames).model;
         run.train = resolve(run.train, *dataset);
         run.train.render.sh_degree = run.train.sh_degree;
     }

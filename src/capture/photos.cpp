@@ -162,7 +162,8 @@ std::vector<LensGroup> lenses_of(const fs::path& folder, const std::vector<fs::p
     std::map<std::string, std::vector<fs::path>> alike;
     for (const fs::path& name : names) {
         const ImageSize size = read_image_size(folder / name);
-        alike[std::to_string(size.width) + "x" + std::to_string(size.height) + image::lens_of(folder / name)]
+        alike[std::to_string(size.width) + "x" + std::to_string(size.height) +
+              image::shot_of(folder / name).lens]
             .push_back(name);
     }
     std::vector<LensGroup> groups;

@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <iterator>
 #include <memory>
 #include <new>
 #include <stdexcept>
+#include <utility>
 
 #include "core/atomic_file.h"
 #include "core/system_limits.h"
@@ -253,20 +255,35 @@ int exif_orientation(const void* exif, uint64_t size) {
     return value == 0 ? 1 : int(block.number(value, 2));
 }
 
-std::string exif_lens(const void* exif, uint64_t size) {
+Shot exif_shot(const void* exif, uint64_t size) {
     constexpr uint64_t kMake = 271, kModel = 272, kPhoto = 34665, kFocal = 37386, kFocal35 = 41989;
+    constexpr uint64_t kTime = 33434, kAperture = 33437, kIso = 34855;  // EXIF 2.32, table 8
     const Exif block(exif, size);
     const uint64_t first = block.first();
-    std::string lens = block.text(first, kMake);
-    lens.append("/").append(block.text(first, kModel));
+    Shot shot;
+    shot.lens = block.text(first, kMake);
+    shot.lens.append("/").append(block.text(first, kModel));
     const uint64_t photo = block.find(first, kPhoto), details = photo == 0 ? 0 : block.number(photo, 4);
-    if (details == 0) return lens;
-    const uint64_t focal = block.find(details, kFocal), focal35 = block.find(details, kFocal35);
-    const uint64_t fraction = focal == 0 ? 0 : block.number(focal, 4);
-    for (const uint64_t number : {block.number(fraction, 4), block.number(fraction + 4, 4),
-                                  focal35 == 0 ? 0 : block.number(focal35, 2)})
-        lens.append("/").append(std::to_string(number));
-    return lens;
+    if (details == 0) return shot;
+    const auto small = [&](uint64_t tag) {
+        const uint64_t at = block.find(details, tag);
+        return at == 0 ? 0 : block.number(at, 2);
+    };
+    const auto fraction = [&](uint64_t tag) {
+        const uint64_t entry = block.find(details, tag), at = entry == 0 ? 0 : block.number(entry, 4);
+        return at == 0 ? std::pair<uint64_t, uint64_t>()
+                       : std::pair(block.number(at, 4), block.number(at + 4, 4));
+    };
+    const auto [focal, unit] = fraction(kFocal);
+    for (const uint64_t number : {focal, unit, small(kFocal35)})
+        shot.lens.append("/").append(std::to_string(number));
+    const auto ratio = [](const std::pair<uint64_t, uint64_t>& f) {
+        return double(f.first) / double(f.second);
+    };
+    const double aperture = ratio(fraction(kAperture));
+    const double exposure = std::log2(ratio(fraction(kTime)) * double(small(kIso)) / (aperture * aperture));
+    if (std::isfinite(exposure)) shot.exposure = exposure;
+    return shot;
 }
 
 Image decode(std::span<const unsigned char> bytes, const std::string& what, int largest) {
@@ -318,10 +335,10 @@ bool ends_as_an_image(const fs::path& path) try {
     return false;
 }
 
-std::string lens_of(const fs::path& path) try {
+Shot shot_of(const fs::path& path) try {
     return with_name(path.string(), [&] {
         const File file = open_file(path);
-        return ewa::format_of(file.get()).read == read_jpeg ? jpeg_lens(file.get()) : std::string();
+        return ewa::format_of(file.get()).read == read_jpeg ? jpeg_shot(file.get()) : Shot();
     });
 } catch (const InputError&) {
     return {};

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -42,9 +43,12 @@ std::string image_fault(const std::filesystem::path& path);
 /// Whether a PNG or JPEG has its last bytes, without decoding it. True for other formats.
 bool ends_as_an_image(const std::filesystem::path& path);
 
-/// A text for the camera and its focal length, as a JPEG's EXIF has them: equal for photos of one lens at one zoom. Empty
-/// for other files.
-std::string lens_of(const std::filesystem::path& path);
+/// What a JPEG's EXIF says of how it was taken. Empty for other files.
+struct Shot {
+    std::string lens;  // text for the camera and its focal length: equal for photos of one lens at one zoom
+    std::optional<double> exposure;  // log2(time * ISO / f-number^2), stops
+};
+Shot shot_of(const std::filesystem::path& path);
 
 /// The files below a folder and its subfolders whose extension is one of an image, relative to the folder and
 /// sorted. Links to folders are not followed. Throws InputError where a folder cannot be read.
@@ -95,10 +99,10 @@ StoredImage read_jpeg(std::FILE* file, uint64_t file_bytes, bool pixels);
 
 /// Decodes at an eighth of the size and keeps nothing.
 void check_jpeg(std::FILE* file, uint64_t file_bytes);
-std::string jpeg_lens(std::FILE* file);  // as lens_of
+Shot jpeg_shot(std::FILE* file);
 
-/// As lens_of, of an EXIF block.
-std::string exif_lens(const void* exif, uint64_t size);
+/// As shot_of, of an EXIF block.
+Shot exif_shot(const void* exif, uint64_t size);
 
 /// The value of EXIF's tag 274. The block starts with the header of a TIFF. 1 where the tag is missing.
 int exif_orientation(const void* exif, uint64_t size);

@@ -60,10 +60,10 @@ class JpegReader {
         attempt([&] { jpeg_finish_decompress(&jpeg_); });
     }
 
-    std::string lens() {
+    Shot shot() {
         attempt([&] { read_header(); });
-        std::string found;
-        with_exif([&](const JOCTET* exif, uint64_t size) { found = exif_lens(exif, size); });
+        Shot found;
+        with_exif([&](const JOCTET* exif, uint64_t size) { found = exif_shot(exif, size); });
         return found;
     }
 
@@ -251,8 +251,8 @@ void check_jpeg(std::FILE* file, uint64_t file_bytes) {
     JpegReader(file).check(file_bytes);
 }
 
-std::string jpeg_lens(std::FILE* file) {
-    return JpegReader(file).lens();
+Shot jpeg_shot(std::FILE* file) {
+    return JpegReader(file).shot();
 }
 
 }  // namespace ewa::image

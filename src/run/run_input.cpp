@@ -339,7 +339,7 @@ RunInput load_run(const RunOptions& options) {
     }
     TrainOptions& train = input.options.train;
     if (train.appearance == AppearanceModel::automatic) {
-        const AppearanceChoice choice = choose_appearance(disagreement_of(input.dataset, input.split.train));
+        const AppearanceChoice choice = choose_appearance(train, input.dataset, input.split.train);
         train.appearance = choice.model;
         input.notes.push_back(fmt::format(
             "appearance {}: {}", choice.model == AppearanceModel::none ? "none" : "ppisp", choice.reason));

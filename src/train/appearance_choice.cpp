@@ -9,82 +9,175 @@
 #include <limits>
 
 #include "core/parallel.h"
+#include "image/image_files.h"
 #include "scene/statistics.h"
 
 namespace ewa::train {
 namespace {
 
-constexpr size_t kMostImages = 64, kMostPoints = 4000, kLeastPoints = 32;
+constexpr size_t kMostImages = 64, kMostPoints = 200'000, kLeastPoints = 32;
+// Points hide others behind them in a cell of the image.
+constexpr int kCellsAcross = 64;
+constexpr float kHiddenBehind = 1.1f;  // of the nearest depth in the cell
 // Colours nearer to black or white say little of a factor between them.
 constexpr double kDark = 24 / 255.0, kBright = 240 / 255.0;
 // The root mean squares from which learning pays (docs/training.md "Appearance").
 constexpr double kStopsToLearn = 0.12, kColorToLearn = 0.06;
+// A factor of light is this power of it in stored values: the exponent of sRGB is about 1 / 2.2.
+constexpr double kStored = 1 / 2.2;
 
-/// Medians over the points of log2(image / point) for red, green and blue. NaN if the image shows too few of them.
-std::array<double, 3> ratios_of(const Dataset& dataset, const Frame& frame) {
-    const Image image = load_training_image(frame, {}).image;
-    const PointCloud& points = dataset.points;
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+/// A value of each image with its standard error.
+struct Measured {
+    double value = kUnknown, error = 0;
+};
+enum : size_t { kExposure, kRed, kBlue, kQuantities };  // stops; red and blue against green
+using Measures = std::array<Measured, kQuantities>;
+
+struct SeenPoint {
+    size_t point;
+    int x, y;     // px
+    float depth;  // world units
+};
+
+std::vector<SeenPoint> seen_points(const Camera& camera, const PointCloud& points) {
+    const int cell = std::max(1, camera.width / kCellsAcross);
+    const int columns = camera.width / cell + 1;
+    std::vector<float> nearest(size_t(columns) * size_t(camera.height / cell + 1),
+                               std::numeric_limits<float>::infinity());
+    const auto nearest_at = [&](int x, int y) -> float& {
+        return nearest[size_t(y / cell) * size_t(columns) + size_t(x / cell)];
+    };
     const size_t stride = std::max<size_t>(1, points.positions.size() / kMostPoints);
-    std::array<std::vector<double>, 3> ratios;
+    std::vector<SeenPoint> seen;
     for (size_t i = 0; i < points.positions.size(); i += stride) {
-        const glm::dvec3 p = frame.camera.rotation * points.positions[i] + frame.camera.translation;
+        const glm::dvec3 p = camera.rotation * points.positions[i] + camera.translation;
         if (!(p.z > 0)) continue;
-        const double x = frame.camera.fx * p.x / p.z + frame.camera.cx;
-        const double y = frame.camera.fy * p.y / p.z + frame.camera.cy;
-        if (!(x >= 0 && y >= 0 && x < image.width && y < image.height)) continue;
-        const float* pixel = image.at(int(x), int(y));
-        const auto within = [](double v) { return v >= kDark && v <= kBright; };
-        std::array<double, 3> ratio;
-        bool usable = true;
-        for (size_t c = 0; c < 3; ++c) {
-            const double own = double(pixel[c]), usual = points.colors[i][c] / 255.0;
-            usable = usable && within(own) && within(usual);
-            ratio[c] = std::log2(own / usual);
-        }
-        for (size_t c = 0; usable && c < 3; ++c) ratios[c].push_back(ratio[c]);
+        const double x = camera.fx * p.x / p.z + camera.cx, y = camera.fy * p.y / p.z + camera.cy;
+        if (!(x >= 0 && y >= 0 && x < camera.width && y < camera.height)) continue;
+        seen.push_back({i, int(x), int(y), float(p.z)});
+        float& depth = nearest_at(int(x), int(y));
+        depth = std::min(depth, float(p.z));
     }
-    std::array<double, 3> medians;
-    medians.fill(std::numeric_limits<double>::quiet_NaN());
-    if (ratios[0].size() < kLeastPoints) return medians;
-    for (size_t c = 0; c < 3; ++c) medians[c] = scene::quantile(ratios[c], 0.5);
-    return medians;
+    std::erase_if(seen, [&](const SeenPoint& p) { return p.depth > kHiddenBehind * nearest_at(p.x, p.y); });
+    return seen;
 }
 
-double root_mean_square(const std::vector<double>& values) {
-    double mean = 0, sum = 0;
-    for (const double value : values) mean += value / double(values.size());
-    for (const double value : values) sum += (value - mean) * (value - mean);
-    return values.empty() ? 0 : std::sqrt(sum / double(values.size()));
+/// The median, and its standard error where the values are normal but for some outliers.
+Measured median_of(std::vector<double>& values) {
+    if (values.size() < kLeastPoints) return {};
+    const double median = scene::quantile(values, 0.5), count = double(values.size());
+    for (double& value : values) value = std::abs(value - median);
+    constexpr double kDeviation = 1.4826,
+                     kOfMedian = 1.2533;  // of a normal distribution: sigma / MAD, sqrt(pi / 2)
+    return {median, kOfMedian * kDeviation * scene::quantile(values, 0.5) / std::sqrt(count)};
+}
+
+/// What the frame's image is against the points that it shows: log2(image / point).
+Measures against_points(const Dataset& dataset, const Frame& frame) {
+    const Image image = load_training_image(frame, {}).image;
+    std::array<std::vector<double>, kQuantities> values;
+    for (const SeenPoint& p : seen_points(frame.camera, dataset.points)) {
+        const float* pixel = image.at(std::min(p.x, image.width - 1), std::min(p.y, image.height - 1));
+        const auto& color = dataset.points.colors[p.point];
+        const auto usable = [&](int c) {
+            const double own = double(pixel[c]), usual = color[c] / 255.0;
+            return own >= kDark && own <= kBright && usual >= kDark && usual <= kBright;
+        };
+        if (!usable(0) || !usable(1) || !usable(2)) continue;
+        const auto ratio = [&](int c) { return std::log2(double(pixel[c]) * 255 / color[c]); };
+        values[kExposure].push_back((ratio(0) + ratio(1) + ratio(2)) / 3);
+        values[kRed].push_back(ratio(0) - ratio(1));
+        values[kBlue].push_back(ratio(2) - ratio(1));
+    }
+    Measures measures;
+    for (size_t q = 0; q < kQuantities; ++q) measures[q] = median_of(values[q]);
+    return measures;
+}
+
+struct Found {
+    std::vector<Measures> each = {};  // of the frames
+    bool by_exif = false;
+};
+
+Found measure(const Dataset& dataset, const std::vector<int>& frames) {
+    const bool points = dataset.points.positions.size() >= kLeastPoints &&
+                        dataset.points.colors.size() == dataset.points.positions.size();
+    Found found{std::vector<Measures>(frames.size()), !points};
+    core::on_all_cores(frames.size(), [&](size_t k) {
+        const Frame& frame = dataset.frames[size_t(frames[k])];
+        if (points) {
+            found.each[k] = against_points(dataset, frame);
+        } else if (const auto stops = image::shot_of(frame.image_path).exposure) {
+            found.each[k] = {Measured{*stops * kStored}, Measured{0}, Measured{0}};
+        }
+    });
+    return found;
+}
+
+/// How a quantity differs between the images that have it.
+struct Spread {
+    int images = 0;
+    double mean = 0, variance = 0;
+    double true_variance = 0;  // without what the errors of the values explain
+};
+
+Spread spread_of(const std::vector<Measures>& each, size_t quantity) {
+    Spread spread;
+    double errors = 0;
+    for (const Measures& measures : each) {
+        const Measured& m = measures[quantity];
+        if (!std::isfinite(m.value)) continue;
+        // Welford's sums.
+        const double before = m.value - spread.mean;
+        spread.mean += before / ++spread.images;
+        spread.variance += before * (m.value - spread.mean);
+        errors += m.error * m.error;
+    }
+    spread.variance /= std::max(1, spread.images);
+    spread.true_variance = std::max(0.0, spread.variance - errors / std::max(1, spread.images));
+    return spread;
 }
 
 }  // namespace
 
 Disagreement disagreement_of(const Dataset& dataset, const std::vector<int>& frames) {
     const size_t count = std::min(frames.size(), kMostImages);
-    if (dataset.points.positions.size() < kLeastPoints ||
-        dataset.points.colors.size() != dataset.points.positions.size())
-        return {};
-    std::vector<std::array<double, 3>> ratios(count);
-    core::on_all_cores(count, [&](size_t k) {
-        ratios[k] = ratios_of(dataset, dataset.frames[size_t(frames[k * frames.size() / count])]);
-    });
-    std::vector<double> exposures, reds, blues;
-    for (const auto& [red, green, blue] : ratios) {
-        if (!std::isfinite(green)) continue;
-        exposures.push_back((red + green + blue) / 3);
-        reds.push_back(red - green);
-        blues.push_back(blue - green);
-    }
-    return {int(exposures.size()), root_mean_square(exposures),
-            std::max(root_mean_square(reds), root_mean_square(blues))};
+    std::vector<int> some;
+    for (size_t k = 0; k < count; ++k) some.push_back(frames[k * frames.size() / count]);
+    const Found found = measure(dataset, some);
+    const Spread exposures = spread_of(found.each, kExposure);
+    const auto differ = [&](size_t quantity) {
+        return std::sqrt(spread_of(found.each, quantity).true_variance);
+    };
+    return {exposures.images, differ(kExposure), std::max(differ(kRed), differ(kBlue)), found.by_exif};
 }
 
-AppearanceChoice choose_appearance(const Disagreement& found) {
-    if (found.images < 2) return {AppearanceModel::none, "there are no points on which images could agree"};
+std::vector<float> first_exposures(const Dataset& dataset, const std::vector<int>& frames) {
+    const Found found = measure(dataset, frames);
+    const Spread spread = spread_of(found.each, kExposure);
+    // The best linear estimate where a part of the variance is error.
+    const double trust = spread.variance > 0 ? spread.true_variance / spread.variance : 0;
+    std::vector<float> stops;
+    for (const Measures& measures : found.each) {
+        const double value = measures[kExposure].value;
+        stops.push_back(std::isfinite(value) ? float(trust * (value - spread.mean)) : 0.0f);
+    }
+    return stops;
+}
+
+AppearanceChoice choose_appearance(const TrainOptions& options, const Dataset& dataset,
+                                   const std::vector<int>& frames) {
+    if (options.exposure) return {AppearanceModel::none, "--exposure is given"};
+    if (options.bands > 1) return {AppearanceModel::none, "--bands cuts the images"};
+    const Disagreement found = disagreement_of(dataset, frames);
+    if (found.images < 2) return {AppearanceModel::none, "the images have neither points in common nor EXIF"};
     const bool learn = found.exposure >= kStopsToLearn || found.color >= kColorToLearn;
-    return {learn ? AppearanceModel::ppisp : AppearanceModel::none,
-            fmt::format("{} images differ by {:.2f} stops, and by {:.2f} between colours", found.images,
-                        found.exposure, found.color)};
+    std::string reason = fmt::format("{} images differ by {:.2f} stops", found.images, found.exposure);
+    reason +=
+        found.by_exif ? ", as their EXIF says" : fmt::format(", and by {:.2f} between colours", found.color);
+    return {learn ? AppearanceModel::ppisp : AppearanceModel::none, reason};
 }
 
 }  // namespace ewa::train

@@ -1,31 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether the training images disagree so far that their appearance is to be learned.
+// What the training images say of their own exposures before any splat is trained: how far they disagree on the colours of
+// the points that they show, or what their EXIF says.
 #pragma once
 #include <string>
 #include <vector>
 
 #include "ewa/appearance.h"
 #include "ewa/dataset.h"
+#include "ewa/train_options.h"
 
 namespace ewa::train {
 
-/// How far images disagree on the colours of the points that they show.
+/// How far images disagree on the colours of the points that they show, beyond what chance explains.
 struct Disagreement {
-    int images = 0;       // that were compared; 0: there are no points
-    double exposure = 0;  // root mean square over the images, stops
+    int images = 0;       // that were compared; 0: they have neither points nor EXIF
+    double exposure = 0;  // root mean square over the images, stops of the stored values
     double color = 0;     // the same of red and blue against green
+    bool by_exif = false;
 };
 
-/// Compares each image with the colours of the dataset's points. An image's value is the median over the points in its
-/// frustum, so the few that are hidden do not count. frames: indices into dataset.frames; at most 64 of them are read.
-/// Throws InputError (an image that cannot be read).
+/// Compares each image with the colours of the dataset's points. An image's value is the median over the points that it shows;
+/// a point behind others does not count. Without points, EXIF's time, f-number and ISO count. frames: indices into
+/// dataset.frames; at most 64 of them are read. Throws InputError (an image that cannot be read).
 Disagreement disagreement_of(const Dataset& dataset, const std::vector<int>& frames);
+
+/// The exposure of each frame's image in stops of the stored values, against their mean: what PPISP starts from. 0 where neither
+/// points nor EXIF say it. Throws as disagreement_of.
+std::vector<float> first_exposures(const Dataset& dataset, const std::vector<int>& frames);
 
 struct AppearanceChoice {
     AppearanceModel model = AppearanceModel::none;
     std::string reason;  // with figures, for the user
 };
-/// The model that AppearanceModel::automatic stands for.
-AppearanceChoice choose_appearance(const Disagreement& found);
+/// The model that AppearanceModel::automatic stands for with these options, which have it.
+AppearanceChoice choose_appearance(const TrainOptions& options, const Dataset& dataset,
+                                   const std::vector<int>& frames);
 
 }  // namespace ewa::train

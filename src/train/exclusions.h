@@ -34,7 +34,10 @@ inline constexpr std::array kExclusions{
               {true, true, true, true},
               "a camera learns while the splats of its own step are moved"},
     Exclusion{"--appearance",
-              [](const TrainOptions& options) { return appearance_of(options) != AppearanceModel::none; },
+              [](const TrainOptions& options) {
+                  const AppearanceModel model = appearance_of(options);
+                  return model != AppearanceModel::none && model != AppearanceModel::automatic;
+              },
               {false, false, true, false},
               "an appearance learns from the whole picture of its view"}};
 

@@ -82,7 +82,7 @@ void check_training(const TrainOptions& options, int ranks) {
     scene::check_look({.render = options.render});
     core::check_exclusions(kPointExclusions, options);
     if (options.exposure && options.appearance != AppearanceModel::none &&
-        options.appearance != AppearanceModel::affine)
+        options.appearance != AppearanceModel::automatic && options.appearance != AppearanceModel::affine)
         throw InputError("--exposure is --appearance affine: name one of them");
 }
 
@@ -216,7 +216,7 @@ TrainOptions resolve(TrainOptions options, const Dataset& dataset) {
     if (options.appearance == AppearanceModel::automatic) {
         std::vector<int> all(dataset.frames.size());
         std::iota(all.begin(), all.end(), 0);
-        options.appearance = train::choose_appearance(train::disagreement_of(dataset, all)).model;
+        options.appearance = train::choose_appearance(options, dataset, all).model;
     }
     return options;
 }

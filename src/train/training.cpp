@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "ewa/error.h"
+#include "train/appearance_choice.h"
 
 namespace ewa::train {
 
@@ -129,6 +130,8 @@ Training::Training(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
     else if (plan_.appearance != AppearanceModel::none)
         learned_.appearances =
             Appearances(*device_, plan_.appearance, cameras_of(dataset, frames), uint32_t(options.batch));
+    if (plan_.appearance == AppearanceModel::ppisp)
+        learned_.appearances.set_exposures(first_exposures(dataset, frames));
     if (plan_.motion) {
         std::vector<MotionBasis> bases;
         for (const int index : frames)

@@ -169,21 +169,23 @@ TEST(Jpeg, ExifSaysTheOrientation) {
     }
 }
 
-TEST(Jpeg, ExifSaysTheLens) {
+TEST(Jpeg, ExifSaysTheLensAndTheExposure) {
     TempFolder folder;
     const auto path = folder / "a.jpg";
     write_jpeg(path, 1, JCS_GRAYSCALE, JCS_GRAYSCALE);
-    EXPECT_EQ(image::lens_of(path), "");
+    EXPECT_EQ(image::shot_of(path).lens, "");
     const std::string whole = test::file_bytes(path);
     const auto entry = [](uint32_t tag, uint32_t type, uint32_t count, const std::string& value) {
         return big(tag, 2) + big(type, 2) + big(count) + value;
     };
-    // The first directory has 3 entries (8 to 50), the second one 2 (50 to 80).
+    // The first directory has 3 entries (8 to 50), the second one 5 (50 to 116).
     const std::string tiff = std::string("MM\0\x2a", 4) + big(8) + big(3, 2) +
-                             entry(271, 2, 3, {"Me\0\0", 4}) + entry(272, 2, 6, big(80)) +
-                             entry(34665, 4, 1, big(50)) + big(0) + big(2, 2) + entry(37386, 5, 1, big(86)) +
-                             entry(41989, 3, 1, big(28, 2) + big(0, 2)) + big(0) + std::string("Phone\0", 6) +
-                             big(42) + big(10);
+                             entry(271, 2, 3, {"Me\0\0", 4}) + entry(272, 2, 6, big(116)) +
+                             entry(34665, 4, 1, big(50)) + big(0) + big(5, 2) + entry(33434, 5, 1, big(130)) +
+                             entry(33437, 5, 1, big(138)) + entry(34855, 3, 1, big(800, 2) + big(0, 2)) +
+                             entry(37386, 5, 1, big(122)) + entry(41989, 3, 1, big(28, 2) + big(0, 2)) +
+                             big(0) + std::string("Phone\0", 6) + big(42) + big(10) + big(1) + big(100) +
+                             big(20) + big(10);
     const auto write = [&](const std::string& block) {
         const std::string exif = std::string("Exif\0\0", 6) + block;
         std::string bytes = whole;
@@ -191,11 +193,13 @@ TEST(Jpeg, ExifSaysTheLens) {
         folder.write("a.jpg", bytes);
     };
     write(tiff);
-    EXPECT_EQ(image::lens_of(path), "Me/Phone/42/10/28");
+    EXPECT_EQ(image::shot_of(path).lens, "Me/Phone/42/10/28");
+    EXPECT_NEAR(image::shot_of(path).exposure.value(), 1, 1e-9);  // 1/100 s, f/2, ISO 800
     // Whatever is cut off counts as absent.
     for (size_t size = 9; size < tiff.size(); ++size) {
         write(tiff.substr(0, size));
-        EXPECT_NE(image::lens_of(path), "Me/Phone/42/10/28") << size;
+        const image::Shot shot = image::shot_of(path);
+        EXPECT_TRUE(shot.lens != "Me/Phone/42/10/28" || !shot.exposure) << size;
     }
 }
 

@@ -8,6 +8,7 @@
 
 #include "ewa/error.h"
 #include "ewa/evaluation.h"
+#include "ewa/run_options.h"
 #include "ewa/splat_files.h"
 #include "ewa/trainer.h"
 #include "gpu/test_device.h"
@@ -467,30 +468,64 @@ TEST(AppearanceChoice, IsAModelWhereImagesDisagreeOnThePoints) {
     const auto found = [](const Dataset& dataset) {
         return train::disagreement_of(dataset, all_frames(dataset));
     };
-    const auto model = [](const train::Disagreement& d) { return train::choose_appearance(d).model; };
-    const train::Disagreement same = found(in_stops(made, {}));
-    EXPECT_EQ(same.images, 8);
-    EXPECT_NEAR(same.exposure, 0, 0.01);
-    EXPECT_EQ(model(same), AppearanceModel::none);
+    const auto choice = [](const Dataset& dataset, const TrainOptions& options = {}) {
+        return train::choose_appearance(options, dataset, all_frames(dataset));
+    };
+    const Dataset same = in_stops(made, {});
+    EXPECT_EQ(found(same).images, 8);
+    EXPECT_NEAR(found(same).exposure, 0, 0.01);
+    EXPECT_EQ(choice(same).model, AppearanceModel::none);
 
-    const Dataset brighter = in_stops(made, {0.3, -0.3, 0.3, -0.3, 0.3, -0.3, 0.3, -0.3});
+    const std::array<double, 8> stops{0.3, -0.3, 0.3, -0.3, 0.3, -0.3, 0.3, -0.3};
+    const Dataset brighter = in_stops(made, stops);
     EXPECT_NEAR(found(brighter).exposure, 0.3, 0.01);
     EXPECT_NEAR(found(brighter).color, 0, 0.01);
-    EXPECT_EQ(model(found(brighter)), AppearanceModel::ppisp);
+    EXPECT_EQ(choice(brighter).model, AppearanceModel::ppisp);
+    EXPECT_EQ(resolve(RunOptions().train, brighter).appearance, AppearanceModel::ppisp);
+    const std::vector<float> first = train::first_exposures(brighter, all_frames(brighter));
+    for (size_t k = 0; k < stops.size(); ++k) EXPECT_NEAR(first[k], stops[k], 0.02) << k;
     TrainOptions options;
-    options.appearance = AppearanceModel::automatic;
-    EXPECT_EQ(resolve(options, brighter).appearance, AppearanceModel::ppisp);
+    options.exposure = true;
+    EXPECT_EQ(choice(brighter, options).model, AppearanceModel::none);
+    options = {};
+    options.bands = 2;
+    EXPECT_EQ(choice(brighter, options).model, AppearanceModel::none);
 
     const train::Disagreement redder = found(in_stops(made, {}, 1.15));
     EXPECT_NEAR(redder.color, std::log2(1.15) / 2, 0.01);
     EXPECT_LT(redder.exposure, 0.04);
-    EXPECT_EQ(model(redder), AppearanceModel::ppisp);
+    EXPECT_EQ(choice(in_stops(made, {}, 1.15)).model, AppearanceModel::ppisp);
 
     Dataset pointless = brighter;
     pointless.points = {};
-    EXPECT_EQ(train::choose_appearance(found(pointless)).reason,
-              "there are no points on which images could agree");
-    EXPECT_EQ(model(found(pointless)), AppearanceModel::none);
+    EXPECT_EQ(choice(pointless).reason, "the images have neither points in common nor EXIF");
+    EXPECT_EQ(choice(pointless).model, AppearanceModel::none);
+    EXPECT_EQ(train::first_exposures(pointless, {0, 1}), (std::vector<float>{0, 0}));
+}
+
+/// Half of the cameras look one way, where brighter points are behind those of the image's colour.
+TEST(AppearanceChoice, DoesNotCompareHiddenPoints) {
+    Synthetic made;
+    Dataset dataset = in_stops(made, {});
+    dataset.points = {};
+    const auto add = [&](double x, double y, double z, uint8_t grey) {
+        dataset.points.positions.push_back({x * z, y * z, z});
+        dataset.points.colors.push_back({grey, grey, grey});
+    };
+    for (int k = 0; k < 100; ++k) {
+        const double x = 0.02 * (k % 10 - 4.5), y = 0.02 * (k / 10 - 4.5);
+        for (const double z : {-2.0, 2.0}) add(x, y, z, 102);
+        for (const double z : {3.0, 4.0, 5.0}) add(x, y, z, 200);
+    }
+    for (size_t k = 0; k < dataset.frames.size(); ++k) {
+        Camera& camera = dataset.frames[k].camera;
+        const double way = k % 2 == 0 ? 1 : -1;
+        camera.rotation = glm::dmat3(way, 0, 0, 0, 1, 0, 0, 0, way);
+        camera.translation = {0, 0, 0};
+    }
+    const train::Disagreement found = train::disagreement_of(dataset, all_frames(dataset));
+    EXPECT_EQ(found.images, 8);
+    EXPECT_NEAR(found.exposure, 0, 0.01);
 }
 
 /// A run on halves and quarters first ends at the whole resolution, and resumes to the byte in the middle of
