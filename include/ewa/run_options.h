@@ -49,9 +49,10 @@ struct RunOptions {
     int downscale = 1;           // divides the images' width and height
     int max_width = 0;           // px; images that are wider after `downscale` are reduced to it; 0: none are
     MaskUse masks = MaskUse::automatic;
-    int test_every = 8;                   // every K-th image in name order is held out; 0: none
-    int eval_every = 0;                   // evaluates the held-out views every N steps; 0: only at the end
-    std::string metrics;                  // that evaluations measure beside PSNR and SSIM: see metrics_named
+    int test_every = 8;         // every K-th image in name order is held out; 0: none
+    bool skip_blurred = false;  // leaves out training images that are blurred far more than the others
+    int eval_every = 0;         // evaluates the held-out views every N steps; 0: only at the end
+    std::string metrics;        // that evaluations measure beside PSNR and SSIM: see metrics_named
     std::filesystem::path lpips_weights;  // see Meter; empty: LPIPS is not computed
     bool tensorboard = false;             // also writes the figures of metrics.jsonl as TensorBoard's events
     int save_every = 0;  // saves splats and checkpoint every N steps; 0: the checkpoint every 30 s or more

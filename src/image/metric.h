@@ -28,6 +28,10 @@ double ssim_valid(const Image& a, const Image& b, const Image& weights);
 /// 0. NaN if a side is under 176 px: the window must fit on the coarsest scale.
 double ms_ssim(const Image& a, const Image& b, const Image& weights);
 
+/// The blur effect of Crete et al. 2007: the share of the differences between neighbours that a box filter of 11 px leaves, along
+/// rows or columns, whichever is larger. From 0 (sharp) to 1; it depends little on what the image shows. 0 for a flat image.
+double blur_effect(const Image& image);
+
 /// Per channel, the inverse of the affine map that takes b to a in the least-squares sense, applied to a (gsplat's
 /// color_correct_affine).
 Image affine_corrected(const Image& a, const Image& b, const Image& weights);

@@ -360,6 +360,9 @@ std::vector<Row> rows() {
          number<int>(
              "test-every", "K", "Hold out every K-th image in name order. 0: none", kDecides,
              [](RunOptions& o) -> int& { return o.test_every; }, 0, 1000000000)},
+        {"Data", "",
+         later_flag("skip-blurred", "Do not train on images that are blurred far more than the others",
+                    [](RunOptions& o) -> bool& { return o.skip_blurred; })},
         {"Quality", "seed",
          number<uint64_t>(
              "seed", "S", "The same seed on the same device gives the same bytes", kDecides,

@@ -19,6 +19,7 @@
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
 #include "io/datasets/image_records.h"
+#include "run/blurred_images.h"
 #include "scene/dense_points.h"
 #include "scene/names.h"
 #include "shared/constants.h"
@@ -115,6 +116,20 @@ Split chosen_frames(const Dataset& dataset, Split split, const std::string& list
             fmt::format("--frames {}: {} {} held out; name more, or hold fewer out with --test-every", list,
                         core::counted(chosen.size(), "image"), core::is_or_are(chosen.size())));
     return split;
+}
+
+void skip_blurred(RunInput& input) {
+    constexpr size_t kNamed = 8;
+    const std::vector<int> blurred = blurred_frames(input.dataset, input.split.train);
+    if (blurred.empty()) return;
+    std::string names;
+    for (size_t k = 0; k < std::min(kNamed, blurred.size()); ++k)
+        names += (k == 0 ? ": " : ", ") + input.dataset.frames[size_t(blurred[k])].name;
+    if (blurred.size() > kNamed) names += fmt::format(" and {} more", blurred.size() - kNamed);
+    input.remarks.push_back(fmt::format("{} {} blurred and skipped{}",
+                                        core::counted(blurred.size(), "training image"),
+                                        core::is_or_are(blurred.size()), names));
+    std::erase_if(input.split.train, [&](int i) { return std::ranges::find(blurred, i) != blurred.end(); });
 }
 
 /// Whether the strategy changes the number of splats at least once.
@@ -337,8 +352,9 @@ RunInput load_run(const RunOptions& options) {
         check_downscale(options.downscale, frame.downscale, frame.pinhole.width, frame.pinhole.height,
                         "the image " + frame.name);
     }
+    if (options.skip_blurred) skip_blurred(input);
     TrainOptions& train = input.options.train;
-    if (train.appearance == AppearanceModel::automatic) {
+    if (train.appearance == AppearanceModel::automatic && !train.exposure) {
         const AppearanceChoice choice = choose_appearance(train, input.dataset, input.split.train);
         train.appearance = choice.model;
         input.notes.push_back(fmt::format(

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <random>
 
+#include "image/metric.h"
 #include "image/pillow.h"
 #include "image/tensors.h"
 #include "support/temp_folder.h"
@@ -167,6 +168,22 @@ TEST(Lpips, AFileWithoutTheNetworkIsRefused) {
     expect_error<InputError>([&] { Meter({"lpips_alex"}, path); }, {path, "has 1 values, not 23232"});
     EXPECT_TRUE(
         std::isnan(Meter({"lpips_vgg"}).measure(grain(40, 40, 3, 1), grain(40, 40, 3, 2)).front().value));
+}
+
+/// Of an edge, a box of 11 px leaves an eleventh of the step between its pixels. A ramp has nothing that it could lose.
+TEST(BlurEffect, IsWhatABoxLeavesOfTheDifferences) {
+    Image edge(40, 30, 3), ramp(40, 30, 3), steps(40, 30, 1);
+    for (int y = 0; y < 30; ++y)
+        for (int x = 0; x < 40; ++x) {
+            std::fill_n(edge.at(x, y), 3, x < 20 ? 0.2f : 0.7f);
+            std::fill_n(ramp.at(x, y), 3, float(x) / 64);
+            *steps.at(x, y) = x < 20 ? 0 : x < 22 ? 0.5f : 1;
+        }
+    EXPECT_NEAR(image::blur_effect(edge), 1 / 11.0, 1e-6);
+    // At both ends it lacks 5/11, 4/11, ... of a difference.
+    EXPECT_NEAR(image::blur_effect(ramp), 1 - 2 * 15 / 11.0 / 39, 1e-5);
+    EXPECT_NEAR(image::blur_effect(steps), 2 / 11.0, 1e-6);
+    EXPECT_EQ(image::blur_effect(Image(9, 9, 3)), 0);
 }
 
 TEST(Pillow, AHalvedRampStaysOne) {

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -239,6 +240,47 @@ TEST(Run, RefusesOptionsThatExcludeEachOther) {
     EXPECT_FALSE(fs::exists(folder / "o"));
 }
 
+TEST(Run, SkipsBlurredTrainingImages) {
+    Synthetic made;
+    make_synthetic(made, 40, 8, 48, 36, 7);
+    for (size_t i = 0; i < 8; ++i) {
+        // Rectangles, then the mean over 9 px of a row in two images.
+        Image sharp(48, 36, 3);
+        for (int y = 0; y < 36; ++y)
+            for (int x = 0; x < 48; ++x)
+                std::fill_n(sharp.at(x, y), 3, ((x + int(i)) / 5 + y / 7) % 2 == 0 ? 0.2f : 0.8f);
+        Image image = sharp;
+        for (int y = 0; (i == 2 || i == 4) && y < 36; ++y)
+            for (int x = 4; x < 44; ++x) {
+                float sum = 0;
+                for (int k = -4; k <= 4; ++k) sum += *sharp.at(x + k, y);
+                std::fill_n(image.at(x, y), 3, sum / 9);
+            }
+        save_image(made.dataset.frames[i].image_path, image);
+    }
+    TempFolder folder;
+    RunOptions options = small_run(folder / "o");
+    options.dataset = made.folder.path();
+    options.train.steps = 2;
+    const auto views = [&](bool skip) {
+        options.skip_blurred = skip;
+        options.force = true;
+        Recorder recorder;
+        run_training(options, recorder);
+        return std::pair(recorder.started.train_views, recorder.started.remarks);
+    };
+    EXPECT_EQ(views(false).first, 6u);
+    // The fifth image, number 4, is held out.
+    const auto [left, remarks] = views(true);
+    EXPECT_EQ(left, 5u);
+    EXPECT_NE(std::ranges::find_if(remarks,
+                                   [&](const std::string& remark) {
+                                       return remark == "1 training image is blurred and skipped: " +
+                                                            made.dataset.frames[2].name;
+                                   }),
+              remarks.end());
+}
+
 TEST(Run, AnExceptionOfTheObserverEndsIt) {
     struct Thrower : RunObserver {
         void on_step(const StepReport& step) override {
@@ -286,6 +328,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                              {"downscale", "2"},
                                              {"masks", "cut"},
                                              {"test-every", "5"},
+                                             {"skip-blurred", "true"},
                                              {"seed", "18446744073709551615"},
                                              {"moments", "32"},
                                              {"image-cache", "9"},
