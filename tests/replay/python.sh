@@ -52,8 +52,9 @@ n, side = 50_000, 1024
 f = np.float32
 means = np.random.default_rng(1).uniform(0, side, (n, 2)).astype(f)
 conics = np.tile(f([1, 0, 1]), (n, 1))
-image = operators.blend_lists(means, conics, np.full(n, 0.5, f), np.ones((n, 1), f), side, side, None, None, side,
-                              np.int32([0, n]), np.arange(n, dtype=np.int32), False)[0]
+splats = operators.Footprints(means2d=means, conics=conics, opacities=np.full(n, 0.5, f), features=np.ones((n, 1), f))
+lists = [(np.int32([0, n]), np.arange(n, dtype=np.int32))]
+image = operators.Blending(splats, [(0, n)], side, side, side, lists=lists).blend(False)[0]
 assert image.max() > 0.4
 "
 }
