@@ -13,9 +13,11 @@
 
 #include "bindings.h"
 #include "core/typing.h"
+#include "core/words.h"
 #include "ewa/error.h"
 #include "options.h"
 #include "run/option_table.h"
+#include "scene/looks.h"
 
 namespace ewa::python {
 namespace {
@@ -190,6 +192,7 @@ nb::dict argument_names() {
 
 nb::set value_words() {
     nb::set words;
+    for (const std::string& word : core::words_of(scene::kIntegratorWords)) words.add(nb::str(word.c_str()));
     for (const RunOption& row : train::run_options()) {
         for (const std::string& choice : row.choices) words.add(nb::str(choice.c_str()));
         std::istringstream parts(row.value);
