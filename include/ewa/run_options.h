@@ -50,7 +50,7 @@ struct RunOptions {
     int max_width = 0;           // px; images that are wider after `downscale` are reduced to it; 0: none are
     MaskUse masks = MaskUse::automatic;
     int test_every = 8;         // every K-th image in name order is held out; 0: none
-    bool skip_blurred = false;  // leaves out training images that are blurred far more than the others
+    bool skip_blurred = false;  // training images are skipped that are blurred far more than the others
     int eval_every = 0;         // evaluates the held-out views every N steps; 0: only at the end
     std::string metrics;        // that evaluations measure beside PSNR and SSIM: see metrics_named
     std::filesystem::path lpips_weights;  // see Meter; empty: LPIPS is not computed
