@@ -2,8 +2,11 @@
 // What an image depends on besides the splats and the camera.
 #pragma once
 #include <array>
+#include <memory>
 
 namespace ewa {
+
+struct SkyMap;
 
 /// How a splat's opacity depends on its footprint. Values are KERNEL_* of shaders/shared/constants.h.
 enum class Footprint { peak = 0, antialias = 1, density = 2 };
@@ -25,6 +28,7 @@ struct RenderOptions {
     int samples = 64;     // of a ray, with Integrator::march
     bool points = false;  // spheres in place of Gaussians: the nearest ones at a pixel, blended by weight
     int nearest = 8;      // spheres at a pixel, with `points`
+    std::shared_ptr<const SkyMap> sky{};  // in place of the background; null: none
 };
 
 enum class Drawing {

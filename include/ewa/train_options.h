@@ -45,6 +45,9 @@ struct TrainOptions {
     int sh_degree = 3;                          // 0 to 3, or kAutomaticShDegree
     uint64_t seed = 0;                          // the same seed on the same device gives the same bytes
     bool random_background = false;             // a new background colour each step
+    /// Learns a SkyMap in place of the background. Not with refine_poses.
+    bool sky = false;
+    double sky_rate = 0.02, sky_rate_final = 0.002;
     /// Device memory for decoded training images, in bytes. Images beyond it are read again for each step.
     uint64_t image_cache_bytes = uint64_t(4) << 30;
     /// Device memory that a training takes at most, in bytes; 0: as much as it needs. Splats that do not fit stay in host

@@ -17,6 +17,7 @@
 #include "ewa/gaussians.h"
 #include "ewa/ranks.h"
 #include "ewa/renderer.h"
+#include "ewa/sky_map.h"
 #include "ewa/step_report.h"
 #include "ewa/summary.h"
 #include "ewa/train_options.h"
@@ -77,6 +78,7 @@ class Trainer {
     std::vector<Exposure> exposures() const;           // one for each training frame; empty if not learned
     std::vector<Appearance> appearances() const;       // the same of every model
     std::vector<CameraMotion> camera_motions() const;  // one for each training frame; empty if not learned
+    std::shared_ptr<const SkyMap> sky() const;         // null if not learned
     size_t images_on_disk() const;                     // training images that are not cached
     double extent() const;                             // the length that rates are relative to, world units
     std::vector<PlanLine> plan() const;                // what the run skips

@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <string>
 
 #include "arrays.h"
 #include "core/typing.h"
 #include "core/words.h"
 #include "ewa/error.h"
+#include "ewa/sky_map.h"
 #include "ewa/splat_edit.h"
 #include "run/option_table.h"
 #include "scene/looks.h"
@@ -25,6 +28,22 @@ std::array<float, 3> background_of(nb::handle value) {
     if (!std::all_of(array.data(), array.data() + 3, [](float x) { return std::isfinite(x); }))
         throw InputError("background is not finite");
     return {array.data()[0], array.data()[1], array.data()[2]};
+}
+
+void use_background(RenderOptions& options, nb::handle value) {
+    options.sky.reset();
+    if (nb::isinstance<nb::str>(value) || nb::len(nb::getattr(value, "shape", nb::tuple())) != 3) {
+        options.background = background_of(value);
+        return;
+    }
+    const Array<float> array(value, "background", {Shape{3}, Shape{any('N'), any('N'), 3}});
+    const size_t size = array.length(0);
+    if (size == 0 || size > size_t(kMostSkyTexels) || array.length(1) != size)
+        throw InputError("background: a sky is [n, n, 3], with n from 1 to " +
+                         std::to_string(kMostSkyTexels));
+    if (!std::all_of(array.data(), array.data() + array.size(), [](float x) { return std::isfinite(x); }))
+        throw InputError("background is not finite");
+    options.sky = std::make_shared<const SkyMap>(SkyMap{int(size), array.values()});
 }
 
 namespace {

@@ -16,6 +16,8 @@ namespace ewa::python {
 
 /// Three numbers, or a colour as core::parse_colour reads it. Throws InputError.
 std::array<float, 3> background_of(nanobind::handle value);
+/// Sets the background, or the sky if the value is an array [n, n, 3]. Throws InputError.
+void use_background(RenderOptions& options, nanobind::handle value);
 
 /// Calls a function, whose InputError then begins with the argument's name.
 template <class Function>

@@ -126,7 +126,7 @@ class SceneRenderer {
                    const std::string& mode) {
         const Cameras cameras = cameras_of(viewmats, intrinsics, width, height);
         DrawOptions options{.render = options_, .drawing = drawing_of(mode)};
-        options.render.background = background_of(background);
+        use_background(options.render, background);
         const size_t count = cameras.all.size();
         Planes color(count, width, height, 3), alpha(count, width, height, 1);
         std::optional<Planes> more;

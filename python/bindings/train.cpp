@@ -118,6 +118,16 @@ class Training {
         return to_numpy(std::move(values), {count, 3, 4});
     }
 
+    nb::ndarray<nb::numpy, float> sky() const {
+        SkyMap map;
+        {
+            const DeviceWork work;
+            if (const auto learned = trainer_->sky()) map = *learned;
+        }
+        const auto size = size_t(map.size);
+        return to_numpy(std::move(map.texels), {size, size, 3});
+    }
+
     void save_checkpoint(const std::filesystem::path& path) const {
         const std::string fingerprint =
             with_files([&] { return train::dataset_fingerprint(*start_.dataset, start_.split()); });
@@ -247,7 +257,7 @@ Evaluation evaluate_splats(const Splats& splats, const LoadedDataset& dataset, n
     if (chosen.empty()) throw InputError("frames is empty: there is nothing to evaluate");
     RenderOptions options =
         look_of({antialias, std::move(kernel), integrator, samples, points, nearest}, splats);
-    options.background = background_of(background);
+    use_background(options, background);
     Gaussians fitted;
     const Gaussians& gaussians = fitted_to(options.kernel, splats, fitted);
     const DeviceWork work;
@@ -352,6 +362,9 @@ void bind_trainer(nb::module_& module) {
         .def("exposures", &Training::exposures,
              nb::sig("def exposures(self) -> numpy.typing.NDArray[numpy.float32]"),
              "[m, 3, 4], the affine map of colours for each training frame; empty unless exposure=True.")
+        .def("sky", &Training::sky, nb::sig("def sky(self) -> numpy.typing.NDArray[numpy.float32]"),
+             "[n, n, 3], the sky that render() and evaluate() take as background; empty unless "
+             "background=\"sky\".")
         .def("save_checkpoint", &Training::save_checkpoint, "path"_a,
              "Writes all that later steps depend on. A file is replaced as a whole. Raises OSError.")
         .def_static(

@@ -43,14 +43,17 @@ struct Special {
 
 nb::object background_value(const RunOptions& options) {
     if (options.train.random_background) return nb::str("random");
+    if (options.train.sky) return nb::str("sky");
     const auto& [r, g, b] = options.train.render.background;
     return nb::make_tuple(r, g, b);
 }
 
 void set_background(RunOptions& options, nb::handle value) {
-    const bool random = nb::isinstance<nb::str>(value) && nb::cast<std::string>(value) == "random";
-    options.train.random_background = random;
-    options.train.render.background = random ? std::array<float, 3>{} : background_of(value);
+    const std::string word = nb::isinstance<nb::str>(value) ? nb::cast<std::string>(value) : std::string();
+    options.train.random_background = word == "random";
+    options.train.sky = word == "sky";
+    const bool colour = word != "random" && word != "sky";
+    options.train.render.background = colour ? background_of(value) : std::array<float, 3>{};
 }
 
 /// Python's unit of memory is the byte.

@@ -301,6 +301,28 @@ def test_exposures_are_learned(still_life):
     )
 
 
+def test_the_sky_is_learned(still_life):
+    trainer = ewa.Trainer(still_life, steps=20, background="sky", train_frames=[0, 1, 2])
+    assert trainer.options["background"] == "sky" and np.all(trainer.sky() == 0.5)
+    splats, sky = trained(trainer), trainer.sky()
+    assert sky.shape[0] == sky.shape[1] > 1 and sky.shape[2] == 3 and np.ptp(sky) > 0.01
+    with_sky = ewa.evaluate(splats, still_life, [0], background=sky)
+    assert with_sky.psnr > ewa.evaluate(splats, still_life, [0]).psnr
+    frame = still_life.frames[0]
+    camera = still_life.viewmats[0], still_life.Ks[0], frame.width, frame.height
+    red = np.zeros((1, 1, 3)) + [1, 0, 0]
+    assert np.allclose(
+        ewa.render(splats, *camera, background=red).color,
+        ewa.render(splats, *camera, background=(1, 0, 0)).color,
+        atol=1e-6,
+    )
+    for wrong in (np.zeros((2, 3, 3)), np.zeros((0, 0, 3)), np.full((1, 1, 3), np.nan)):
+        with pytest.raises(ValueError, match="background"):
+            ewa.render(splats, *camera, background=wrong)
+    none = ewa.Trainer(still_life, steps=1, train_frames=[0])
+    assert none.sky().shape == (0, 0, 3)
+
+
 def test_evaluation_is_that_of_the_command_line(still_life, command_line_run, program, tmp_path):
     program("eval", command_line_run / "splats.ply", STILL_LIFE, "--json", tmp_path / "eval.json")
     expected = json.loads((tmp_path / "eval.json").read_text())

@@ -150,6 +150,15 @@ EWA_REAL(GREY_GREEN, 0.587);
 EWA_REAL(GREY_BLUE, 0.114);
 EWA_REAL(GRID_VARIATION_WEIGHT, 10.0);  // of the mean squared differences along the three axes
 
+// The sky: light from infinitely far, a map of texels over an octahedron (lib/sky.glsl).
+EWA_UINT(SKY_SIZE, 64u);   // texels a side of a map that training learns
+EWA_UINT(SKY_BLOCK, 8u);   // px a side of a block, for the gradient
+EWA_REAL(SKY_PULL, 1e-6);  // d(loss)/d(texel) for a neighbour that differs by 1
+// Gradients are added as whole multiples of 1 / SKY_UNITS. A pixel has at most SKY_SUM_MAX of an image's pixels: then no sum
+// overflows. dL/d(colour) of L1 is 1.07e8 / pixels of them.
+EWA_REAL(SKY_UNITS, 402653184.0);
+EWA_REAL(SKY_SUM_MAX, 1073741824.0);
+
 // The path tracer of mesh scenes (docs/meshes.md describes its model).
 EWA_UINT(TRACE_STACK, 48u);         // greatest depth of the hierarchy: children on the stack of a ray
 EWA_UINT(TRACE_LEAF_MAX, 4u);       // triangles a leaf

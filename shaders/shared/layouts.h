@@ -409,6 +409,25 @@ struct GridUpdatePush {
     uint instance_capacity;
 };
 
+struct SkyPush {
+    ImageLayout image;
+    uint size;       // texels a side of the map
+    uint first_row;  // of the view: the image's first
+};
+
+struct SkyGradientPush {
+    SkyPush sky;
+    uint slot;  // of the view in the step: its first float
+};
+
+struct SkyUpdatePush {
+    uint size;   // texels a side of the map
+    uint views;  // of the step
+    float rate;
+    float bias1, bias2;  // 1 / (1 - beta^step)
+    uint instance_capacity;
+};
+
 struct MoveCameraPush {
     uint photo;  // index of the training image
 };

@@ -5,14 +5,18 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <memory>
 
 #include "cli/interrupt.h"
 #include "cli/output.h"
+#include "core/folders.h"
 #include "core/messages.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "ewa/sky_map.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
+#include "report/run_file_names.h"
 #include "scene/camera.h"
 #include "scene/looks.h"
 #include "scene/names.h"
@@ -96,10 +100,13 @@ RenderOptions DrawArguments::options() const {
             throw InputError(std::string("--") + name + ": " + error.what());
         }
     };
-    if (background == "random") throw InputError("--background: only ewa train takes random");
-    set("background", background);
+    if (background == "random" || background == "sky")
+        throw InputError("--background: only ewa train takes " + background);
+    const bool sky = background.ends_with(".json");
+    if (!sky) set("background", background);
     set("kernel", kernel);
     RenderOptions render = drawn.train.render;
+    if (sky) render.sky = std::make_shared<const SkyMap>(load_sky(background));
     render.kernel = settled_kernel(render.kernel, antialias);
     render.sh_degree = sh_degree;
     render.points = points;
@@ -119,15 +126,20 @@ Gaussians DrawArguments::load(const fs::path& splats, RenderOptions& options) co
         if (scene.antialiased && options.integrator == Integrator::splat)
             options.kernel = Footprint::antialias;
     }
+    const fs::path sky = splats.parent_path() / report::kSkyFile;
+    if (!names_background() && core::is_file(sky))
+        options.sky = std::make_shared<const SkyMap>(load_sky(sky));
     fit_opacities(scene.gaussians, options.kernel == Footprint::density);
     return std::move(scene.gaussians);
 }
 
 void add_draw_options(CLI::App& app, DrawArguments& arguments) {
-    app.add_option("--background", arguments.background,
-                   "Background colour: r,g,b in 0..1, a name such as white, or #rrggbb")
-        ->type_name("COLOUR")
-        ->capture_default_str();
+    arguments.background_option =
+        app.add_option("--background", arguments.background,
+                       "Background colour: r,g,b in 0..1, a name such as white, #rrggbb, or a sky.json "
+                       "[that beside SPLATS, if it is there]")
+            ->type_name("COLOUR")
+            ->capture_default_str();
     const train::RunOption& kernel = train::run_option("kernel");
     arguments.kernel_option = app.add_option("--kernel", arguments.kernel, kernel.help)
                                   ->transform(one_of(kernel.choices))

@@ -49,15 +49,17 @@ struct DrawArguments {
     int sh_degree = kMaxShDegree;
     bool points = false;
     std::optional<int> nearest;
-    const CLI::Option* kernel_option = nullptr;
+    const CLI::Option *kernel_option = nullptr, *background_option = nullptr;
     std::string integrator = "splat";
     std::optional<int> samples;
 
     /// Throws InputError if the background is not a colour, or the options exclude each other.
     RenderOptions options() const;
+    bool names_background() const { return background_option && background_option->count() > 0; }
     bool names_kernel() const { return antialias || (kernel_option && kernel_option->count() > 0); }
     /// Reads splats to draw, with warnings of what is skipped. Without a kernel that is named, sets options.kernel to
-    /// that of the file: of its density, or its mark of antialiasing. Fits densities to the kernel.
+    /// that of the file: of its density, or its mark of antialiasing. Without a background that is named, a sky.json beside the
+    /// file is options.sky. Fits densities to the kernel.
     Gaussians load(const std::filesystem::path& splats, RenderOptions& options) const;
 };
 void add_draw_options(CLI::App& app, DrawArguments& arguments);

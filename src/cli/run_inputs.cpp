@@ -70,6 +70,12 @@ void use_options_of(const live::Run& run, CLI::App& app) {
         const auto value = run.config.find(name);
         if (value == run.config.end() || *value == false) continue;
         if (*value == "random") continue;  // evaluated over black
+        if (*value == "sky" && std::string_view(name) == "background") {
+            if (!core::is_file(run.folder / report::kSkyFile))
+                core::warn(core::one_line(run.folder.string()) +
+                           ": sky.json is missing; the splats are drawn over black");
+            continue;  // DrawArguments::load finds it
+        }
         if (name == std::string_view("nearest") && app.count("--points") == 0) continue;
         apply_config_value(app, name, *value, config);
     }

@@ -529,6 +529,42 @@ struct Perturb {
     gpu::BufferPart params, counts;
 };
 
+// The sky behind the splats.
+
+/// Adds the sky to an image that was blended over black.
+struct AddSky {
+    static constexpr char shader[] = "add_sky";
+    using Work = PerElement<pixels<shared::SkyPush>>;
+    gpu::BufferPart planes, camera, sky;
+};
+
+/// Gradient of AddSky by the sky, which it adds to the slot. Adds to Counts.dropped_updates.
+struct SkyGradient {
+    static constexpr char shader[] = "sky_gradient";
+    struct Work : OneSubgroup<shared::SkyGradientPush> {
+        static Groups groups(const KernelConfig& config, const Push& push) {
+            const auto blocks = [](uint32_t pixels) {
+                return (pixels + shared::SKY_BLOCK - 1) / shared::SKY_BLOCK;
+            };
+            const auto& size = push.sky.image.size;
+            return grid_of(config, uint64_t(blocks(size[0])) * blocks(size[1]));
+        }
+    };
+    gpu::BufferPart planes, image_gradient, camera, slots, counts;
+};
+
+/// Floats of a sky.
+inline uint64_t sky_floats(const shared::SkyUpdatePush& push) {
+    return uint64_t(3) * push.size * push.size;
+}
+
+/// Adam's step of the sky. before: a copy of the sky.
+struct SkyUpdate {
+    static constexpr char shader[] = "sky_update";
+    using Work = PerElement<sky_floats>;
+    gpu::BufferPart slots, before, sky, moments1, moments2, counts;
+};
+
 // Ray tracing of mesh scenes. Variant of each: SPEC_ALPHA_TESTED,
 // SPEC_COLOR_FLOATS. The number of workgroups follows from the
 // view's pixels, so record takes it.

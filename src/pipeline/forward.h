@@ -13,6 +13,7 @@ namespace ewa::pipeline {
 
 struct AppearanceUse;
 struct ExposureUse;
+struct LearnedSky;
 struct ListStart;
 struct MotionUse;
 struct Rates;
@@ -48,6 +49,9 @@ struct FramePasses : passes::Recorder {
     void loss(const gpu::Buffer& photo, bool masked = false, const ExposureUse* exposure = nullptr,
               const AppearanceUse* appearance = nullptr) const;
 
+    /// After the loss: leaves the gradient by the sky in the slot of its view in the step.
+    void sky_gradient(const LearnedSky& sky, uint32_t slot) const;
+
     /// Gradients of blending and projection. With plan.adam it moves the model; without, it writes
     /// the gradient to model.moments1.
     /// With plan.motion, the gradient of the camera's motion is in frame.motion_reduced, which must be reserved for it.
@@ -75,6 +79,7 @@ struct FramePasses : passes::Recorder {
 
   private:
     gpu::BufferPart camera() const;
+    void add_sky() const;
     gpu::SpecConstant degree() const;
     gpu::SpecConstant kernel() const { return {shared::SPEC_KERNEL, uint32_t(plan.kernel)}; }
     void mean_of_partials(uint32_t target, uint32_t rows, float scale) const;

@@ -77,7 +77,7 @@ gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passe
 
 FrameInputs inputs_of(const gpu::Buffer& block, const Camera& camera, const RenderOptions& options) {
     return {.camera = {.buffer = &block, .width = uint32_t(camera.width), .height = uint32_t(camera.height)},
-            .background = options.background,
+            .background = options.sky ? std::array<float, 3>{} : options.background,
             .sh_degree = options.sh_degree,
             .samples = uint32_t(std::max(options.samples, 1))};
 }

@@ -19,6 +19,8 @@ struct CameraUse {
     uint32_t width = 0, height = 0;       // px
 };
 
+struct SkyTexels;
+
 /// Rows of a view that a render shows. The loss counts some of them: the others are a halo, which the windows of SSIM reach.
 struct Band {
     uint32_t first = 0;                   // row of the view that is the render's first
@@ -28,7 +30,8 @@ struct Band {
 
 struct FrameInputs {
     CameraUse camera;
-    std::array<float, 3> background{0, 0, 0};
+    std::array<float, 3> background{0, 0, 0};  // black with a sky
+    const SkyTexels* sky = nullptr;            // null: none
     bool keep_overflow = false;    // the frame before may not be done: if it overflows, this one does nothing
     int sh_degree = kMaxShDegree;  // evaluated: at most this, and at most what the plan stores
     uint32_t samples = 1;          // of a ray, with Integrator::march
@@ -47,7 +50,7 @@ shared::CameraBlock camera_block(const Camera& camera, const passes::KernelConfi
 gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passes::KernelConfig& config,
                           const glm::dvec3& origin = glm::dvec3(0));
 
-/// The inputs of a frame whose camera was uploaded to `block`.
+/// The inputs of a frame whose camera was uploaded to `block`. They lack the sky.
 FrameInputs inputs_of(const gpu::Buffer& block, const Camera& camera, const RenderOptions& options);
 
 /// A training image as the loss reads it: width * height RGBA texels, 8-bit if every value is one of 256

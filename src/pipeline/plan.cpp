@@ -63,6 +63,7 @@ Plan plan_for(const PlanRequest& request) {
     plan.motion = request.motion && !request.render.points && !plan.rays();
     if (request.purpose == Purpose::training) {
         plan.adam = true;
+        plan.sky = request.sky;
         plan.packed_moments = request.packed_moments;
         plan.statistics = request.statistics;
         plan.absolute = request.statistics && request.absolute_gradients;
@@ -100,6 +101,8 @@ std::vector<PlanLine> describe(const Plan& plan, int scene_degree, uint64_t spla
             {"appearance of images, its passes and the image as shown", "not asked for (--appearance)", 0});
     if (plan.gradients && !plan.motion && !plan.points() && !plan.rays())
         lines.push_back({"gradient of the camera and its passes", "not asked for (--refine-poses)", 0});
+    if (plan.gradients && !plan.sky)
+        lines.push_back({"sky and its passes", "not asked for (--background sky)", 0});
     if (plan.points()) {
         lines.push_back({"opacities and rotations", "a sphere has none (--points)", 0});
         return lines;

@@ -33,6 +33,7 @@ struct PlanRequest {
     bool masks = false;                                  // training images in which some pixels count less
     AppearanceModel appearance = AppearanceModel::none;  // of the training images, which is learned
     bool motion = false;  // the gradient by the camera's motion; in a training it is learned
+    bool sky = false;     // in a training: it is learned
 
     // For a training.
     bool statistics = false;          // the strategy reads densification statistics
@@ -58,6 +59,7 @@ struct Plan {
     bool masks = false;
     AppearanceModel appearance = AppearanceModel::none;
     bool motion = false;  // the gradient by the camera's motion
+    bool sky = false;     // a sky that is learned
 
     bool operator==(const Plan&) const = default;
     bool points() const { return nearest > 0; }

@@ -10,6 +10,7 @@
 #include "passes/passes.h"
 #include "pipeline/backward.h"
 #include "pipeline/image_reader.h"
+#include "pipeline/sky.h"
 #include "pipeline/views.h"
 
 namespace ewa {
@@ -58,6 +59,8 @@ struct Renderer::State {
     std::vector<ScenePart> parts;  // of a scene that would take too much of the device's limit
     FrameBuffers frame;
     shared::Counts counts{};
+    std::shared_ptr<const SkyMap> sky;  // that was uploaded
+    SkyTexels sky_texels;
     gpu::Buffer packed;  // host visible; allocated at the first render_bytes
     std::vector<uint8_t> bytes;
 
@@ -89,6 +92,8 @@ struct Renderer::State {
     void submit_parts(const Plan& plan, const FrameInputs& inputs, FrameRequest size, Record then);
 
     Plan plan_of(const DrawOptions& options) const;
+    /// The sky on the device; null: none.
+    const SkyTexels* sky_of(const RenderOptions& look);
     /// then: what to record after the image.
     template <class Record>
     void submit(const Camera& camera, const Plan& plan, const RenderOptions& look, Record then);
@@ -158,7 +163,8 @@ void Renderer::State::submit_parts(const Plan& plan, const FrameInputs& inputs, 
 template <class Record>
 void Renderer::State::submit(const Camera& camera, const Plan& plan, const RenderOptions& look, Record then) {
     const gpu::Buffer block = upload_camera(*device, camera, cache.config(), model.origin);
-    const FrameInputs inputs = inputs_of(block, camera, look);
+    FrameInputs inputs = inputs_of(block, camera, look);
+    inputs.sky = sky_of(look);
     const FrameRequest size{.splats = model.splats,
                             .width = inputs.camera.width,
                             .height = inputs.camera.height,
@@ -190,6 +196,13 @@ Plan Renderer::State::plan_of(const DrawOptions& o) const {
     drawing.debug = true;
     drawing.splat_scale = o.splat_scale;
     return plan_for(drawing);
+}
+
+const SkyTexels* Renderer::State::sky_of(const RenderOptions& look) {
+    if (!look.sky) return nullptr;
+    if (look.sky != sky) sky_texels = SkyTexels(*device, *look.sky);
+    sky = look.sky;
+    return &sky_texels;
 }
 
 Rendering Renderer::State::draw(const Camera& camera, const Plan& plan, const RenderOptions& look) {
@@ -279,7 +292,9 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
     const Model model = upload_model(*device, gaussians, plan.moment_buffers(), false);
     const gpu::Buffer block = upload_camera(*device, camera, cache.config(), model.origin);
     const gpu::Buffer photo = upload_photo(*device, target);
-    const FrameInputs inputs = inputs_of(block, camera, options);
+    const SkyTexels sky = options.sky ? SkyTexels(*device, *options.sky) : SkyTexels();
+    FrameInputs inputs = inputs_of(block, camera, options);
+    if (options.sky) inputs.sky = &sky;
     const FrameRequest size{.splats = model.splats,
                             .width = inputs.camera.width,
                             .height = inputs.camera.height,

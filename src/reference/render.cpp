@@ -5,6 +5,7 @@
 #include "reference/points.h"
 #include "reference/projection.h"
 #include "reference/rays.h"
+#include "reference/sky.h"
 
 namespace ewa::reference {
 
@@ -26,7 +27,10 @@ Rendered render(const Values& values, const Camera& camera, const RenderOptions&
     out.order = depth_order(out.projected);
     const TileGrid grid{camera.width, camera.height, reference.tile_width, reference.tile_height};
     out.instances = make_instances(out.projected, out.order, grid, reference.smoothing);
-    out.blended = blend(out.projected, out.instances, options.background, reference.smoothing);
+    const auto background = options.sky ? std::array<float, 3>{} : options.background;
+    out.blended = blend(out.projected, out.instances, background, reference.smoothing);
+    if (options.sky)
+        out.blended.color = over_sky(out.blended.color, out.blended.transmittance, camera, *options.sky);
     return out;
 }
 

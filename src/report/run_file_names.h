@@ -13,12 +13,12 @@ inline constexpr const char *kConfigFile = "config.json", *kMetricsFile = "metri
                             *kSplatsFile = "splats.ply", *kSummaryFile = "summary.json",
                             *kReportFile = "report.html", *kExposuresFile = "exposures.json",
                             *kAppearanceFile = "appearance.json", *kCamerasFile = "cameras.json",
-                            *kEventsFile = "events.out.tfevents.0.ewa";
+                            *kSkyFile = "sky.json", *kEventsFile = "events.out.tfevents.0.ewa";
 
 /// The files that `ewa train` writes beside its renders.
 inline constexpr std::array kRunFiles{kConfigFile,  kMetricsFile, kCheckpointFile, kTimesFile,
                                       kSplatsFile,  kSummaryFile, kReportFile,     kExposuresFile,
-                                      kCamerasFile, kEventsFile,  kAppearanceFile};
+                                      kCamerasFile, kEventsFile,  kAppearanceFile, kSkyFile};
 
 /// The COLMAP model of the refined cameras.
 inline constexpr std::array kCameraModelFiles{"cameras/sparse/0/cameras.bin", "cameras/sparse/0/images.bin",

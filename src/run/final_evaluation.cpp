@@ -155,9 +155,10 @@ bool FinalEvaluation::add_section() {
     if (!input_.options.report_section) return true;
     return done_unless_stopped([&] {
         const int first = saved_frames(input_.split).front();
-        report_.section = input_.options.report_section({scene_.device, scene_.gaussians,
-                                                         input_.dataset.frames[size_t(first)].camera,
-                                                         input_.options.train.render});
+        RenderOptions look = input_.options.train.render;
+        look.sky = scene_.sky;
+        report_.section = input_.options.report_section(
+            {scene_.device, scene_.gaussians, input_.dataset.frames[size_t(first)].camera, look});
     });
 }
 

@@ -29,6 +29,7 @@ struct TrainedScene {
     std::shared_ptr<gpu::Device> device;
     Gaussians gaussians;
     std::vector<Appearance> appearances;  // of the training frames, or empty
+    std::shared_ptr<const SkyMap> sky;    // null: none
     ViewRenderer renderer;
 };
 

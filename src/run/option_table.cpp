@@ -227,18 +227,20 @@ RunOption inria_option() {
 RunOption background_option() {
     RunOption option{
         "background", "COLOUR",
-        "Colour behind the splats: r,g,b in 0..1, a name such as white, #rrggbb, or random (a new one each "
-        "step)",
+        "Colour behind the splats: r,g,b in 0..1, a name such as white, #rrggbb, random (a new one each "
+        "step), or sky (light from far away that is learned, by direction)",
         kDecides};
     option.get = [](const RunOptions& options) {
         const auto& [r, g, b] = options.train.render.background;
+        if (options.train.sky) return std::string("sky");
         return options.train.random_background ? "random" : fmt::format("{},{},{}", r, g, b);
     };
     option.set = [](RunOptions& options, const std::string& text) {
-        const bool random = text == "random";
-        const auto colour = random ? std::optional(std::array<float, 3>{}) : core::parse_colour(text);
+        const bool random = text == "random", sky = text == "sky";
+        const auto colour = random || sky ? std::optional(std::array<float, 3>{}) : core::parse_colour(text);
         if (!colour) throw InputError(core::not_a_colour(text));
         options.train.random_background = random;
+        options.train.sky = sky;
         options.train.render.background = *colour;
     };
     return option;

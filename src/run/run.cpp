@@ -124,7 +124,8 @@ class Run {
     Evaluation evaluate(Trainer& trainer);
     void log(const std::optional<Evaluation>& evaluation);
     bool draws_with_ranks() const { return options().ranks->size() > 1; }
-    train::ViewRenderer view_renderer(const Gaussians& gaussians, const Trainer* trainer) const;
+    train::ViewRenderer view_renderer(const Gaussians& gaussians, std::shared_ptr<const SkyMap> sky,
+                                      const Trainer* trainer) const;
     train::TrainedScene save_last(std::unique_ptr<Trainer>& trainer);
     void finish(std::unique_ptr<Trainer> trainer);
     void fill_summary();
@@ -307,8 +308,8 @@ Evaluation Run::evaluate(Trainer& trainer) {
         cameras_.align_test(device_, gaussians, {});
     }
     Evaluation evaluation = train::evaluate_views(
-        view_renderer(gaussians, &trainer), input_.dataset, input_.split.test, options().train.render,
-        train::for_new_views(trainer.appearances(), input_.split.test.size()),
+        view_renderer(gaussians, trainer.sky(), &trainer), input_.dataset, input_.split.test,
+        options().train.render, train::for_new_views(trainer.appearances(), input_.split.test.size()),
         [&] { trainer.keep_waiting(); }, [](size_t, const train::RenderedView&, const EvalFrame&) {},
         measures_);
     cameras_.use_given();
@@ -362,8 +363,11 @@ void Run::train(Trainer& trainer) {
 }
 
 /// By all ranks from their shares; or by a renderer, without the trainer.
-train::ViewRenderer Run::view_renderer(const Gaussians& gaussians, const Trainer* trainer) const {
-    if (!draws_with_ranks()) return train::view_renderer_of(device_, gaussians, options().train.render);
+train::ViewRenderer Run::view_renderer(const Gaussians& gaussians, std::shared_ptr<const SkyMap> sky,
+                                       const Trainer* trainer) const {
+    RenderOptions look = options().train.render;
+    look.sky = std::move(sky);
+    if (!draws_with_ranks()) return train::view_renderer_of(device_, gaussians, look);
     return {size_t(options().ranks->size()),
             [trainer](std::span<const Camera> cameras) { return trainer->render(cameras); }};
 }
@@ -384,7 +388,7 @@ void Run::fill_summary() {
 /// Saves the result. Gives back the trainer's memory if no rank draws with it.
 train::TrainedScene Run::save_last(std::unique_ptr<Trainer>& trainer) {
     const StepReport& last = progress_.last;
-    train::TrainedScene scene{device_, trainer->gaussians(), trainer->appearances(), {}};
+    train::TrainedScene scene{device_, trainer->gaussians(), trainer->appearances(), trainer->sky(), {}};
     saves_.last_checkpoint(*trainer);  // from here on, neither a kill nor a full disk costs training
     saves_.splats(scene.gaussians);
     if (options().save_every > 0 && last.step % options().save_every == 0)
@@ -397,6 +401,7 @@ train::TrainedScene Run::save_last(std::unique_ptr<Trainer>& trainer) {
     if (options().inria) train::save_inria(folder_.path(), input_, scene.gaussians, last.step);
     if (!scene.appearances.empty())
         folder_.save_appearances(input_.dataset, input_.split.train, scene.appearances);
+    folder_.save_sky(scene.sky);
     report_.times = report_times(trainer->step_times());
     report_.summary.ranks = trainer->rank_figures();
     report_.summary.chunks = trainer->chunk_figures();
@@ -404,7 +409,7 @@ train::TrainedScene Run::save_last(std::unique_ptr<Trainer>& trainer) {
     if (options().train.device_memory_bytes > 0)
         device_->limit_memory(options().train.device_memory_bytes, {});
     observer_.on_saved(last);
-    scene.renderer = view_renderer(scene.gaussians, trainer.get());
+    scene.renderer = view_renderer(scene.gaussians, scene.sky, trainer.get());
     return scene;
 }
 

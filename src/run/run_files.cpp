@@ -121,6 +121,10 @@ void RunFolder::save_appearances(const Dataset& dataset, const std::vector<int>&
     core::write_json(path_ / report::kExposuresFile, json);
 }
 
+void RunFolder::save_sky(const std::shared_ptr<const SkyMap>& sky) const {
+    if (sky) ewa::save_sky(path_ / report::kSkyFile, *sky);
+}
+
 namespace {
 
 /// The camera of the frame's file, as the frame's pinhole camera was refined.

@@ -3,6 +3,7 @@
 #pragma once
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
@@ -11,6 +12,7 @@
 #include "core/folders.h"
 #include "ewa/appearance.h"
 #include "ewa/run_options.h"
+#include "ewa/sky_map.h"
 #include "ewa/summary.h"
 #include "report/html.h"
 #include "report/run_file_names.h"
@@ -52,6 +54,8 @@ class RunFolder {
     /// exposures.json, or appearance.json. appearances: one for each of the training frames.
     void save_appearances(const Dataset& dataset, const std::vector<int>& frames,
                           const std::vector<Appearance>& appearances) const;
+    /// sky.json. sky: null: nothing.
+    void save_sky(const std::shared_ptr<const SkyMap>& sky) const;
     /// cameras.json, and a COLMAP model of the dataset with these cameras in cameras/, where images is a link. The frames have
     /// the refined cameras. given: those of the dataset. aligned: the test cameras were aligned to their images.
     void save_cameras(const Dataset& dataset, const Split& split, const std::vector<Camera>& given,

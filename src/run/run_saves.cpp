@@ -61,6 +61,7 @@ void RunSaves::result(const Trainer& trainer, bool kept) {
     const Gaussians gaussians = trainer.gaussians();
     splats(gaussians);
     if (kept) kept_splats(gaussians);
+    folder_.save_sky(trainer.sky());
     if (!cameras_.refine()) return;
     cameras_.use_refined(trainer);
     cameras_.save(folder_, false);

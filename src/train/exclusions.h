@@ -39,7 +39,11 @@ inline constexpr std::array kExclusions{
                   return model != AppearanceModel::none && model != AppearanceModel::automatic;
               },
               {false, false, true, false},
-              "an appearance learns from the whole picture of its view"}};
+              "an appearance learns from the whole picture of its view"},
+    Exclusion{"--background sky",
+              [](const TrainOptions& options) { return options.sky; },
+              {false, false, true, false},
+              "the sky learns from the whole picture of a view"}};
 
 inline bool has_points(const TrainOptions& options) {
     return options.render.points;
@@ -56,6 +60,11 @@ inline constexpr std::array kPointExclusions{
     core::Exclusion<TrainOptions>{"--points", has_points, core::Relation::excludes, "--refine-poses",
                                   [](const TrainOptions& options) { return options.refine_poses; },
                                   "spheres have no gradient by the camera"}};
+
+inline constexpr std::array kSkyExclusions{core::Exclusion<TrainOptions>{
+    "--background sky", [](const TrainOptions& options) { return options.sky; }, core::Relation::excludes,
+    "--refine-poses", [](const TrainOptions& options) { return options.refine_poses; },
+    "a camera has no gradient by the sky"}};
 
 /// Throws InputError if options exclude what divides the training.
 void check_exclusions(const TrainOptions& options, int ranks);

@@ -57,6 +57,7 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
             .masks = masks,
             .appearance = appearance_of(options),
             .motion = options.refine_poses,
+            .sky = options.sky,
             .statistics = options.strategy == Strategy::adc,
             .absolute_gradients = options.absolute_gradients,
             .packed_moments = options.moment_bits == 16,
@@ -81,6 +82,7 @@ void check_training(const TrainOptions& options, int ranks) {
     check_exclusions(options, ranks);
     scene::check_look({.render = options.render});
     core::check_exclusions(kPointExclusions, options);
+    core::check_exclusions(kSkyExclusions, options);
     if (options.exposure && options.appearance != AppearanceModel::none &&
         options.appearance != AppearanceModel::automatic && options.appearance != AppearanceModel::affine)
         throw InputError("--exposure is --appearance affine: name one of them");
@@ -129,6 +131,10 @@ double Schedule::mean_rate(int step, double extent) const {
 
 double Schedule::exposure_rate(int step) const {
     return decayed(exposures_rate, exposures_rate_final, double(step) / steps);
+}
+
+double Schedule::sky_rate(int step) const {
+    return decayed(skies_rate, skies_rate_final, double(step) / steps);
 }
 
 double Schedule::appearance_rate(int step) const {
@@ -194,6 +200,8 @@ Schedule schedule_for(const TrainOptions& options, size_t photos) {
     s.exposures_rate_final = options.exposure_rate_final;
     s.poses_rate = options.pose_rate;
     s.poses_rate_final = options.pose_rate_final;
+    s.skies_rate = options.sky_rate;
+    s.skies_rate_final = options.sky_rate_final;
     // Published rates are those of values that take a step of Adam with every image. Here they take one with their own, and
     // Adam divides a gradient that is there in one of n steps by its mean square's root, which is sqrt(n) times smaller.
     s.cameras_rate = options.appearance_rate;

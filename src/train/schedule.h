@@ -41,6 +41,7 @@ struct Schedule {
     int fade_start = 0;  // the step after which the rates fade; 0: they do not
     double exposures_rate = 0, exposures_rate_final = 0;
     double poses_rate = 0, poses_rate_final = 0;
+    double skies_rate = 0, skies_rate_final = 0;
     double appearances_rate = 0, cameras_rate = 0;  // of PPISP or grids of photos, and of PPISP of cameras
     double appearance_warm_up = 0;                  // share of the steps
 
@@ -65,8 +66,9 @@ struct Schedule {
     /// Learning rate of the means without gain: exponential from means_rate to means_rate_final over the run (Plenoxels'
     /// decay, as 3DGS uses it), times the scene extent.
     double mean_rate(int step, double extent) const;
-    /// Learning rate of the exposures, with the same decay.
+    /// Learning rate of the exposures, with the same decay, and of the sky.
     double exposure_rate(int step) const;
+    double sky_rate(int step) const;
     /// Learning rate of a photo's PPISP or grid, and of a camera's PPISP: both rise from a hundredth and fall exponentially
     /// to a hundredth, with gain.
     double appearance_rate(int step) const;

@@ -205,6 +205,11 @@ std::vector<Appearance> Trainer::appearances() const {
     const pipeline::Appearances& learned = training_->learned().appearances;
     return learned.model == AppearanceModel::none ? std::vector<Appearance>() : learned.download();
 }
+std::shared_ptr<const SkyMap> Trainer::sky() const {
+    training_->finish_all();
+    if (!training_->plan().sky) return nullptr;
+    return std::make_shared<const SkyMap>(training_->learned().sky.download());
+}
 std::vector<CameraMotion> Trainer::camera_motions() const {
     training_->finish_all();
     return training_->plan().motion ? training_->learned().motions.download() : std::vector<CameraMotion>();

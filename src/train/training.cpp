@@ -69,6 +69,11 @@ std::vector<Learned::Array> Learned::arrays() {
                                            {"app_moments1", &appearances.moments1},
                                            {"app_moments2", &appearances.moments2}})
             arrays.push_back({name, buffer, appearances.bytes()});
+    if (sky.size > 0)
+        for (const auto& [name, buffer] : {std::pair{"sky", &sky.values},
+                                           {"sky_moments1", &sky.moments1},
+                                           {"sky_moments2", &sky.moments2}})
+            arrays.push_back({name, buffer, sky.bytes()});
     if (motions.photos > 0) {
         for (const auto& [name, buffer] : {std::pair{"motions", &motions.values},
                                            {"motion_moments1", &motions.moments1},
@@ -132,6 +137,7 @@ Training::Training(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
             Appearances(*device_, plan_.appearance, cameras_of(dataset, frames), uint32_t(options.batch));
     if (plan_.appearance == AppearanceModel::ppisp)
         learned_.appearances.set_exposures(first_exposures(dataset, frames));
+    if (plan_.sky) learned_.sky = LearnedSky(*device_, uint32_t(options.batch));
     if (plan_.motion) {
         std::vector<MotionBasis> bases;
         for (const int index : frames)

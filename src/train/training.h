@@ -19,6 +19,7 @@
 #include "pipeline/appearances.h"
 #include "pipeline/backward.h"
 #include "pipeline/frame_buffers.h"
+#include "pipeline/sky.h"
 #include "pipeline/strategy.h"
 #include "portions/portions.h"
 #include "portions/step.h"
@@ -50,6 +51,7 @@ struct Learned {
     pipeline::Exposures exposures;
     pipeline::Appearances appearances;
     pipeline::Motions motions;
+    pipeline::LearnedSky sky;
 
     std::vector<Array> arrays();  // of a state
 };
@@ -121,7 +123,11 @@ class Training {
     pipeline::FrameRequest request_of(const pipeline::CameraUse& camera) const;
     /// slot: of the view in the step.
     portions::StepView view_of(int step, ImageCache& seen, int sh_degree, uint32_t slot = 0);
-    void update_cameras(int first, int last);
+    /// What is learned of all views of a step together. Every rank has their gradients.
+    void update_learned(int first, int last);
+    void record_update_sky(const passes::Recorder& on, int first, int last, uint32_t capacity);
+    /// The sky that is drawn; null: none.
+    const pipeline::SkyTexels* sky() const { return plan_.sky ? &learned_.sky : nullptr; }
 
     /// All that changes from step to step is a pure function of the step's number: a step can be repeated.
     void record_fused(gpu::Recording& recording, int step, size_t index, const portions::StepView& view);
@@ -140,6 +146,10 @@ class Training {
     void optimise(int first, int last);
     void optimise_several(int first, int last);
     portions::StepParts step_parts();
+    /// What a view of a step learns, for other ranks.
+    std::vector<uint64_t> words_of(uint32_t photo, uint32_t slot) const;
+    void set_words(uint32_t photo, uint32_t slot, std::span<const uint64_t> words);
+    size_t words_of_appearance() const;
     /// The image through the camera of this rank's number; without pixels if there is none.
     Image render_own(std::span<const Camera> cameras);
 

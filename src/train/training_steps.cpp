@@ -95,6 +95,7 @@ void Training::record_fused(gpu::Recording& recording, int step, size_t index,
     const auto photo = uint32_t(index);
     record_cameras_update(on, learned_.appearances, tools_.frame, std::span(&photo, 1),
                           float(schedule_.camera_rate(step)), tools_.frame.instance_capacity);
+    if (plan_.sky) record_update_sky(on, step, step, tools_.frame.instance_capacity);
     on.backward(model, sorted, rates(step), plan_.motion ? &motion : nullptr);
     if (options_.strategy == Strategy::mcmc) record_noise(on, model, tools_.frame, noise(step));
 }
@@ -168,6 +169,7 @@ portions::StepView Training::view_of(int step, ImageCache& seen, int sh_degree, 
     const FrameInputs inputs{.camera = camera,
                              .background = options_.random_background ? random_background(step, options_.seed)
                                                                       : options_.render.background,
+                             .sky = sky(),
                              .sh_degree = sh_degree};
     const ExposureUse exposure{&learned_.exposures, uint32_t(index), float(schedule_.exposure_rate(step)),
                                visit_of(step)};
@@ -176,29 +178,50 @@ portions::StepView Training::view_of(int step, ImageCache& seen, int sh_degree, 
     const bool affine = plan_.appearance == AppearanceModel::affine;
     const bool learned = learned_.appearances.model != AppearanceModel::none;
     const auto weight = std::make_shared<double>(1);
-    return {.inputs = inputs,
-            .request = request_of(camera),
-            .record_loss =
-                [exposure, appearance, affine, learned, weight, index, &seen](const FramePasses& on) {
-                    const auto& photo = seen.photo(index);
-                    *weight = photo.weight;
-                    on.loss(photo.texels, photo.masked, affine ? &exposure : nullptr,
-                            learned ? &appearance : nullptr);
-                },
-            .weight = [weight] { return *weight; },
-            .learned =
-                [this, index, slot, affine] {
-                    if (!affine) return learned_.appearances.words(uint32_t(index), slot);
-                    const auto words = learned_.exposures.words(uint32_t(index));
-                    return std::vector<uint64_t>(words.begin(), words.end());
-                },
-            .learn =
-                [this, index, slot, affine](std::span<const uint64_t> words) {
-                    if (affine)
-                        learned_.exposures.set(uint32_t(index), words);
-                    else
-                        learned_.appearances.set(uint32_t(index), slot, words);
-                }};
+    return {
+        .inputs = inputs,
+        .request = request_of(camera),
+        .record_loss =
+            [this, exposure, appearance, affine, learned, weight, index, slot, &seen](const FramePasses& on) {
+                const auto& photo = seen.photo(index);
+                *weight = photo.weight;
+                on.loss(photo.texels, photo.masked, affine ? &exposure : nullptr,
+                        learned ? &appearance : nullptr);
+                if (plan_.sky) on.sky_gradient(learned_.sky, slot);
+            },
+        .weight = [weight] { return *weight; },
+        .learned = [this, index, slot] { return words_of(uint32_t(index), slot); },
+        .learn = [this, index,
+                  slot](std::span<const uint64_t> words) { set_words(uint32_t(index), slot, words); }};
+}
+
+/// What a view learns: its appearance, then its gradient by the sky.
+std::vector<uint64_t> Training::words_of(uint32_t photo, uint32_t slot) const {
+    std::vector<uint64_t> words;
+    if (plan_.appearance == AppearanceModel::affine) {
+        const auto own = learned_.exposures.words(photo);
+        words.assign(own.begin(), own.end());
+    } else if (plan_.appearance != AppearanceModel::none) {
+        words = learned_.appearances.words(photo, slot);
+    }
+    if (!plan_.sky) return words;
+    const std::vector<uint64_t> of_sky = learned_.sky.words(slot);
+    words.insert(words.end(), of_sky.begin(), of_sky.end());
+    return words;
+}
+
+void Training::set_words(uint32_t photo, uint32_t slot, std::span<const uint64_t> words) {
+    const size_t appearance = words_of_appearance();
+    if (plan_.appearance == AppearanceModel::affine)
+        learned_.exposures.set(photo, words.first(appearance));
+    else if (appearance > 0)
+        learned_.appearances.set(photo, slot, words.first(appearance));
+    if (plan_.sky) learned_.sky.set(slot, words.subspan(appearance));
+}
+
+size_t Training::words_of_appearance() const {
+    if (plan_.appearance == AppearanceModel::affine) return std::tuple_size_v<Exposures::Words>;
+    return plan_.appearance == AppearanceModel::none ? 0 : learned_.appearances.words_of_view();
 }
 
 void Training::optimise_several(int first, int last) {
@@ -213,7 +236,7 @@ void Training::optimise_several(int first, int last) {
     Noise of_noise = noise(last);
     of_noise.amplitude *= float(std::sqrt(double(views.size())));
     portions::StepSums drawn = several_.draw(parts, views);
-    update_cameras(first, last);
+    update_learned(first, last);
     several_.update(
         parts, batch_rates(of_step), sh_degree,
         [&](const passes::Recorder& on, const Model& moved) {
@@ -224,16 +247,24 @@ void Training::optimise_several(int first, int last) {
     log_.add(drawn);
 }
 
-/// The cameras' part of a step of several views. Every rank has the gradients of all of them.
-void Training::update_cameras(int first, int last) {
-    if (plan_.appearance != AppearanceModel::ppisp) return;
+void Training::update_learned(int first, int last) {
+    constexpr uint32_t kAnyInstances = std::numeric_limits<uint32_t>::max();
+    if (plan_.appearance != AppearanceModel::ppisp && !plan_.sky) return;
     std::vector<uint32_t> photos;
     for (int step = first; step <= last; ++step) photos.push_back(uint32_t(index_of(step)));
     gpu::Recording recording(device_->limits());
+    const passes::Recorder on{recording, tools_.cache};
     const double rate = schedule_.camera_rate(last) * std::sqrt(double(photos.size()));
-    record_cameras_update({recording, tools_.cache}, learned_.appearances, tools_.frame, photos, float(rate),
-                          std::numeric_limits<uint32_t>::max());
+    record_cameras_update(on, learned_.appearances, tools_.frame, photos, float(rate), kAnyInstances);
+    if (plan_.sky) record_update_sky(on, first, last, kAnyInstances);
     tools_.executor.run(recording);
+}
+
+void Training::record_update_sky(const passes::Recorder& on, int first, int last, uint32_t capacity) {
+    const auto views = uint32_t(last - first + 1);
+    const double rate = schedule_.sky_rate(last) * std::sqrt(double(views));
+    record_sky_update(on, learned_.sky, tools_.frame, views, float(rate),
+                      uint32_t((first - 1) / options_.batch + 1), capacity);
 }
 
 portions::StepParts Training::step_parts() {
@@ -243,9 +274,7 @@ portions::StepParts Training::step_parts() {
             tools_.frame,
             tools_.instance_capacity,
             [this] { log_.add_passes(tools_.executor.timings()); },
-            plan_.appearance == AppearanceModel::none     ? 0
-            : plan_.appearance == AppearanceModel::affine ? std::tuple_size_v<Exposures::Words>
-                                                          : learned_.appearances.words_of_view()};
+            words_of_appearance() + (plan_.sky ? learned_.sky.words_of_view() : 0)};
 }
 
 Image Training::render_own(std::span<const Camera> cameras) {
@@ -254,7 +283,8 @@ Image Training::render_own(std::span<const Camera> cameras) {
         blocks.push_back(upload_camera(*device_, camera, tools_.cache.config(), portions_.origin()));
     std::vector<portions::StepView> views;
     for (size_t i = 0; i < cameras.size(); ++i) {
-        const FrameInputs inputs = inputs_of(blocks[i], cameras[i], options_.render);
+        FrameInputs inputs = inputs_of(blocks[i], cameras[i], options_.render);
+        inputs.sky = sky();
         views.push_back({.inputs = inputs,
                          .request = request_of(inputs.camera),
                          .record_loss = {},

@@ -194,7 +194,9 @@ Startup open(const Arguments& arguments) {
     look.points = startup.scene.look.points && !arguments.antialias;
     look.nearest = startup.scene.look.nearest;
     look.background = startup.scene.look.background;
+    look.sky = startup.scene.look.sky;
     if (arguments.background.empty()) return startup;
+    look.sky.reset();
     const auto background = core::parse_colour(arguments.background);
     if (!background) throw InputError("--background: " + core::not_a_colour(arguments.background));
     look.background = *background;

@@ -9,6 +9,7 @@
 #include "core/words.h"
 #include "ewa/capture.h"
 #include "ewa/error.h"
+#include "ewa/sky_map.h"
 #include "ewa/splat_files.h"
 #include "ewa/synthetic_dataset.h"
 #include "io/datasets/refined_cameras.h"
@@ -53,6 +54,13 @@ std::shared_ptr<const Dataset> load_cameras(const fs::path& path, DatasetOptions
 
 Look look_of(const live::Run& run) {
     Look look;
+    const fs::path sky = run.folder / report::kSkyFile;
+    try {
+        if (run.text("background") == "sky" && core::is_file(sky))
+            look.sky = std::make_shared<const SkyMap>(load_sky(sky));
+    } catch (const InputError&) {
+        // The splats are shown over black.
+    }
     look.kernel = core::find_value(scene::kKernelWords, run.text("kernel")).value_or(look.kernel);
     look.points = run.flag("points");
     const auto nearest = run.config.find("nearest");

@@ -52,7 +52,9 @@ void show_facts(const PanelFacts& facts) {
 /// What the colours of the mode mean, or the background behind them.
 void edit_background(const PanelFacts& facts, Look& look) {
     const bool shown = facts.picture && facts.picture->request.look.mode == look.mode;
-    if (look.mode == Mode::color || look.mode == Mode::ellipsoids)
+    if ((look.mode == Mode::color || look.mode == Mode::ellipsoids) && look.sky)
+        ImGui::TextUnformatted("background: the run's sky");
+    else if (look.mode == Mode::color || look.mode == Mode::ellipsoids)
         ImGui::ColorEdit3("background", look.background.data(), ImGuiColorEditFlags_NoInputs);
     else if (look.mode == Mode::depth && shown)
         text_row("dark %.4g to white %.4g", double(facts.picture->picture.dark),

@@ -19,6 +19,7 @@ RenderOptions options_of(const Look& look) {
     RenderOptions options{look.background, look.kernel, look.sh_degree};
     options.points = look.points;
     options.nearest = look.nearest;
+    options.sky = look.sky;
     return options;
 }
 

@@ -37,6 +37,7 @@ void ViewSession::adopt(OpenedScene opened, std::optional<int> frame) {
     look.points = scene.look.points;
     look.nearest = scene.look.nearest;
     look.background = scene.look.background;
+    look.sky = scene.look.sky;
     look.sh_degree = scene.sh_degree;
     state_.message.note.clear();
     if (!scene.remark.empty()) state_.say(scene.remark);

@@ -2,10 +2,13 @@
 // The folder of a training run in the place of splats and of a dataset.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "cli/expect.h"
 #include "ewa/image.h"
+#include "ewa/sky_map.h"
 #include "ewa/splat_files.h"
 
 namespace {
@@ -170,6 +173,54 @@ TEST_F(Runs, EvalAndRenderUseTheAppearances) {
     EXPECT_NE((chosen.out + chosen.err).find("appearance none: "), std::string::npos) << chosen.out;
     write_file(folder / "bad.json", "{\"model\": \"ppisp\", \"images\": 3}");
     expect_failure(run_ewa({"eval", run, "--exposures", folder / "bad.json"}), 2, "bad.json");
+}
+
+TEST_F(Runs, EvalRenderAndCompareUseTheSky) {
+    const auto trained = [&](const std::string& name, const Names& more) {
+        Names all{"train",   folder / "data", "-o", folder / name,  "--init", folder / "s.ply",
+                  "--quiet", "--steps",       "30", "--background", "sky",    "--test-every",
+                  "2"};
+        all.insert(all.end(), more.begin(), more.end());
+        expect_success(run_ewa(all));
+        return folder / name;
+    };
+    const std::string run = trained("run", {"--save-every", "20"});
+    const SkyMap sky = load_sky(run + "/sky.json");
+    EXPECT_NE(*std::ranges::max_element(sky.texels), *std::ranges::min_element(sky.texels));
+    const double of_run = read_json(run + "/summary.json")["test_psnr"];
+    const auto psnr = [&](const std::string& splats, const Names& more) {
+        Names all{"eval", splats, "--json", folder / "e.json"};
+        all.insert(all.end(), more.begin(), more.end());
+        expect_success(run_ewa(all));
+        return read_json(folder / "e.json")["psnr"].get<double>();
+    };
+    EXPECT_NEAR(psnr(run, {}), of_run, 1e-6);
+    EXPECT_NEAR(psnr(run + "/splats.ply", {}), of_run, 1e-6);
+    EXPECT_GT(std::abs(of_run - psnr(run, {"--background", "0,0,0"})), 0.5);
+    fs::copy(run + "/splats.ply", folder / "alone.ply");
+    const std::string alone = folder / "alone.ply";
+    EXPECT_NEAR(psnr(alone, {run, "--test-every", "2", "--background", run + "/sky.json"}), of_run, 1e-6);
+    expect_success(run_ewa({"render", run, "--format", "exr", "-o", folder / "views"}));
+    expect_success(run_ewa({"compare", run, folder / "views", "--max-error", "1e-5"}));
+    // Each of two runs has its own.
+    const std::string other = trained("other", {"--sky-rate", "1e-9"});
+    expect_success(run_ewa({"compare", run, run, "--max-error", "0"}));
+    EXPECT_EQ(run_ewa({"compare", run, other, "--max-error", "0.1"}).status, 1);
+
+    expect_failure(run_ewa({"eval", alone, run, "--background", "sky"}), 2, "only ewa train takes sky");
+    expect_failure(
+        run_ewa({"train", folder / "data", "-o", folder / "t", "--background", "sky", "--refine-poses"}), 2,
+        "--background sky and --refine-poses exclude each other");
+    write_file(folder / "sky.json", R"({"size": 2, "texels": [1, 2]})");
+    expect_failure(run_ewa({"render", alone, "-o", folder / "a.png"}), 2,
+                   "sky.json: \"texels\" are not 12 finite numbers");
+    write_file(folder / "sky.json", R"({"size": 2000})");
+    expect_failure(run_ewa({"render", alone, "-o", folder / "a.png"}), 2,
+                   "sky.json: \"size\" is not a number from 1 to 1024");
+    fs::remove(run + "/sky.json");
+    const Outcome without = run_ewa({"render", run, "--frames", "0", "-o", folder / "b.png"});
+    EXPECT_EQ(without.status, 0);
+    EXPECT_NE(without.err.find("sky.json is missing"), std::string::npos) << without.err;
 }
 
 TEST_F(Runs, EvalRenderAndGradUseTheRefinedCameras) {
@@ -428,7 +479,7 @@ TEST_F(Runs, FilesOfARunStayWhole) {
     };
     const std::string reason = "is a file of the training run in " + run;
     for (const char* file : {"config.json", "checkpoint.ewa", "times.json", "summary.json", "metrics.jsonl",
-                             "splats.ply", "report.html", "exposures.json", "cameras.json"})
+                             "splats.ply", "report.html", "exposures.json", "cameras.json", "sky.json"})
         refused({"eval", run, "--json", run + "/" + file}, reason);
     refused({"grad", run, "--frame", "0", "-o", folder / "x.ply", "--json", run + "/summary.json"}, reason);
     refused({"compare", run, other, "--json", run + "/metrics.jsonl"}, reason);

@@ -164,6 +164,9 @@ void compile_training(Compiler& compiler) {
     compiler.compile<passes::GridSliceBackward>();
     compiler.compile<passes::GridGradient>();
     compiler.compile<passes::GridUpdate>();
+    compiler.compile<passes::AddSky>();
+    compiler.compile<passes::SkyGradient>();
+    compiler.compile<passes::SkyUpdate>();
     compiler.compile<passes::MoveCamera>();
     compiler.compile<passes::MotionUpdate>();
     compiler.compile<passes::DensifyDecide>();

@@ -129,6 +129,13 @@ void check_scene(const std::map<std::string, Appearance>& appearances) {
         }
     }
 }
+#elif defined(EWA_READ_SKY)
+void check_scene(const SkyMap& sky) {
+    const std::string text = "a sky of " + std::to_string(sky.size);
+    EWA_REQUIRE(sky.size >= 1 && sky.size <= kMostSkyTexels);
+    EWA_REQUIRE(sky.texels.size() == size_t(3) * size_t(sky.size) * size_t(sky.size));
+    for (const float value : sky.texels) EWA_REQUIRE(std::isfinite(value));
+}
 #elif defined(EWA_READ_EXPOSURES)
 void check_scene(const std::map<std::string, Exposure>& exposures) {
     const std::string text = std::to_string(exposures.size()) + " exposures";

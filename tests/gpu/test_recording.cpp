@@ -15,6 +15,7 @@
 #include "passes/shader_code.h"
 #include "pipeline/appearances.h"
 #include "pipeline/backward.h"
+#include "pipeline/sky.h"
 #include "pipeline/strategy.h"
 #include "pipeline/views.h"
 
@@ -407,6 +408,7 @@ struct FrameParts {
     pipeline::Exposures exposures;
     pipeline::Appearances ppisp, grids;
     pipeline::Motions motions;
+    pipeline::LearnedSky sky;
     pipeline::ViewBuffers views;
 };
 SharedByTests<FrameParts>* const frame_parts = SharedByTests<FrameParts>::add();
@@ -425,11 +427,12 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     Rig& r = rig();
     const Scene scene = random_scene(3000, 50, SplatKind::ordinary, 61, 47, 2);
     FrameParts& parts = frame_parts->get([] { return FrameParts(); });
-    auto& [model, frame, wide, camera, photo, exposures, ppisp, grids, motions, views] = parts;
+    auto& [model, frame, wide, camera, photo, exposures, ppisp, grids, motions, sky, views] = parts;
     exposures = pipeline::Exposures(*device(), 3);
     const pipeline::ExposureUse exposure{&exposures, 1, 0.01f, 1};
     ppisp = pipeline::Appearances(*device(), AppearanceModel::ppisp, {0, 1, 0}, 2);
     grids = pipeline::Appearances(*device(), AppearanceModel::grid, {0, 0}, 1);
+    sky = pipeline::LearnedSky(*device(), 1);
     motions = pipeline::Motions(*device(), std::vector<pipeline::MotionBasis>(3));
     const pipeline::MotionUse motion{.motions = &motions, .photo = 1};
     model = pipeline::upload_model(*device(), scene.gaussians, 2, true);
@@ -479,6 +482,17 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
         record_cameras_update(shown, *each, frame, photos, 0.01f, frame.instance_capacity);
     }
     out.push_back(appearance.commands());
+
+    // A sky that is learned.
+    gpu::Recording behind = r.recording();
+    pipeline::FrameInputs over_sky = inputs;
+    over_sky.sky = &sky;
+    const pipeline::FramePasses under_sky{{behind, r.cache}, plan, frame, over_sky};
+    under_sky.forward(model);
+    under_sky.loss(photo);
+    under_sky.sky_gradient(sky, 0);
+    record_sky_update(under_sky, sky, frame, 1, 0.01f, 1, frame.instance_capacity);
+    out.push_back(behind.commands());
 
     // A step of two views. The sums have room for both.
     request.motion = false;

@@ -387,17 +387,18 @@ TEST(Plan, OfATrainingHasWhatItsStrategyAndItsImagesNeed) {
     PlanRequest request = request_for(Purpose::training);
     const Plan plain = plan_for(request);
     EXPECT_TRUE(plain.gradients && plain.adam);
-    EXPECT_FALSE(plain.statistics || plain.absolute || plain.regularised || plain.masks || plain.motion);
+    EXPECT_FALSE(plain.statistics || plain.absolute || plain.regularised || plain.masks || plain.motion ||
+                 plain.sky);
     EXPECT_EQ(plain.stored_degree, 3);
     request.absolute_gradients = true;
     EXPECT_EQ(plan_for(request), plain);  // nobody reads them without statistics
     request.statistics = true;
     EXPECT_TRUE(plan_for(request).statistics && plan_for(request).absolute);
     request = request_for(Purpose::training);
-    request.regularised = request.masks = request.motion = true;
+    request.regularised = request.masks = request.motion = request.sky = true;
     request.appearance = AppearanceModel::ppisp;
     const Plan other = plan_for(request);
-    EXPECT_TRUE(other.regularised && other.masks && other.motion);
+    EXPECT_TRUE(other.regularised && other.masks && other.motion && other.sky);
     EXPECT_EQ(other.appearance, AppearanceModel::ppisp);
     EXPECT_FALSE(other.statistics);
 }
@@ -406,7 +407,7 @@ TEST(Plan, OfATrainingHasWhatItsStrategyAndItsImagesNeed) {
 TEST(Plan, IgnoresTheInputsOfOtherPurposes) {
     PlanRequest request = request_for(Purpose::image);
     const Plan drawn = plan_for(request);
-    request.masks = request.motion = request.statistics = request.regularised = true;
+    request.masks = request.motion = request.statistics = request.regularised = request.sky = true;
     request.appearance = AppearanceModel::grid;
     EXPECT_EQ(plan_for(request), drawn);
     request = request_for(Purpose::training);

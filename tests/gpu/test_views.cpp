@@ -191,13 +191,13 @@ TEST(ViewBatch, AListDrawsItsView) {
     }
 }
 
-struct ViewsCase {
+struct ViewBatchCase {
     Footprint kernel;
     SplatKind kind;
     size_t views;
     uint32_t bands = 1;
 };
-class ViewBatchGradient : public testing::TestWithParam<ViewsCase> {};
+class ViewBatchGradient : public testing::TestWithParam<ViewBatchCase> {};
 
 TEST_P(ViewBatchGradient, IsTheMeanOfTheViews) {
     const auto& [kernel, kind, views, bands] = GetParam();
@@ -216,14 +216,14 @@ TEST_P(ViewBatchGradient, IsTheMeanOfTheViews) {
 }
 
 INSTANTIATE_TEST_SUITE_P(ViewBatch, ViewBatchGradient,
-                         testing::Values(ViewsCase{Footprint::peak, SplatKind::ordinary, 1},
-                                         ViewsCase{Footprint::peak, SplatKind::mixed, 3},
-                                         ViewsCase{Footprint::antialias, SplatKind::mixed, 2},
-                                         ViewsCase{Footprint::density, SplatKind::ordinary, 2},
-                                         ViewsCase{Footprint::peak, SplatKind::needles, 2},
-                                         ViewsCase{Footprint::peak, SplatKind::mixed, 2, 2},
-                                         ViewsCase{Footprint::antialias, SplatKind::ordinary, 1, 3},
-                                         ViewsCase{Footprint::density, SplatKind::mixed, 2, 3}));
+                         testing::Values(ViewBatchCase{Footprint::peak, SplatKind::ordinary, 1},
+                                         ViewBatchCase{Footprint::peak, SplatKind::mixed, 3},
+                                         ViewBatchCase{Footprint::antialias, SplatKind::mixed, 2},
+                                         ViewBatchCase{Footprint::density, SplatKind::ordinary, 2},
+                                         ViewBatchCase{Footprint::peak, SplatKind::needles, 2},
+                                         ViewBatchCase{Footprint::peak, SplatKind::mixed, 2, 2},
+                                         ViewBatchCase{Footprint::antialias, SplatKind::ordinary, 1, 3},
+                                         ViewBatchCase{Footprint::density, SplatKind::mixed, 2, 3}));
 
 /// The rows that the loss of a band counts have those of the view's render.
 TEST(ViewBatch, ABandDrawsItsRowsOfTheView) {

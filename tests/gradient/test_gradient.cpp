@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
 #include <tuple>
 
 #include "ewa/renderer.h"
@@ -11,6 +12,7 @@
 #include "reference/render.h"
 #include "support/gradient_check.h"
 #include "support/random_scene.h"
+#include "support/random_sky.h"
 
 namespace ewa::test {
 namespace {
@@ -34,6 +36,7 @@ TEST_P(Gradient, IsTheSlopeOfTheReferencesLoss) {
     RenderOptions options;
     options.kernel = c.kernel;
     options.background = {0.3f, 0.6f, 0.1f};
+    if (c.seed % 2 == 0) options.sky = std::make_shared<const SkyMap>(random_sky(c.seed, 16));
     const LossGradient device_gradient = loss_gradient(device(), gaussians, camera, target, options);
     const reference::ReferenceGradient cpu = reference::loss_gradient(gaussians, camera, target, options);
 

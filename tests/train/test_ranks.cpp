@@ -125,6 +125,13 @@ template <AppearanceModel model>
 void with_model(TrainOptions& options) {
     options.appearance = model;
 }
+void under_sky(TrainOptions& options) {
+    options.sky = true;
+}
+void under_sky_with_model(TrainOptions& options) {
+    options.sky = true;
+    options.appearance = AppearanceModel::ppisp;
+}
 template <int bands>
 void cut(TrainOptions& options) {
     options.bands = bands;
@@ -168,6 +175,8 @@ INSTANTIATE_TEST_SUITE_P(
         RanksCase{Strategy::adc, 3, 2, with_model<AppearanceModel::ppisp>, "_ppisp"},
         RanksCase{Strategy::mcmc, 1, 2, with_model<AppearanceModel::ppisp>, "_ppisp"},
         RanksCase{Strategy::mcmc, 2, 3, with_model<AppearanceModel::grid>, "_grid"},
+        RanksCase{Strategy::adc, 3, 2, under_sky, "_sky"}, RanksCase{Strategy::mcmc, 1, 2, under_sky, "_sky"},
+        RanksCase{Strategy::mcmc, 2, 3, under_sky_with_model, "_sky_ppisp"},
         RanksCase{Strategy::none, 1, 4, wide_moments, "_wide"},
         RanksCase{Strategy::adc, 1, 2, cut<2>, "_bands2"}, RanksCase{Strategy::adc, 2, 3, cut<2>, "_bands2"},
         RanksCase{Strategy::adc, 1, 5, cut<3>, "_bands3"},

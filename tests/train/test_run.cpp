@@ -122,8 +122,9 @@ TEST(Run, WritesItsFilesAndTellsItsObserver) {
 
 TEST(Run, StoppedAndResumedEndsWithTheSameBytes) {
     TempFolder folder;
-    run_training(small_run(folder / "whole"));
-    RunOptions options = small_run(folder / "cut");
+    RunOptions whole = small_run(folder / "whole"), options = small_run(folder / "cut");
+    whole.train.sky = options.train.sky = true;
+    run_training(whole);
     options.resume = true;  // starts, since there is no checkpoint
     for (const int last : {13, 27}) {
         Recorder stops(last);
@@ -140,7 +141,8 @@ TEST(Run, StoppedAndResumedEndsWithTheSameBytes) {
 
     const RunResult result = run_training(options);
     EXPECT_FALSE(result.summary.interrupted);
-    for (const char* file : {"splats.ply", "exposures.json", "config.json"})
+    EXPECT_EQ(json_of(folder / "cut/config.json")["background"], "sky");
+    for (const char* file : {"splats.ply", "exposures.json", "sky.json", "config.json"})
         EXPECT_EQ(file_bytes(folder / "cut" / file), file_bytes(folder / "whole" / file)) << file;
 
     options.train.seed = 4;

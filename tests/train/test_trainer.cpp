@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <memory>
 #include <numeric>
 
 #include "ewa/error.h"
@@ -12,7 +13,9 @@
 #include "ewa/splat_files.h"
 #include "ewa/trainer.h"
 #include "gpu/test_device.h"
+#include "reference/render.h"
 #include "shared/layouts.h"
+#include "support/random_sky.h"
 #include "support/shared_by_tests.h"
 #include "train/appearance_choice.h"
 #include "train/synthetic.h"
@@ -526,6 +529,46 @@ TEST(AppearanceChoice, DoesNotCompareHiddenPoints) {
     const train::Disagreement found = train::disagreement_of(dataset, all_frames(dataset));
     EXPECT_EQ(found.images, 8);
     EXPECT_NEAR(found.exposure, 0, 0.01);
+}
+
+/// The sky behind splats is learned, a checkpoint has it, and a renderer draws what the trainer does.
+TEST(Trainer, LearnsTheSkyAndResumes) {
+    Synthetic made;
+    make_synthetic(made, 40, 8, 64, 48, 13);
+    RenderOptions truth;
+    truth.sky = std::make_shared<const SkyMap>(random_sky(14, 4));
+    for (const Frame& frame : made.dataset.frames) {
+        const auto render = reference::render(made.truth, frame.camera, truth);
+        Image image(64, 48, 3);
+        for (size_t i = 0; i < image.pixels.size(); ++i)
+            image.pixels[i] = float(render.blended.color.values[i]);
+        save_image(frame.image_path, image);
+    }
+    const Gaussians start = shaken_start(made, 0.05, 11, 0);
+    const std::vector<int> frames = all_frames(made.dataset);
+    double psnr[2];
+    for (const bool sky : {false, true}) {
+        TrainOptions options = quick(400);
+        options.sky = sky;
+        Trainer whole(device(), made.dataset, frames, start, options);
+        while (whole.steps_done() < 150) whole.step();
+        Trainer later(device(), made.dataset, frames, start, options);
+        later.restore(whole.state());
+        while (whole.steps_done() < 400) whole.step();
+        while (later.steps_done() < 400) later.step();
+        RenderOptions look;
+        look.sky = whole.sky();
+        ASSERT_EQ(bool(look.sky), sky);
+        EXPECT_EQ(later.gaussians().sh, whole.gaussians().sh);
+        psnr[sky] = evaluate(device(), whole.gaussians(), made.dataset, frames, look).psnr;
+        if (!sky) continue;
+        EXPECT_EQ(*later.sky(), *look.sky);
+        const Camera& camera = made.dataset.frames[0].camera;
+        Renderer renderer(device(), whole.gaussians(), look);
+        EXPECT_EQ(whole.render({&camera, 1})[0].pixels, renderer.render(camera).color.pixels);
+    }
+    printf("    %.2f dB with a sky, %.2f dB without\n", psnr[1], psnr[0]);
+    EXPECT_GT(psnr[1], psnr[0] + 5);
 }
 
 /// A run on halves and quarters first ends at the whole resolution, and resumes to the byte in the middle of

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <vector>
 
 #include "cli/program.h"
+#include "ewa/sky_map.h"
 #include "viewer/opening.h"
 
 namespace ewa::viewer {
@@ -66,6 +68,14 @@ TEST(Opening, TheSplatsOfARunHaveItsCameras) {
     test::write_file(folder / "run/config.json", R"({"dataset": "gone"})");
     EXPECT_FALSE(open_scene(splats, {}).dataset);
     EXPECT_EQ(open_scene(splats, {}).gaussians->size(), 50u);
+    EXPECT_FALSE(scene.look.sky);
+    test::write_file(folder / "run/config.json", R"({"dataset": "data", "background": "sky"})");
+    EXPECT_FALSE(open_scene(splats, {}).look.sky);
+    test::write_file(folder / "run/sky.json", R"({"size": 1, "texels": [1, 0.5, 0]})");
+    ASSERT_TRUE(open_scene(splats, {}).look.sky);
+    EXPECT_EQ(open_scene(splats, {}).look.sky->texels, (std::vector<float>{1, 0.5f, 0}));
+    test::write_file(folder / "run/sky.json", "no sky");
+    EXPECT_FALSE(open_scene(splats, {}).look.sky);
     // Another name is not the run's.
     test::write_file(folder / "run/config.json", R"({"dataset": "data"})");
     std::filesystem::copy_file(splats, folder / "run/mine.ply");

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pipeline/sky.h"
+
+#include <algorithm>
+
+#include "passes/passes.h"
+#include "pipeline/adam.h"
+#include "pipeline/model.h"
+#include "shared/constants.h"
+
+namespace ewa::pipeline {
+namespace {
+
+constexpr float kGrey = 0.5f;
+
+SkyMap grey_sky() {
+    return {int(shared::SKY_SIZE), std::vector<float>(3ull * shared::SKY_SIZE * shared::SKY_SIZE, kGrey)};
+}
+
+shared::SkyPush sky_push(const FrameBuffers& frame, const SkyTexels& sky, const Band& band) {
+    return {.image = frame.sizes.image(), .size = sky.size, .first_row = band.rows > 0 ? band.first : 0};
+}
+
+}  // namespace
+
+SkyTexels::SkyTexels(gpu::Device& device, const SkyMap& map)
+    : size(uint32_t(map.size)), values(device, "sky", bytes()) {
+    values.upload(std::span<const float>(map.texels));
+}
+
+LearnedSky::LearnedSky(gpu::Device& device, uint32_t views)
+    : SkyTexels(device, grey_sky()),
+      moments1(device, "sky moments1", bytes()),
+      moments2(device, "sky moments2", bytes()),
+      slots(device, "sky slots", bytes() * views),
+      before(device, "sky before", bytes()) {
+    zero(moments1);
+    zero(moments2);
+}
+
+SkyMap LearnedSky::download() const {
+    return {int(size), values.download<float>(bytes() / sizeof(float))};
+}
+
+std::vector<uint64_t> LearnedSky::words(uint32_t slot) const {
+    return slots.download<uint64_t>(words_of_view(), bytes() * slot);
+}
+
+void LearnedSky::set(uint32_t slot, std::span<const uint64_t> words) {
+    slots.upload(words, bytes() * slot);
+}
+
+void FramePasses::add_sky() const {
+    record(passes::AddSky{.planes = frame.planes, .camera = camera(), .sky = inputs.sky->values},
+           sky_push(frame, *inputs.sky, inputs.band));
+}
+
+void FramePasses::sky_gradient(const LearnedSky& sky, uint32_t slot) const {
+    recording.fill(sky.slots, 0, sky.bytes() * slot, sky.bytes());
+    record(passes::SkyGradient{.planes = frame.planes,
+                               .image_gradient = frame.image_gradient,
+                               .camera = camera(),
+                               .slots = sky.slots,
+                               .counts = frame.counts},
+           {.sky = sky_push(frame, sky, inputs.band), .slot = 3 * sky.size * sky.size * slot});
+}
+
+void record_sky_update(const passes::Recorder& on, const LearnedSky& sky, const FrameBuffers& frame,
+                       uint32_t views, float rate, uint32_t step, uint32_t capacity) {
+    const auto [bias1, bias2] = adam_biases(step);
+    on.recording.copy(sky.values, 0, sky.before, 0, sky.bytes());
+    on.record(passes::SkyUpdate{.slots = sky.slots,
+                                .before = sky.before,
+                                .sky = sky.values,
+                                .moments1 = sky.moments1,
+                                .moments2 = sky.moments2,
+                                .counts = frame.counts},
+              {.size = sky.size,
+               .views = views,
+               .rate = rate,
+               .bias1 = bias1,
+               .bias2 = bias2,
+               .instance_capacity = capacity});
+}
+
+}  // namespace ewa::pipeline
