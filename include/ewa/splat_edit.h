@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ewa/gaussians.h"
+#include "ewa/sky_map.h"
 
 namespace ewa {
 
@@ -26,6 +27,10 @@ void set_sh_degree(Gaussians& gaussians, int degree);
 /// Appends the splats of `more`. The SH degree becomes the larger of both. If only one of them has opacities of
 /// Footprint::density, these are fitted to the other kernels.
 void append_splats(Gaussians& gaussians, const Gaussians& more);
+
+/// Opaque splats in the colours of the sky, one for each of its texels, on a sphere around the scene. Its radius is 30 times that
+/// of the scene. They replace the sky where a viewer has none.
+Gaussians sky_splats(const SkyMap& sky, const Gaussians& scene);
 
 /// Converts the opacities to those of Footprint::density, or from them to those of the other kernels, so that renders
 /// look about the same. Does nothing if Gaussians::density says that they are of that kind. Exact to float32 when it is

@@ -16,12 +16,14 @@
 #include "cli/output.h"
 #include "cli/run_inputs.h"
 #include "cli/splat_statistics.h"
+#include "core/folders.h"
 #include "core/messages.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
 #include "io/splats/formats.h"
+#include "report/run_file_names.h"
 
 namespace ewa::cli {
 namespace {
@@ -38,7 +40,7 @@ struct ConvertArguments {
     Edits edits;
     int spz_version = 3;
     fs::path json;
-    bool check = false, allow_empty = false, quiet = false;
+    bool bake_sky = false, check = false, allow_empty = false, quiet = false;
     std::optional<live::Run> run;  // that the only input is of
 };
 
@@ -56,6 +58,15 @@ std::string described(const fs::path& path, std::string_view format, const std::
                        core::bytes_text(fs::file_size(path)));
 }
 
+/// Adds splats in place of the sky of the file's run.
+void bake_sky(const fs::path& file, Gaussians& gaussians) {
+    const fs::path sky = file.parent_path() / report::kSkyFile;
+    if (!core::is_file(sky))
+        throw InputError("--bake-sky: " + core::one_line(sky.string()) +
+                         " is missing; ewa train --background sky writes it");
+    append_splats(gaussians, sky_splats(load_sky(sky), gaussians));
+}
+
 /// Reads the inputs and appends each to the one before.
 Work read_all(const ConvertArguments& arguments) {
     Work work;
@@ -63,6 +74,7 @@ Work read_all(const ConvertArguments& arguments) {
     for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
         const fs::path& path = arguments.files[i];
         SplatScene scene = read_splats(path);
+        if (arguments.bake_sky) bake_sky(path, scene.gaussians);
         place_splats(scene.gaussians, arguments.placements.at(i), path.string());
         if (!arguments.quiet)
             fmt::print("{}\n", described(path, name_of(scene.format), scene.variant, scene.gaussians));
@@ -257,6 +269,8 @@ Action add_convert(CLI::App& app) {
         ->transform(one_of({"3", "4"}))
         ->type_name("3|4")
         ->capture_default_str();
+    app.add_flag("--bake-sky", arguments->bake_sky,
+                 "Add opaque splats far away in place of the sky of the run: for viewers that have none");
     app.add_flag("--allow-empty", arguments->allow_empty, "Write the output even if no splat is left");
     app.add_flag(
         "--check", arguments->check,

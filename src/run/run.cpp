@@ -399,8 +399,7 @@ train::TrainedScene Run::save_last(std::unique_ptr<Trainer>& trainer) {
         report_.summary.cameras = cameras_.moves();
     }
     if (options().inria) train::save_inria(folder_.path(), input_, scene.gaussians, last.step);
-    if (!scene.appearances.empty())
-        folder_.save_appearances(input_.dataset, input_.split.train, scene.appearances);
+    folder_.save_appearances(input_.dataset, input_.split.train, scene.appearances);
     folder_.save_sky(scene.sky);
     report_.times = report_times(trainer->step_times());
     report_.summary.ranks = trainer->rank_figures();

@@ -103,6 +103,7 @@ void RunFolder::keep_splats(const Gaussians& gaussians, int step, const RenderOp
 
 void RunFolder::save_appearances(const Dataset& dataset, const std::vector<int>& frames,
                                  const std::vector<Appearance>& appearances) const {
+    if (appearances.empty()) return;
     std::vector<Exposure> exposures;
     std::vector<std::string> names;
     for (size_t i = 0; i < appearances.size(); ++i) {

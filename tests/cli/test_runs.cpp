@@ -202,6 +202,15 @@ TEST_F(Runs, EvalRenderAndCompareUseTheSky) {
     EXPECT_NEAR(psnr(alone, {run, "--test-every", "2", "--background", run + "/sky.json"}), of_run, 1e-6);
     expect_success(run_ewa({"render", run, "--format", "exr", "-o", folder / "views"}));
     expect_success(run_ewa({"compare", run, folder / "views", "--max-error", "1e-5"}));
+    // Splats far away take its place.
+    const std::string baked = folder / "baked.ply";
+    expect_success(run_ewa({"convert", run, baked, "--bake-sky", "--quiet"}));
+    const size_t texels = size_t(sky.size) * size_t(sky.size);
+    EXPECT_EQ(load_splats(baked).size(), load_splats(run + "/splats.ply").size() + texels);
+    expect_success(run_ewa({"render", baked, "--cameras", run, "--frames", "0", "-o", folder / "baked.png"}));
+    expect_success(run_ewa({"render", run, "--frames", "0", "-o", folder / "sky.png"}));
+    EXPECT_GT(ewa::psnr(load_image(folder / "baked.png"), load_image(folder / "sky.png")), 30);
+    expect_failure(run_ewa({"convert", alone, folder / "b.ply", "--bake-sky"}), 2, "--bake-sky: ");
     // Each of two runs has its own.
     const std::string other = trained("other", {"--sky-rate", "1e-9"});
     expect_success(run_ewa({"compare", run, run, "--max-error", "0"}));
