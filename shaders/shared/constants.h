@@ -151,7 +151,6 @@ EWA_REAL(GREY_BLUE, 0.114);
 EWA_REAL(GRID_VARIATION_WEIGHT, 10.0);  // of the mean squared differences along the three axes
 
 // The sky: light from infinitely far, a map of texels over an octahedron (lib/sky.glsl).
-EWA_UINT(SKY_SIZE, 64u);   // texels a side of a map that training learns
 EWA_UINT(SKY_BLOCK, 8u);   // px a side of a block, for the gradient
 EWA_REAL(SKY_PULL, 1e-6);  // d(loss)/d(texel) for a neighbour that differs by 1
 // Gradients are added as whole multiples of 1 / SKY_UNITS. A pixel has at most SKY_SUM_MAX of an image's pixels: then no sum

@@ -14,7 +14,7 @@ namespace {
 constexpr float kGrey = 0.5f;
 
 SkyMap grey_sky() {
-    return {int(shared::SKY_SIZE), std::vector<float>(3ull * shared::SKY_SIZE * shared::SKY_SIZE, kGrey)};
+    return {int(kLearnedSkySize), std::vector<float>(3ull * kLearnedSkySize * kLearnedSkySize, kGrey)};
 }
 
 shared::SkyPush sky_push(const FrameBuffers& frame, const SkyTexels& sky, const Band& band) {

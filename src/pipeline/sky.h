@@ -10,6 +10,8 @@
 
 namespace ewa::pipeline {
 
+inline constexpr uint32_t kLearnedSkySize = 128;  // texels a side
+
 /// As SkyMap.
 struct SkyTexels {
     uint32_t size = 0;

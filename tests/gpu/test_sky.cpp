@@ -98,7 +98,7 @@ struct SkySlots {
 };
 
 reference::Sky size_of_learned() {
-    return random_sky(1, int(shared::SKY_SIZE));  // the gradient does not depend on the texels
+    return random_sky(1, int(pipeline::kLearnedSkySize));  // the gradient does not depend on the texels
 }
 
 class Sky : public testing::TestWithParam<SkyCase> {};
@@ -200,7 +200,7 @@ TEST(SkyOfBands, IsThatOfTheView) {
 struct SkySteps {
     GuardedFrame guarded{rig().config(), sky_request(16, 16)};
     pipeline::LearnedSky sky{*device(), 3};
-    const SkyMap start = random_sky(72, int(shared::SKY_SIZE));
+    const SkyMap start = random_sky(72, int(pipeline::kLearnedSkySize));
     size_t floats = start.texels.size();
     std::vector<int32_t> gradients = std::vector<int32_t>(3 * floats);
     static constexpr float kRate = 0.01f;
