@@ -36,7 +36,7 @@ class ViewSession {
     void take_live();  // new splats of the run replace those that are shown
 
     bool saving() const { return saving_.valid(); }
-    bool waiting() const { return opening_.valid() || saving_.valid(); }
+    bool waiting() const { return opening_.valid() || saving_.valid() || dialog.open(); }
     bool empty() const;  // nothing is open, nor on its way
     /// What the middle of the picture says where there is nothing to see.
     std::optional<Headline> headline() const;
