@@ -19,7 +19,7 @@ enum class AppearanceModel {
     affine,    // an affine map of colours for each image: Exposure
     ppisp,     // exposure and colours of each image, vignette and response of each camera: Ppisp
     grid,      // a bilateral grid of affine maps for each image: ColorGrid
-    automatic  // ppisp if the training images disagree on the colours of the points, else none
+    automatic  // ppisp if the training images disagree on the colours of the points or by EXIF, else none
 };
 
 /// PPISP: an image's exposure and colour map, and its camera's vignette and response, in this order

@@ -75,6 +75,8 @@ struct TrainOptions {
     bool exposure = false;  // AppearanceModel::affine; not with another model
     double exposure_rate = 0.01, exposure_rate_final = 0.001;
     double appearance_rate = 0.002;  // of ppisp and grid, per step of a full run
+    /// ppisp starts from the exposures that points or EXIF say. A trainer that is restored needs none.
+    bool measure_exposures = true;
 
     // Cameras.
     bool refine_poses = false;  // learns a rotation and a translation for each training camera, from none

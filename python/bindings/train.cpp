@@ -25,7 +25,6 @@
 #include "run/option_table.h"
 #include "run/resume.h"
 #include "run/run_input.h"
-#include "train/appearance_choice.h"
 #include "train/checkpoint.h"
 #include "train_options.h"
 
@@ -42,14 +41,12 @@ int usual_test_every() {
 /// What a training begins with.
 struct TrainerStart {
     SharedDataset dataset;
-    RunOptions run;  // with a concrete strategy and SH degree
+    RunOptions run = usual_options();  // with a concrete strategy and SH degree
     std::vector<int> frames;
     bool own_start = false;  // the first splats are an argument
 
     void resolve_options() {
-        if (run.train.appearance == AppearanceModel::automatic)
-            run.train.appearance = train::choose_appearance(run.train, *dataset, frames).model;
-        run.train = resolve(run.train, *dataset);
+        run.train = resolve(run.train, *dataset, frames);
         run.train.render.sh_degree = run.train.sh_degree;
     }
     /// The frames that are not trained on count as held out.
@@ -197,13 +194,16 @@ void read_settings(const Json& settings, TrainerStart& start) {
                 start.frames.push_back(frame.get<int>());
         return;
     }
-    RunOptions run;
+    RunOptions run = usual_options();
     const Json stored = settings.value("options", Json::object());
     for (const train::RunOption& option : train::run_options()) {
         if (!option.decides_result || !stored.contains(option.name)) continue;
         const Json& value = stored[option.name];
         option.set(run, value.is_string() ? value.get<std::string>() : value.dump());
     }
+    if (run.skip_blurred)
+        throw InputError(
+            "was written with --skip-blurred, which Python does not have; ewa train --resume continues it");
     start.run.train = run.train;
     start.run.dense_start = run.dense_start;
     start.run.init_opacity = run.init_opacity;
@@ -239,7 +239,7 @@ Training resume(const std::filesystem::path& path, const LoadedDataset& dataset,
         throw InputError(path.string() + ": its training began with splats; pass them again as init");
     RunOptions& run = start.run;
     if (steps) run.train.steps = *steps;
-    train::continue_from(path, checkpoint, run.train.strategy, run);
+    train::continue_from(path, checkpoint, TrainOptions(run.train), run);
     start.resolve_options();
     const nb::object first =
         init.is_none() ? nb::cast(begun.is_string() ? begun.get<std::string>() : "sfm") : nb::borrow(init);

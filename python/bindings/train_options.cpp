@@ -193,6 +193,12 @@ nb::dict argument_names() {
     return names;
 }
 
+RunOptions usual_options() {
+    RunOptions usual;
+    usual.train.appearance = AppearanceModel::none;
+    return usual;
+}
+
 nb::set value_words() {
     nb::set words;
     for (const std::string& word : core::words_of(scene::kIntegratorWords)) words.add(nb::str(word.c_str()));
@@ -207,7 +213,7 @@ nb::set value_words() {
 }
 
 std::string option_parameters() {
-    const RunOptions usual;
+    const RunOptions usual = usual_options();
     std::string text;
     const auto add = [&](const std::string& name, const std::string& type, const nb::object& value) {
         text.append(", ").append(name).append(": ").append(type).append(" = ").append(

@@ -19,6 +19,9 @@ std::string option_parameters();
 /// The arguments whose names are not those of the command line, under the names there.
 nanobind::dict argument_names();
 
+/// The usual options, but without an appearance, since ewa.evaluate can apply none.
+RunOptions usual_options();
+
 /// The words that are values of options of the command line.
 nanobind::set value_words();
 

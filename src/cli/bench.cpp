@@ -52,7 +52,7 @@ Trained train(const std::shared_ptr<gpu::Device>& device, const Dataset& dataset
     options.strategy = strategy;
     options.max_splats = kMaxSplats;
     options.sh_degree = kAutomaticShDegree;
-    options = resolve(options, dataset);
+    options = resolve(options, dataset, split.train);
     Gaussians start = gaussians_from_points(dataset.points, options.sh_degree);
     Trainer trainer(device, dataset, split.train, start, options);
     Trained result{{name, true, {}}, {}};

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <future>
 #include <thread>
 #include <vector>
@@ -11,13 +12,13 @@
 namespace ewa::core {
 
 /// Calls work(i) for each i < count on all cores. The work of different i must be independent: its order is not fixed. An
-/// exception of any of them is thrown after all threads have ended.
+/// exception of any of them is thrown after all threads have ended. most: of them at once.
 template <class Work>
-void on_all_cores(size_t count, const Work& work) {
+void on_all_cores(size_t count, const Work& work, size_t most = SIZE_MAX) {
     std::atomic<size_t> next{0};
     std::vector<std::future<void>> threads;
     const size_t cores = std::max(1u, std::thread::hardware_concurrency());
-    for (size_t t = 0; t < std::min(cores, count); ++t)
+    for (size_t t = 0; t < std::min({cores, count, most}); ++t)
         threads.push_back(std::async(std::launch::async, [&] {
             for (size_t i = next++; i < count; i = next++) work(i);
         }));

@@ -6,6 +6,7 @@
 
 #include "core/parallel.h"
 #include "image/metric.h"
+#include "scene/frame_images.h"
 #include "scene/statistics.h"
 
 namespace ewa::train {
@@ -18,10 +19,11 @@ constexpr double kDeviations = 4, kLeastBlur = 0.05, kPerMad = 1.4826;
 }  // namespace
 
 std::vector<int> blurred_frames(const Dataset& dataset, const std::vector<int>& frames) {
+    const std::vector<const Frame*> each = scene::frames_at(dataset, frames);
     std::vector<double> effects(frames.size());
-    core::on_all_cores(frames.size(), [&](size_t k) {
-        effects[k] = image::blur_effect(load_frame_image(dataset.frames[size_t(frames[k])]));
-    });
+    core::on_all_cores(
+        frames.size(), [&](size_t k) { effects[k] = image::blur_effect(load_frame_image(*each[k])); },
+        scene::images_at_once(each));
     if (effects.empty()) return {};
     std::vector<double> sorted = effects;
     const double median = scene::quantile(sorted, 0.5);

@@ -273,7 +273,7 @@ RunOption appearance_option() {
         "affine: a map of colours. ppisp: exposure and colours of each image, vignette and response of each "
         "camera. "
         "grid: maps that vary over the image. auto: ppisp if the images disagree on the colours of the "
-        "points",
+        "points, or by their EXIF; else none",
         [](RunOptions& o) -> AppearanceModel& { return o.train.appearance; }, kAppearances);
     option.before = "none";
     return option;

@@ -96,22 +96,26 @@ std::string dataset_fingerprint(const Dataset& dataset, const Split& split) {
     return core::digits_of(hash);
 }
 
-int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, Strategy asked,
+int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, const TrainOptions& asked,
                   RunOptions& options) {
     const Json then = parse_settings(path, earlier.settings);
     RunOptions before = options;
     const auto take = [&](const char* name, RunOptions& into) {
-        const Json value = then["options"].value(name, Json());
+        const RunOption& option = run_option(name);
+        Json value = then["options"].value(name, Json());
+        if (value.is_null() && !option.before.empty()) value = option.before;
         if (value.is_null()) return;
         try {
-            run_option(name).set(into, value.is_string() ? value.get<std::string>() : value.dump());
+            option.set(into, value.is_string() ? value.get<std::string>() : value.dump());
         } catch (const InputError& error) {
             throw InputError(path.string() + ": its settings have --" + name + " " +
                              value.dump().substr(0, kLongestValue) + ", which is no value of it" + kWaysOut);
         }
     };
     take("steps", before);
-    if (asked == Strategy::automatic) take("strategy", options);
+    if (asked.strategy == Strategy::automatic) take("strategy", options);
+    if (asked.appearance == AppearanceModel::automatic) take("appearance", options);
+    options.train.measure_exposures = false;
     const int step = earlier.state.report.step;
     if (options.train.steps < step)
         throw InputError(path.string() + ": is at step " + std::to_string(step) +

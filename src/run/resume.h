@@ -19,11 +19,11 @@ std::string dataset_fingerprint(const Dataset& dataset, const Split& split);
 /// The run adds the device.
 nlohmann::ordered_json checkpoint_settings(const RunOptions& options, const std::string& fingerprint);
 
-/// Lets a run continue from the checkpoint at `path`. Strategy::automatic becomes the checkpoint's strategy. If the
+/// Lets a run continue from the checkpoint at `path`. What was automatic becomes the checkpoint's strategy and appearance. If the
 /// checkpoint's run has another number of steps, the options keep what it has reached (TrainOptions::least_sh_degree,
 /// most_halvings). An automatic cap of splats does not fall below the checkpoint's. Returns that run's number of steps. Throws InputError if the checkpoint lies behind the last step.
-/// asked: the strategy before resolve().
-int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, Strategy asked,
+/// asked: the options before resolve().
+int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, const TrainOptions& asked,
                   RunOptions& options);
 
 /// Throws InputError that names the first difference, except in the number of steps, if a run with the settings `now`

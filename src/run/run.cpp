@@ -103,14 +103,14 @@ class Run {
           folder_(checked_folder(input_)),
           cameras_(input_),
           saves_(folder_, input_.options, cameras_, progress_) {
-        read_checkpoint(options.train.strategy);
+        read_checkpoint(options.train);
     }
 
     RunResult run();
 
   private:
     const RunOptions& options() const { return input_.options; }
-    void read_checkpoint(Strategy asked);
+    void read_checkpoint(const TrainOptions& asked);
     void begin_files();
     void choose_cap();
     TrainOptions capped_options() const;
@@ -144,7 +144,7 @@ class Run {
     std::filesystem::path first_render_;
 };
 
-void Run::read_checkpoint(Strategy asked) {
+void Run::read_checkpoint(const TrainOptions& asked) {
     train::check_free(folder_.path(), options());  // again, now that no other run writes here
     if (options().resume && std::filesystem::exists(folder_.checkpoint())) {
         earlier_.emplace(EarlierRun{std::make_unique<train::CheckpointReader>(folder_.checkpoint()), 0});

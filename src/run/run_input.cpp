@@ -357,10 +357,12 @@ RunInput load_run(const RunOptions& options) {
     if (train.appearance == AppearanceModel::automatic && !train.exposure) {
         const AppearanceChoice choice = choose_appearance(train, input.dataset, input.split.train);
         train.appearance = choice.model;
-        input.notes.push_back(fmt::format(
-            "appearance {}: {}", choice.model == AppearanceModel::none ? "none" : "ppisp", choice.reason));
+        const bool learned = choice.model != AppearanceModel::none;
+        input.notes.push_back(
+            fmt::format("appearance {}: {}{}", learned ? "ppisp" : "none", choice.reason,
+                        learned ? "; --metrics cc_psnr compares held-out images without it" : ""));
     }
-    train = resolve(train, input.dataset);
+    train = resolve(train, input.dataset, input.split.train);
     train.render.sh_degree = train.sh_degree;
     input.options.output = output_folder(options);
     input.start = initial_splats(input.options, input.dataset, input.split.train);

@@ -10,6 +10,7 @@
 
 #include "core/parallel.h"
 #include "image/image_files.h"
+#include "scene/frame_images.h"
 #include "scene/statistics.h"
 
 namespace ewa::train {
@@ -21,6 +22,9 @@ constexpr int kCellsAcross = 64;
 constexpr float kHiddenBehind = 1.1f;  // of the nearest depth in the cell
 // Colours nearer to black or white say little of a factor between them.
 constexpr double kDark = 24 / 255.0, kBright = 240 / 255.0;
+// Brightness of an image and of the points that it shows: a smaller correlation says that they have nothing in common. Rendered
+// captures have 0.3 or more, random colours under 0.06 (1,000 points).
+constexpr double kLeastCorrelation = 0.15, kDeviationsOfChance = 3;
 // The root mean squares from which learning pays (docs/training.md "Appearance").
 constexpr double kStopsToLearn = 0.12, kColorToLearn = 0.06;
 // A factor of light is this power of it in stored values: the exponent of sRGB is about 1 / 2.2.
@@ -28,7 +32,7 @@ constexpr double kStored = 1 / 2.2;
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-/// A value of each image with its standard error.
+/// A value with its standard error.
 struct Measured {
     double value = kUnknown, error = 0;
 };
@@ -49,7 +53,7 @@ std::vector<SeenPoint> seen_points(const Camera& camera, const PointCloud& point
     const auto nearest_at = [&](int x, int y) -> float& {
         return nearest[size_t(y / cell) * size_t(columns) + size_t(x / cell)];
     };
-    const size_t stride = std::max<size_t>(1, points.positions.size() / kMostPoints);
+    const size_t stride = (points.positions.size() + kMostPoints - 1) / kMostPoints;
     std::vector<SeenPoint> seen;
     for (size_t i = 0; i < points.positions.size(); i += stride) {
         const glm::dvec3 p = camera.rotation * points.positions[i] + camera.translation;
@@ -66,31 +70,56 @@ std::vector<SeenPoint> seen_points(const Camera& camera, const PointCloud& point
 
 /// The median, and its standard error where the values are normal but for some outliers.
 Measured median_of(std::vector<double>& values) {
-    if (values.size() < kLeastPoints) return {};
-    const double median = scene::quantile(values, 0.5), count = double(values.size());
+    const double median = scene::quantile(values, 0.5);
     for (double& value : values) value = std::abs(value - median);
     constexpr double kDeviation = 1.4826,
                      kOfMedian = 1.2533;  // of a normal distribution: sigma / MAD, sqrt(pi / 2)
-    return {median, kOfMedian * kDeviation * scene::quantile(values, 0.5) / std::sqrt(count)};
+    return {median, kOfMedian * kDeviation * scene::quantile(values, 0.5) / std::sqrt(double(values.size()))};
 }
 
-/// What the frame's image is against the points that it shows: log2(image / point).
+/// Whether the values go together: more than by chance, or because both are constant.
+bool are_related(const std::vector<double>& a, const std::vector<double>& b) {
+    constexpr double kConstant = 1e-6;  // a variance
+    const double count = double(a.size());
+    double mean_a = 0, mean_b = 0, aa = 0, bb = 0, ab = 0;
+    for (size_t i = 0; i < a.size(); ++i) {
+        mean_a += a[i] / count;
+        mean_b += b[i] / count;
+    }
+    for (size_t i = 0; i < a.size(); ++i) {
+        aa += (a[i] - mean_a) * (a[i] - mean_a) / count;
+        bb += (b[i] - mean_b) * (b[i] - mean_b) / count;
+        ab += (a[i] - mean_a) * (b[i] - mean_b) / count;
+    }
+    if (aa < kConstant && bb < kConstant) return true;
+    return ab > std::max(kLeastCorrelation, kDeviationsOfChance / std::sqrt(count)) * std::sqrt(aa * bb);
+}
+
+/// What the frame's image is against the points that it shows: log2(image / point), as medians. Unknown where the points are too
+/// few, or do not have the colours of the image.
 Measures against_points(const Dataset& dataset, const Frame& frame) {
-    const Image image = load_training_image(frame, {}).image;
+    const Image image = load_frame_image(frame);
     std::array<std::vector<double>, kQuantities> values;
+    std::vector<double> own, usual;
     for (const SeenPoint& p : seen_points(frame.camera, dataset.points)) {
         const float* pixel = image.at(std::min(p.x, image.width - 1), std::min(p.y, image.height - 1));
         const auto& color = dataset.points.colors[p.point];
         const auto usable = [&](int c) {
-            const double own = double(pixel[c]), usual = color[c] / 255.0;
-            return own >= kDark && own <= kBright && usual >= kDark && usual <= kBright;
+            const double there = double(pixel[c]), expected = color[c] / 255.0;
+            return there >= kDark && there <= kBright && expected >= kDark && expected <= kBright;
         };
-        if (!usable(0) || !usable(1) || !usable(2)) continue;
-        const auto ratio = [&](int c) { return std::log2(double(pixel[c]) * 255 / color[c]); };
-        values[kExposure].push_back((ratio(0) + ratio(1) + ratio(2)) / 3);
-        values[kRed].push_back(ratio(0) - ratio(1));
-        values[kBlue].push_back(ratio(2) - ratio(1));
+        if (!usable(0) || !usable(1) || !usable(2) || (image.channels == 4 && pixel[3] < 1)) continue;
+        std::array<double, 3> ratio;
+        for (size_t c = 0; c < 3; ++c) ratio[c] = std::log2(double(pixel[c]) * 255 / color[c]);
+        const double expected =
+            (std::log2(color[0] / 255.0) + std::log2(color[1] / 255.0) + std::log2(color[2] / 255.0)) / 3;
+        values[kExposure].push_back((ratio[0] + ratio[1] + ratio[2]) / 3);
+        values[kRed].push_back(ratio[0] - ratio[1]);
+        values[kBlue].push_back(ratio[2] - ratio[1]);
+        usual.push_back(expected);
+        own.push_back(expected + values[kExposure].back());
     }
+    if (own.size() < kLeastPoints || !are_related(own, usual)) return {};
     Measures measures;
     for (size_t q = 0; q < kQuantities; ++q) measures[q] = median_of(values[q]);
     return measures;
@@ -99,20 +128,24 @@ Measures against_points(const Dataset& dataset, const Frame& frame) {
 struct Found {
     std::vector<Measures> each = {};  // of the frames
     bool by_exif = false;
+    int known() const {
+        return int(
+            std::ranges::count_if(each, [](const Measures& m) { return std::isfinite(m[kExposure].value); }));
+    }
 };
 
 Found measure(const Dataset& dataset, const std::vector<int>& frames) {
-    const bool points = dataset.points.positions.size() >= kLeastPoints &&
-                        dataset.points.colors.size() == dataset.points.positions.size();
-    Found found{std::vector<Measures>(frames.size()), !points};
-    core::on_all_cores(frames.size(), [&](size_t k) {
-        const Frame& frame = dataset.frames[size_t(frames[k])];
-        if (points) {
-            found.each[k] = against_points(dataset, frame);
-        } else if (const auto stops = image::shot_of(frame.image_path).exposure) {
+    const std::vector<const Frame*> all = scene::frames_at(dataset, frames);
+    Found found{std::vector<Measures>(frames.size())};
+    if (dataset.points.colors.size() == dataset.points.positions.size() && !dataset.points.colors.empty())
+        core::on_all_cores(
+            frames.size(), [&](size_t k) { found.each[k] = against_points(dataset, *all[k]); },
+            scene::images_at_once(all));
+    if (found.known() >= 2) return found;
+    found.by_exif = true;
+    for (size_t k = 0; k < frames.size(); ++k)
+        if (const auto stops = image::shot_of(all[k]->image_path).exposure)
             found.each[k] = {Measured{*stops * kStored}, Measured{0}, Measured{0}};
-        }
-    });
     return found;
 }
 
@@ -171,8 +204,9 @@ AppearanceChoice choose_appearance(const TrainOptions& options, const Dataset& d
                                    const std::vector<int>& frames) {
     if (options.exposure) return {AppearanceModel::none, "--exposure is given"};
     if (options.bands > 1) return {AppearanceModel::none, "--bands cuts the images"};
+    if (frames.size() < 2) return {AppearanceModel::none, "there are no two training images"};
     const Disagreement found = disagreement_of(dataset, frames);
-    if (found.images < 2) return {AppearanceModel::none, "the images have neither points in common nor EXIF"};
+    if (found.images < 2) return {AppearanceModel::none, "neither points nor EXIF say how the images differ"};
     const bool learn = found.exposure >= kStopsToLearn || found.color >= kColorToLearn;
     std::string reason = fmt::format("{} images differ by {:.2f} stops", found.images, found.exposure);
     reason +=

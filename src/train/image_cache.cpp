@@ -10,6 +10,7 @@
 #include "core/random.h"
 #include "ewa/error.h"
 #include "pipeline/frame_inputs.h"
+#include "scene/frame_images.h"
 #include "train/schedule.h"
 
 namespace ewa::train {
@@ -33,11 +34,8 @@ double mean_weight(const Image& image) {
 class ParallelLoader {
   public:
     explicit ParallelLoader(std::vector<const Frame*> frames) : frames_(std::move(frames)) {
-        uint64_t largest = 1;
-        for (const Frame* frame : frames_)
-            largest = std::max(largest, uint64_t(frame->source.width) * uint64_t(frame->source.height));
-        ahead_ = size_t(std::clamp<uint64_t>(kPixelsAhead / largest, 1,
-                                             std::max(1u, std::thread::hardware_concurrency())));
+        ahead_ = std::min<size_t>(scene::images_at_once(frames_),
+                                  std::max(1u, std::thread::hardware_concurrency()));
     }
 
     /// Throws what load_frame_image throws for this image.
@@ -51,8 +49,6 @@ class ParallelLoader {
     }
 
   private:
-    static constexpr uint64_t kPixelsAhead = 1 << 26;  // 1 GiB as four float32 channels
-
     std::vector<const Frame*> frames_;
     size_t started_ = 0;
     size_t ahead_ = 1;

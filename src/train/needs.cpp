@@ -107,14 +107,14 @@ namespace ewa {
 
 SplatCap splat_cap(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& train_frames,
                    const Gaussians& start, const TrainOptions& options) {
-    const TrainOptions resolved = resolve(options, dataset);
+    const TrainOptions resolved = resolve(options, dataset, train_frames);
     return train::Needs(device, dataset, train_frames, start, resolved).cap();
 }
 
 MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset,
                                const std::vector<int>& train_frames, const Gaussians& start,
                                const TrainOptions& options) {
-    const TrainOptions resolved = resolve(options, dataset);
+    const TrainOptions resolved = resolve(options, dataset, train_frames);
     train::Needs needs(device, dataset, train_frames, start, resolved);
     return needs.memory(needs.cap().splats);
 }

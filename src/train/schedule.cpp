@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <vector>
 
 #include "ewa/error.h"
@@ -215,17 +214,14 @@ Schedule schedule_for(const TrainOptions& options, size_t photos) {
 
 namespace ewa {
 
-TrainOptions resolve(TrainOptions options, const Dataset& dataset) {
+TrainOptions resolve(TrainOptions options, const Dataset& dataset, const std::vector<int>& train_frames) {
     const bool adc_asked_for = options.absolute_gradients || options.revised_opacity || options.render.points;
     if (options.strategy == Strategy::automatic)
         options.strategy = adc_asked_for ? Strategy::adc : strategy_for(options.steps);
     if (options.sh_degree == kAutomaticShDegree)
         options.sh_degree = dataset.color_depends_on_view ? kMaxShDegree : 0;
-    if (options.appearance == AppearanceModel::automatic) {
-        std::vector<int> all(dataset.frames.size());
-        std::iota(all.begin(), all.end(), 0);
-        options.appearance = train::choose_appearance(options, dataset, all).model;
-    }
+    if (options.appearance == AppearanceModel::automatic)
+        options.appearance = train::choose_appearance(options, dataset, train_frames).model;
     return options;
 }
 

@@ -101,7 +101,7 @@ Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
     train::check_start(start.size(), options);
     train::check_training(options, ranks->size());
     const double extent = extent_for(dataset, train_frames, start);
-    TrainOptions resolved = resolve(options, dataset);
+    TrainOptions resolved = resolve(options, dataset, train_frames);
     train::Needs needs(*device, dataset, train_frames, start, resolved);
     const uint32_t most = agreed(*ranks, needs.cap().splats);
     const auto count = int(agreed(*ranks, uint32_t(needs.portions(most, ranks->size()))));

@@ -135,7 +135,7 @@ Training::Training(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
     else if (plan_.appearance != AppearanceModel::none)
         learned_.appearances =
             Appearances(*device_, plan_.appearance, cameras_of(dataset, frames), uint32_t(options.batch));
-    if (plan_.appearance == AppearanceModel::ppisp)
+    if (plan_.appearance == AppearanceModel::ppisp && options.measure_exposures)
         learned_.appearances.set_exposures(first_exposures(dataset, frames));
     if (plan_.sky) learned_.sky = LearnedSky(*device_, uint32_t(options.batch));
     if (plan_.motion) {

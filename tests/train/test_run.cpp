@@ -236,7 +236,7 @@ TEST(Run, RefusesOptionsThatExcludeEachOther) {
     expect_error<InputError>([&] { run_training(options); }, {"--absgrad", "--strategy adc"});
     options.train.strategy = Strategy::automatic;
     EXPECT_NO_THROW(check_options(options));
-    EXPECT_EQ(resolve(options.train, {}).strategy, Strategy::adc);
+    EXPECT_EQ(resolve(options.train, {}, {}).strategy, Strategy::adc);
     options.resume = options.force = true;
     expect_error<InputError>([&] { run_training(options); }, {"--resume", "--force"});
     EXPECT_FALSE(fs::exists(folder / "o"));
@@ -246,11 +246,13 @@ TEST(Run, SkipsBlurredTrainingImages) {
     Synthetic made;
     make_synthetic(made, 40, 8, 48, 36, 7);
     for (size_t i = 0; i < 8; ++i) {
-        // Rectangles, then the mean over 9 px of a row in two images.
+        // Rectangles without a period, then the mean over 9 px of a row in two images.
         Image sharp(48, 36, 3);
         for (int y = 0; y < 36; ++y)
-            for (int x = 0; x < 48; ++x)
-                std::fill_n(sharp.at(x, y), 3, ((x + int(i)) / 5 + y / 7) % 2 == 0 ? 0.2f : 0.8f);
+            for (int x = 0; x < 48; ++x) {
+                const int block = (x + int(i)) / 5 * 7 + y / 7 * 13;
+                std::fill_n(sharp.at(x, y), 3, block * block / 3 % 2 == 0 ? 0.2f : 0.8f);
+            }
         Image image = sharp;
         for (int y = 0; (i == 2 || i == 4) && y < 36; ++y)
             for (int x = 4; x < 44; ++x) {

@@ -143,12 +143,12 @@ TEST(Schedule, PointsAreNotResetAndHaveNoMcmc) {
     TrainOptions options;
     options.render.points = true;
     options.strategy = Strategy::automatic;
-    const TrainOptions resolved = resolve(options, {});
+    const TrainOptions resolved = resolve(options, {}, {});
     EXPECT_EQ(resolved.strategy, Strategy::adc);
     const train::Schedule schedule = train::schedule_for(resolved);
     for (int step = 1; step <= options.steps; ++step) ASSERT_FALSE(schedule.resets_opacity(step));
     options.render.points = false;
-    EXPECT_EQ(resolve(options, {}).strategy, Strategy::mcmc);
+    EXPECT_EQ(resolve(options, {}, {}).strategy, Strategy::mcmc);
 }
 
 TEST(Schedule, RelocationsStopWhereMcmcsCodeStopsThem) {

@@ -2,6 +2,7 @@
 // Training as a whole: it learns, it repeats itself byte by byte, and it stays within its bounds.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
@@ -466,6 +467,29 @@ Dataset in_stops(Synthetic& made, const std::array<double, 8>& stops, double red
     return dataset;
 }
 
+/// Images of one camera that show its points, each in a pixel of its grey, times 2^stops.
+Dataset textured(Synthetic& made, const std::array<double, 8>& stops) {
+    Dataset dataset = in_stops(made, stops);
+    const Camera camera = dataset.frames[0].camera;
+    dataset.points = {};
+    for (size_t i = 0; i < stops.size(); ++i) {
+        Image image(48, 36, 3);
+        for (int y = 0; y < 36; ++y)
+            for (int x = 0; x < 48; ++x) {
+                const int grey = 60 + (x * x + 5 * y * y + 3 * x * y) % 120;
+                std::fill_n(image.at(x, y), 3, float(std::exp2(stops[i]) * grey / 255));
+                if (i > 0) continue;
+                const glm::dvec3 ray((x + 0.5 - camera.cx) / camera.fx, (y + 0.5 - camera.cy) / camera.fy, 1);
+                dataset.points.positions.push_back(glm::transpose(camera.rotation) *
+                                                   (2.0 * ray - camera.translation));
+                dataset.points.colors.push_back({uint8_t(grey), uint8_t(grey), uint8_t(grey)});
+            }
+        save_image(dataset.frames[i].image_path, image);
+        dataset.frames[i].camera = camera;
+    }
+    return dataset;
+}
+
 TEST(AppearanceChoice, IsAModelWhereImagesDisagreeOnThePoints) {
     Synthetic made;
     const auto found = [](const Dataset& dataset) {
@@ -484,7 +508,7 @@ TEST(AppearanceChoice, IsAModelWhereImagesDisagreeOnThePoints) {
     EXPECT_NEAR(found(brighter).exposure, 0.3, 0.01);
     EXPECT_NEAR(found(brighter).color, 0, 0.01);
     EXPECT_EQ(choice(brighter).model, AppearanceModel::ppisp);
-    EXPECT_EQ(resolve(RunOptions().train, brighter).appearance, AppearanceModel::ppisp);
+    EXPECT_EQ(resolve(RunOptions().train, brighter, all_frames(brighter)).appearance, AppearanceModel::ppisp);
     const std::vector<float> first = train::first_exposures(brighter, all_frames(brighter));
     for (size_t k = 0; k < stops.size(); ++k) EXPECT_NEAR(first[k], stops[k], 0.02) << k;
     TrainOptions options;
@@ -499,9 +523,18 @@ TEST(AppearanceChoice, IsAModelWhereImagesDisagreeOnThePoints) {
     EXPECT_LT(redder.exposure, 0.04);
     EXPECT_EQ(choice(in_stops(made, {}, 1.15)).model, AppearanceModel::ppisp);
 
+    // Points of one grey, or of random colours, say nothing of images.
+    for (const bool random : {false, true}) {
+        Dataset colorless = textured(made, stops);
+        EXPECT_NEAR(found(colorless).exposure, 0.3, 0.05);
+        for (size_t i = 0; i < colorless.points.colors.size(); ++i)
+            colorless.points.colors[i].fill(uint8_t(random ? 60 + i * 7919 % 150 : 128));
+        EXPECT_EQ(found(colorless).images, 0) << random;
+    }
+
     Dataset pointless = brighter;
     pointless.points = {};
-    EXPECT_EQ(choice(pointless).reason, "the images have neither points in common nor EXIF");
+    EXPECT_EQ(choice(pointless).reason, "neither points nor EXIF say how the images differ");
     EXPECT_EQ(choice(pointless).model, AppearanceModel::none);
     EXPECT_EQ(train::first_exposures(pointless, {0, 1}), (std::vector<float>{0, 0}));
 }

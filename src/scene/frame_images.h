@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// How many images of frames may be decoded at once.
+#pragma once
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "ewa/dataset.h"
+
+namespace ewa::scene {
+
+/// So many images that their pixels take about 1 GiB as four float32 channels; at least one. frames: of these images.
+inline size_t images_at_once(const std::vector<const Frame*>& frames) {
+    constexpr uint64_t kPixels = 1 << 26;
+    uint64_t largest = 1;
+    for (const Frame* frame : frames)
+        largest = std::max(largest, uint64_t(frame->source.width) * uint64_t(frame->source.height));
+    return size_t(std::max<uint64_t>(1, kPixels / largest));
+}
+
+/// The frames with these indices.
+inline std::vector<const Frame*> frames_at(const Dataset& dataset, const std::vector<int>& indices) {
+    std::vector<const Frame*> frames;
+    for (const int index : indices) frames.push_back(&dataset.frames[size_t(index)]);
+    return frames;
+}
+
+}  // namespace ewa::scene
