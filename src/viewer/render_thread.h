@@ -24,7 +24,7 @@ struct Look {
     float splat_scale = 1;
     bool points = false;  // in place of the kernel
     int nearest = RenderOptions().nearest;
-    std::shared_ptr<const SkyMap> sky;  // in place of the background; null: none
+    std::shared_ptr<const SkyMap> sky = nullptr;  // in place of the background; null: none
     bool operator==(const Look&) const = default;
 };
 
