@@ -61,10 +61,10 @@ void RunFolder::begin(const nlohmann::ordered_json& config, bool continues) cons
     core::write_json(path_ / report::kConfigFile, config);
     if (continues) return;
     std::error_code absent;
-    for (const char* result :
-         {report::kCheckpointFile, report::kTimesFile, report::kSummaryFile, report::kReportFile,
-          report::kExposuresFile, report::kAppearanceFile, report::kCamerasFile, report::kEventsFile})
-        fs::remove(path_ / result, absent);
+    // The splats and the log stay until the run saves its own.
+    for (const std::string_view result : report::kRunFiles)
+        if (result != report::kConfigFile && result != report::kMetricsFile && result != report::kSplatsFile)
+            fs::remove(path_ / result, absent);
     for (const char* result : report::kCameraModelFiles) fs::remove(path_ / result, absent);
     for (const auto& [step, file] : kept_splats(path_)) fs::remove(file, absent);
 }

@@ -227,6 +227,11 @@ TEST_F(Runs, EvalRenderAndCompareUseTheSky) {
     expect_failure(run_ewa({"render", alone, "-o", folder / "a.png"}), 2,
                    "sky.json: \"size\" is not a number from 1 to 1024");
     fs::remove(run + "/sky.json");
+    // A run without a sky leaves none of an earlier one.
+    ASSERT_TRUE(fs::exists(other + "/sky.json"));
+    expect_success(run_ewa({"train", folder / "data", "-o", other, "--force", "--init", folder / "s.ply",
+                            "--quiet", "--steps", "1", "--test-every", "2"}));
+    EXPECT_FALSE(fs::exists(other + "/sky.json"));
     const Outcome without = run_ewa({"render", run, "--frames", "0", "-o", folder / "b.png"});
     EXPECT_EQ(without.status, 0);
     EXPECT_NE(without.err.find("sky.json is missing"), std::string::npos) << without.err;
