@@ -3,6 +3,7 @@
 #pragma once
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <glm/vec3.hpp>
 #include <vector>
@@ -17,6 +18,21 @@ T quantile(std::vector<T>& values, double share) {
     const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
     std::nth_element(values.begin(), at, values.end());
     return *at;
+}
+
+/// The middle of values, and how far they are from it.
+struct Center {
+    double median = 0;
+    double deviation =
+        0;  // the standard deviation of a normal distribution with the same median absolute deviation
+};
+
+/// The centre of the values, which few outliers do not change. Zeros without values. Overwrites the values. O(n).
+inline Center center_of(std::vector<double>& values) {
+    constexpr double kPerMad = 1.4826;  // of a normal distribution: sigma / MAD
+    const double median = quantile(values, 0.5);
+    for (double& value : values) value = std::abs(value - median);
+    return {median, kPerMad * quantile(values, 0.5)};
 }
 
 /// The mean squared distance of each point to its 3 nearest other points, or to all others if there are

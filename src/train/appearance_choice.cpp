@@ -70,11 +70,9 @@ std::vector<SeenPoint> seen_points(const Camera& camera, const PointCloud& point
 
 /// The median, and its standard error where the values are normal but for some outliers.
 Measured median_of(std::vector<double>& values) {
-    const double median = scene::quantile(values, 0.5);
-    for (double& value : values) value = std::abs(value - median);
-    constexpr double kDeviation = 1.4826,
-                     kOfMedian = 1.2533;  // of a normal distribution: sigma / MAD, sqrt(pi / 2)
-    return {median, kOfMedian * kDeviation * scene::quantile(values, 0.5) / std::sqrt(double(values.size()))};
+    constexpr double kOfMedian = 1.2533;  // sqrt(pi / 2), of a normal distribution
+    const auto [median, deviation] = scene::center_of(values);
+    return {median, kOfMedian * deviation / std::sqrt(double(values.size()))};
 }
 
 /// Whether the values go together: more than by chance, or because both are constant.
