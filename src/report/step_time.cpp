@@ -18,19 +18,28 @@ struct Stage {
 
 const std::vector<Stage>& stages() {
     static const std::vector<Stage> all = {
-        {"project", "finds where each splat is in the image, its shape and its colour", {"project"}},
+        {"project",
+         "finds where each splat is in the image, its shape and its colour",
+         {"project", "project_points", "band_tiles", "collect_visible", "receive_records"}},
         {"sort",
          "orders the splats by depth, and lists those of each tile of the image",
          {"fill counters", "depth order", "instance offsets", "emit_instances", "tile order", "tile_starts",
           "copy digit totals"}},
-        {"blend", "renders the view, each tile from front to back", {"blend"}},
+        {"blend", "renders the view, each tile from front to back", {"blend", "blend_points"}},
+        {"sky", "puts the sky behind the splats, and learns it", {"add_sky", "sky_gradient", "sky_update"}},
+        {"appearance",
+         "gives the render the look of its training image, and learns the look",
+         {"expose", "expose_backward", "exposure_update", "ppisp", "ppisp_backward", "ppisp_update",
+          "ppisp_camera_update", "grid_slice", "grid_slice_backward", "grid_gradient", "grid_update"}},
         {"loss",
          "compares the render with the training image, and finds how each pixel should change",
-         {"unpack_target", "mask_images", "expose", "loss_columns", "loss_rows", "reduce",
-          "loss_backward_columns", "loss_backward_rows", "mask_gradient", "expose_backward",
-          "exposure_update"}},
-        {"blend backward", "finds how each splat should change for that", {"blend_backward"}},
-        {"update", "changes the splats (Adam)", {"update"}},
+         {"unpack_target", "mask_images", "loss_columns", "loss_rows", "reduce", "loss_backward_columns",
+          "loss_backward_rows", "mask_gradient"}},
+        {"blend backward",
+         "finds how each splat should change for that",
+         {"blend_backward", "blend_points_backward"}},
+        {"update", "changes the splats (Adam)", {"sum_slots", "update", "update_points", "update_views"}},
+        {"camera", "moves and learns the cameras", {"move_camera", "motion_update"}},
         {"noise", "moves splats at random, to find better places (MCMC)", {"perturb"}}};
     return all;
 }

@@ -320,6 +320,48 @@ TEST(Report, StagesAddUpToTheStep) {
     EXPECT_NE(step_time_html(time).find("Means over 50 steps"), std::string::npos);
 }
 
+TEST(Report, NoPassOfTrainingIsCalledACopy) {
+    for (const char* pass : {"project",
+                             "project_points",
+                             "band_tiles",
+                             "collect_visible",
+                             "receive_records",
+                             "blend",
+                             "blend_points",
+                             "add_sky",
+                             "sky_gradient",
+                             "sky_update",
+                             "ppisp",
+                             "ppisp_backward",
+                             "ppisp_update",
+                             "ppisp_camera_update",
+                             "grid_slice",
+                             "grid_slice_backward",
+                             "grid_gradient",
+                             "grid_update",
+                             "expose",
+                             "expose_backward",
+                             "exposure_update",
+                             "unpack_target",
+                             "mask_images",
+                             "mask_gradient",
+                             "loss_columns",
+                             "loss_rows",
+                             "loss_backward_columns",
+                             "loss_backward_rows",
+                             "reduce",
+                             "blend_backward",
+                             "blend_points_backward",
+                             "sum_slots",
+                             "update",
+                             "update_points",
+                             "update_views",
+                             "move_camera",
+                             "motion_update",
+                             "perturb"})
+        EXPECT_NE(stages_of({1, 20, 0, {{pass, 10}}}).front().name, "other passes") << pass;
+}
+
 TEST(Report, StagesOfOverlappingStepsAreScaledToTheStep) {
     double sum = 0;
     for (const StageTime& stage : stages_of({50, 20, 0, {{"project", 10}, {"blend", 30}}})) {
