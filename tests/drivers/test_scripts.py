@@ -49,7 +49,7 @@ class Drivers(unittest.TestCase):
 class GpuCheck(unittest.TestCase):
     @unittest.skipUnless(BENCH, "without ewa-bench")
     def test_each_prediction_finds_its_passes(self):
-        said = subprocess.run([BENCH, "--cases", "capture_2k*train", "--runs", "1"], stdout=subprocess.PIPE, text=True, check=True).stdout
+        said = subprocess.run([BENCH, "--cases", "capture_2k*train", "--runs", "5"], stdout=subprocess.PIPE, text=True, check=True).stdout
         script = f'source {PROJECT}/scripts/gpu-check; here={PROJECT}/bench; pass_times <(cat)'
         rows = subprocess.run(["bash", "-c", script], input=said, stdout=subprocess.PIPE, text=True, check=True).stdout
         times = {line.split("|")[0]: float(line.split("|")[1]) for line in rows.splitlines()}
