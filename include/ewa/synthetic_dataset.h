@@ -29,6 +29,7 @@ struct SyntheticOptions {
     /// ppisp: each image has an exposure and colours of its own, and all share a vignette and a response. Their means over
     /// all images change nothing. none: images are as develop makes them.
     AppearanceModel appearance = AppearanceModel::none;
+    bool sky = false;    // images show the sky, and have no alpha; else they are transparent there
     bool force = false;  // replaces the views of another scene or of other options in the folder
 };
 
@@ -50,7 +51,7 @@ bool is_mesh_scene(const std::filesystem::path& path);
 /// Renders the scene into a folder, in the glTF's own world frame. docs/meshes.md describes the light
 /// transport.
 /// - images/*.png: 8 bit, sRGB's curve over min(1, radiance * 2^exposure), with alpha where the sky is
-///   visible.
+///   visible, unless SyntheticOptions::sky shows it.
 /// - depth/*.exr: camera z in world units, 0 for the sky.
 /// - points.ply: initial points.
 /// - appearance.json, with SyntheticOptions::appearance: what was applied to each image.

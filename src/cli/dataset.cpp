@@ -79,6 +79,7 @@ Action add_dataset(CLI::App& app) {
         "--vary-appearance", arguments->varied,
         "Give each image an exposure and colours of its own, and the camera a vignette and a response. "
         "DIR/appearance.json has them");
+    app.add_flag("--sky", options.sky, "Show the sky in the images, which else are transparent there");
     app.add_option("--seed", options.seed,
                    "Seed of random numbers. The same seed on the same device gives the same bytes")
         ->check(accepted_by(train::run_option("seed")))

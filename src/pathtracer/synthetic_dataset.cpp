@@ -113,6 +113,7 @@ std::string RenderJob::fingerprint() const {
     hash.add(options.seed);
     hash.add(options.exposure.value_or(1e9));
     if (options.appearance != AppearanceModel::none) hash.add(double(options.appearance));
+    if (options.sky) hash.add(std::string("sky"));
     char text[17];
     std::snprintf(text, sizeof(text), "%016llx", static_cast<unsigned long long>(hash.value()));
     return text;
@@ -271,8 +272,9 @@ class DatasetJob {
         const auto words =
             core::pcg4d({uint32_t(i), 0, uint32_t(options_.seed), uint32_t(options_.seed >> 32)});
         const uint64_t seed = uint64_t(words[0]) << 32 | words[1];
-        const Image radiance =
+        Image radiance =
             tracer_.radiance(cameras_[i], options_.samples, seed, shared::TRACE_SAMPLE_MAX / factor);
+        if (options_.sky) pathtracer::show_sky(radiance, cameras_[i], job_.scene.sky);
         Image image = pathtracer::develop(radiance, factor);
         if (!appearances_.empty()) image = with_appearance(std::move(image), appearances_[i]);
         save_image(folder_ / job_.image_name(i), image);

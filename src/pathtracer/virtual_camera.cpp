@@ -70,6 +70,18 @@ float developed(double value) {
     return float(scene::srgb_of_linear(std::min(value, 1.0)));
 }
 
+void show_sky(Image& radiance, const Camera& camera, const scene::Sky& sky) {
+    for (int y = 0; y < radiance.height; ++y)
+        for (int x = 0; x < radiance.width; ++x) {
+            const glm::dvec3 ray((x + 0.5 - camera.cx) / camera.fx, (y + 0.5 - camera.cy) / camera.fy, 1);
+            const float up = float(glm::normalize(glm::transpose(camera.rotation) * ray).y);
+            const glm::vec3 color = glm::mix(sky.horizon, up >= 0 ? sky.zenith : sky.ground, std::abs(up));
+            float* pixel = radiance.at(x, y);
+            for (int c = 0; c < 3; ++c) pixel[c] += (1 - pixel[3]) * color[c];
+            pixel[3] = 1;
+        }
+}
+
 Image develop(const Image& radiance, double factor) {
     bool whole = true;
     for (size_t i = 3; i < radiance.pixels.size(); i += 4) whole = whole && radiance.pixels[i] >= 1;

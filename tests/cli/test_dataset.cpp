@@ -51,6 +51,33 @@ TEST(Dataset, IsReadBackByOurOwnReader) {
     EXPECT_EQ(info.out.find("does not depend on the view"), std::string::npos);
 }
 
+TEST(Dataset, SkyIsVisibleOrTransparent) {
+    const Folder folder;
+    std::vector<std::string> visible = small("railing.gltf", folder / "sky");
+    visible.push_back("--sky");
+    ASSERT_EQ(run_ewa(small("railing.gltf", folder / "clear")).status, 0);
+    ASSERT_EQ(run_ewa(visible).status, 0);
+    const ewa::Dataset clear = ewa::load_dataset(folder / "clear", {}),
+                       sky = ewa::load_dataset(folder / "sky", {});
+    int clear_pixels = 0;
+    for (size_t i = 0; i < clear.frames.size(); ++i) {
+        const ewa::Image a = ewa::load_image(clear.frames[i].image_path),
+                         b = ewa::load_image(sky.frames[i].image_path);
+        ASSERT_EQ(a.channels, 4);
+        ASSERT_EQ(b.channels, 3);
+        for (int y = 0; y < a.height; ++y)
+            for (int x = 0; x < a.width; ++x) {
+                for (int c = 0; c < 3 && a.at(x, y)[3] == 1; ++c) EXPECT_EQ(a.at(x, y)[c], b.at(x, y)[c]);
+                if (a.at(x, y)[3] > 0) continue;
+                EXPECT_GT(b.at(x, y)[2], 0.2f);
+                ++clear_pixels;
+            }
+    }
+    EXPECT_GT(clear_pixels, 20);
+    visible.pop_back();
+    EXPECT_EQ(run_ewa(visible).status, 2) << "images of other options are not replaced";
+}
+
 TEST(Dataset, GoesOnWhereItWasEnded) {
     const Folder folder;
     ASSERT_EQ(run_ewa(small("railing.gltf", folder / "d")).status, 0);
