@@ -42,9 +42,11 @@ struct TrainOptions {
     int bands = 1;
     Strategy strategy = Strategy::mcmc;
     uint32_t max_splats = kAutomaticMaxSplats;  // hard limit
-    int sh_degree = 3;                          // 0 to 3, or kAutomaticShDegree
-    uint64_t seed = 0;                          // the same seed on the same device gives the same bytes
-    bool random_background = false;             // a new background colour each step
+    /// Splats that the last quarter of the run has at most: those of the largest weight at a pixel of a training image. 0: all.
+    uint32_t final_splats = 0;
+    int sh_degree = 3;               // 0 to 3, or kAutomaticShDegree
+    uint64_t seed = 0;               // the same seed on the same device gives the same bytes
+    bool random_background = false;  // a new background colour each step
     /// Learns a SkyMap in place of the background. Not with refine_poses.
     bool sky = false;
     double sky_rate = 0.02, sky_rate_final = 0.002;

@@ -233,6 +233,13 @@ struct BlendBackward : BlendBackwardBuffers {
     static constexpr char shader[] = "blend_backward";
 };
 
+/// Raises each splat's largest weight at a pixel: the bits of a float a splat. Variant: SPEC_KERNEL.
+struct Contribute {
+    static constexpr char shader[] = "contribute";
+    using Work = PerTile;
+    gpu::BufferPart records, splats, tile_starts, largest;
+};
+
 /// Absolute gradients by the means over any number of channels, in slots whose other floats are 0. Variant: SPEC_MODE (the
 /// number of channels), SPEC_SHARP, SPEC_PARTS.
 struct BlendAbsolute {

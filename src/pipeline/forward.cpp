@@ -177,6 +177,14 @@ Sorted FramePasses::draw(uint32_t splats) const {
             .indices = plan.gradients ? &frame.sorted_indices[1] : nullptr};
 }
 
+void FramePasses::contributions(const Sorted& sorted, const gpu::Buffer& largest) const {
+    record(passes::Contribute{.records = frame.records,
+                              .splats = *sorted.splats,
+                              .tile_starts = frame.tile_starts,
+                              .largest = largest},
+           blend_push(cache.config(), frame, inputs.background), {kernel()});
+}
+
 Sorted FramePasses::forward(const Model& model) const {
     project(model);
     return draw(model.splats);

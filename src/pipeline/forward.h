@@ -40,6 +40,9 @@ struct FramePasses : passes::Recorder {
     /// The rest of forward: from frame's records, depth_keys[0] and tile_counts of `splats` splats to the image planes.
     Sorted draw(uint32_t splats) const;
 
+    /// After drawing: raises each splat's largest weight at a pixel, as the bits of a float.
+    void contributions(const Sorted& sorted, const gpu::Buffer& largest) const;
+
     /// Leaves the parts of the loss in Counts and dL/d(image) in frame.image_gradient. The loss is that of the whole view:
     /// those of its bands add up to it, and so do their gradients.
     /// photo: width * height texels, RGBA. Its alpha composites it over the background or, if `masked`, is the

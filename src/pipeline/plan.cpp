@@ -68,6 +68,7 @@ Plan plan_for(const PlanRequest& request) {
         plan.statistics = request.statistics;
         plan.absolute = request.statistics && request.absolute_gradients;
         plan.regularised = request.regularised;
+        plan.pruned = request.pruned;
     }
     return plan;
 }
@@ -91,6 +92,9 @@ std::vector<PlanLine> describe(const Plan& plan, int scene_degree, uint64_t spla
         lines.push_back({"sums of absolute gradients", "not asked for (--absgrad)", 0});
     if (!plan.regularised && plan.adam)
         lines.push_back({"opacity and scale regularisers", "the strategy has none", 0});
+    if (!plan.pruned && plan.adam && !plan.points())
+        lines.push_back({"largest weights of splats in the training images",
+                         "all splats stay (--final-splats)", sizeof(float) * splats});
     if (plan.drawing != Drawing::depth)
         lines.push_back({"depth plane", "only colour and opacity were asked for", 0});
     if (plan.gradients && !plan.masks)

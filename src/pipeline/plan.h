@@ -40,6 +40,7 @@ struct PlanRequest {
     bool absolute_gradients = false;  // of the statistics: absolute gradients of the pixels
     bool packed_moments = false;      // Adam's moments in 16 bits each
     bool regularised = false;         // opacity and scale regularisers in the loss
+    bool pruned = false;              // splats of small weight are removed near the end
 };
 
 struct Plan {
@@ -56,6 +57,7 @@ struct Plan {
     bool statistics = false;      // densification statistics
     bool absolute = false;        // of absolute gradients
     bool regularised = false;     // opacity and scale regularisers in the loss
+    bool pruned = false;          // splats of small weight are removed near the end
     bool masks = false;
     AppearanceModel appearance = AppearanceModel::none;
     bool motion = false;  // the gradient by the camera's motion

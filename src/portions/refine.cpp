@@ -2,7 +2,9 @@
 #include "portions/refine.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
+#include <limits>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -161,6 +163,88 @@ Refinement refine_mcmc(Portions& portions, const Phase& phase, const McmcRules& 
     }
     portions.level();
     return result;
+}
+
+namespace {
+
+/// The bits of a float of at least zero. They are ordered as such floats are.
+uint32_t bits_of(float weight) {
+    return std::bit_cast<uint32_t>(weight);
+}
+
+/// Which splats have the `kept` largest weights.
+class Largest {
+  public:
+    /// Collective. There are at least `kept` splats.
+    Largest(Portions& portions, std::span<const std::vector<float>> weights, uint32_t kept)
+        : weights_(weights) {
+        // The bisection ends at the bits of the smallest weight that is kept.
+        uint64_t low = 0, high = uint64_t(1) << 32;
+        while (high - low > 1) {
+            const uint64_t middle = low + (high - low) / 2;
+            (all_from(portions, uint32_t(middle)) >= kept ? low : high) = middle;
+        }
+        least_ = uint32_t(low);
+        const uint64_t above =
+            least_ == std::numeric_limits<uint32_t>::max() ? 0 : all_from(portions, least_ + 1);
+        uint64_t room = kept - above;
+        std::vector<uint64_t> equal;
+        for (const std::vector<float>& own : weights)
+            equal.push_back(uint64_t(
+                std::ranges::count_if(own, [&](float weight) { return bits_of(weight) == least_; })));
+        const auto first = size_t(portions.first());
+        const std::vector<uint64_t> all = portions.ranks().gather(equal);
+        for (size_t p = 0; p < first + weights.size(); ++p) {
+            if (p >= first) equal_.push_back(std::min(room, all[p]));
+            room -= std::min(room, all[p]);
+        }
+    }
+
+    /// A flag for each splat of one of this rank's portions.
+    std::vector<bool> of(size_t portion) const {
+        std::vector<bool> kept;
+        uint64_t room = equal_[portion];
+        for (const float weight : weights_[portion]) {
+            const bool equal = bits_of(weight) == least_;
+            kept.push_back(bits_of(weight) > least_ || (equal && room > 0));
+            if (equal && room > 0) --room;
+        }
+        return kept;
+    }
+
+  private:
+    uint64_t all_from(Portions& portions, uint32_t bits) const {
+        uint64_t own = 0;
+        for (const std::vector<float>& each : weights_)
+            own += uint64_t(std::ranges::count_if(each, [&](float w) { return bits_of(w) >= bits; }));
+        const std::vector<uint64_t> all = portions.ranks().gather(std::span(&own, 1));
+        return std::accumulate(all.begin(), all.end(), uint64_t(0));
+    }
+
+    std::span<const std::vector<float>> weights_;
+    uint32_t least_ = 0;
+    std::vector<uint64_t> equal_;  // of each portion: splats of the least weight that are kept
+};
+
+}  // namespace
+
+Refinement keep_largest(Portions& portions, const Phase& phase, std::span<const std::vector<float>> largest,
+                        uint32_t kept) {
+    const uint32_t before = portions.splats();
+    if (before <= kept) return {before, before, 0};
+    const Largest chosen(portions, largest, kept);
+    const DensifyRules rules{.prune_logit = std::numeric_limits<float>::lowest()};
+    portions.visit(Portions::Need::state, [&](int portion, Model& model) {
+        const std::vector<bool> stays = chosen.of(size_t(portion));
+        // Without views nothing grows; a negative number of them prunes.
+        std::vector<float> statistics(2 * stays.size());
+        for (size_t i = 0; i < stays.size(); ++i) statistics[2 * i + 1] = stays[i] ? 0.0f : -1.0f;
+        model.statistics = fresh_statistics(phase.cache.device(), model.splats);
+        model.statistics.upload(std::span<const float>(statistics));
+        write_densified(phase, model, rules, std::numeric_limits<float>::infinity());
+    });
+    portions.level();
+    return {before, portions.splats(), 0};
 }
 
 }  // namespace ewa::portions

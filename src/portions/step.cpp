@@ -291,7 +291,9 @@ void Step::return_sums(const StepParts& parts, const Turn& turn) {
     });
 }
 
-shared::Counts Step::draw_own(const StepParts& parts, const ViewPart& view_part, const Turn& turn) {
+/// largest: gets the largest weight of each splat of the list, if it is given.
+shared::Counts Step::draw_own(const StepParts& parts, const ViewPart& view_part, const Turn& turn,
+                              const gpu::Buffer* largest) {
     gpu::Device& device = parts.cache.device();
     const bool alone = portions_.alone();
     const uint64_t listed = turn.own();
@@ -311,6 +313,10 @@ shared::Counts Step::draw_own(const StepParts& parts, const ViewPart& view_part,
             on.list_backward(splats, sorted, sums,
                              alone ? uint32_t(seen_[view_part.number].first_indices.front()) : 0);
         }
+        if (largest) {
+            recording.fill(*largest, 0, 0, largest->bytes());
+            on.contributions(sorted, *largest);
+        }
         const shared::Counts counts = run(parts, recording);
         if (counts.instances <= parts.frame.instance_capacity) return counts;
         parts.instance_capacity = grown_capacity(counts.instances);
@@ -327,6 +333,59 @@ bool Step::draw_views(const StepParts& parts, std::span<const StepView> views) {
     send(parts, of, turn);
     if (turn.draws(own)) draw_own(parts, part_of(parts, of, size_t(own)), turn);
     return turn.draws(own);
+}
+
+/// The largest weights of this rank's splats in the parts of the turn, as each part lists them.
+std::vector<float> Step::weights_of(const StepParts& parts, const Views& of, const Turn& turn) {
+    const size_t ranks = size_t(portions_.ranks().size()), own = size_t(portions_.ranks().rank());
+    std::vector<float> drawn(turn.own()), listed(sum_of(turn.listed));
+    if (turn.draws(int(own))) {
+        const gpu::Buffer largest(parts.cache.device(), "largest weights",
+                                  sizeof(float) * std::max<uint64_t>(turn.own(), 1));
+        draw_own(parts, part_of(parts, of, own), turn, &largest);
+        if (!drawn.empty()) drawn = largest.download<float>(drawn.size());
+    }
+    std::vector<std::span<const std::byte>> out(ranks);
+    std::vector<std::span<std::byte>> in(ranks);
+    size_t from = 0, to = 0;
+    for (size_t rank = 0; rank < ranks; ++rank) {
+        out[rank] = std::as_bytes(std::span(drawn).subspan(from, turn.of_own[rank]));
+        from += turn.of_own[rank];
+        if (!turn.draws(int(rank))) continue;
+        in[rank] = std::as_writable_bytes(std::span(listed).subspan(to, turn.listed[rank]));
+        to += turn.listed[rank];
+    }
+    exchange(out, in);
+    return listed;
+}
+
+void Step::raise_weights(const StepParts& parts, std::span<const StepView> views,
+                         std::vector<std::vector<float>>& largest) {
+    const Views of{views, 1};
+    StepSums sums;
+    seen_.assign(views.size(), Seen(size_t(portions_.count())));
+    list(parts, of, 0, views.size());
+    const Turn turn = turn_of(gather_counts(0, views.size(), sums), 0, views.size(), 0);
+    send(parts, of, turn);
+    const std::vector<float> listed = weights_of(parts, of, turn);
+    portions_.visit(Portions::Need::state, [&](int portion, const Model& model) {
+        const auto indices = portions_.take_list_indices().download<uint32_t>(views.size() * model.splats);
+        std::vector<float>& raised = largest[size_t(portion)];
+        raised.resize(model.splats);
+        size_t before = 0;
+        for (size_t view = 0; view < views.size(); ++view) {
+            const Seen& seen = seen_[view];
+            const float* weights =
+                listed.data() + before + sum_of(std::span(seen.listed).first(size_t(portion)));
+            before += sum_of(seen.listed);
+            for (uint32_t i = 0; i < model.splats; ++i) {
+                const uint32_t index = indices[view * model.splats + i];
+                if (index != shared::NOT_LISTED)
+                    raised[i] = std::max(raised[i], weights[index - seen.first_indices[size_t(portion)]]);
+            }
+        }
+    });
+    seen_.clear();
 }
 
 StepSums Step::draw(const StepParts& parts, std::span<const StepView> views) {

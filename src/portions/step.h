@@ -70,6 +70,13 @@ class Step {
     /// has drawn one, which the frame then holds.
     bool draw_views(const StepParts& parts, std::span<const StepView> views);
 
+    /// Raises `largest`, a float a splat of each of this rank's portions, to the splat's largest weight at a pixel of the views:
+    /// at most as many views as ranks, without a loss.
+    void raise_weights(const StepParts& parts, std::span<const StepView> views,
+                       std::vector<std::vector<float>>& largest);
+    /// Frees what a step holds on the device besides the portions.
+    void free_buffers() { buffers_ = {}, own_sums_ = {}; }
+
     const Traffic& traffic() const { return traffic_; }
 
   private:
@@ -93,7 +100,9 @@ class Step {
     Turn turn_of(const std::vector<uint64_t>& listed, size_t first, size_t view_parts, size_t begin) const;
     std::vector<uint64_t> gather_counts(size_t first, size_t view_parts, StepSums& sums);
     void send(const StepParts& parts, const Views& of, const Turn& turn);
-    shared::Counts draw_own(const StepParts& parts, const ViewPart& view_part, const Turn& turn);
+    shared::Counts draw_own(const StepParts& parts, const ViewPart& view_part, const Turn& turn,
+                            const gpu::Buffer* largest = nullptr);
+    std::vector<float> weights_of(const StepParts& parts, const Views& of, const Turn& turn);
     void return_sums(const StepParts& parts, const Turn& turn);
     void upload_sums(const StepParts& parts, size_t portion);
 

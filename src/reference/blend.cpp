@@ -222,6 +222,18 @@ BlendGradients blend_backward(std::span<const Projected> projected, const Instan
     return out;
 }
 
+std::vector<double> largest_weights(std::span<const Projected> projected, const Instances& instances,
+                                    const Smoothing& smoothing) {
+    std::vector<double> largest(projected.size());
+    const std::vector<Whitener> whiteners = whiteners_of(projected);
+    for (int y = 0; y < instances.grid.image_height; ++y)
+        for (int x = 0; x < instances.grid.image_width; ++x)
+            walk_pixel(projected, whiteners, instances, x, y, smoothing, [&](const Contribution& c) {
+                largest[c.splat] = std::max(largest[c.splat], c.alpha.value * c.transmittance);
+            });
+    return largest;
+}
+
 Raster ellipsoids(std::span<const Projected> projected, const Instances& instances,
                   const std::array<float, 3>& background) {
     const TileGrid& grid = instances.grid;

@@ -222,6 +222,10 @@ BlendGradients blend_backward(std::span<const Projected> projected, const Instan
                               const Blended& blended, const Raster& image_gradient,
                               const Smoothing& smoothing = {});
 
+/// The largest weight alpha T that each splat has at a pixel; 0 for one that no pixel shows (Niemeyer et al. 2024, RadSplat).
+std::vector<double> largest_weights(std::span<const Projected> projected, const Instances& instances,
+                                    const Smoothing& smoothing = {});
+
 /// Renders splats as solids. A pixel shows the nearest splat, by its mean's depth, with an opacity of at
 /// least ELLIPSOID_OPACITY whose ellipse contains the pixel. The ellipse has ELLIPSOID_REACH standard
 /// deviations, including the low-pass. With the distance d in standard deviations, the RGB colour is

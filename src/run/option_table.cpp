@@ -93,6 +93,17 @@ RunOption max_splats_option() {
     return option;
 }
 
+RunOption final_splats_option() {
+    RunOption option = number<uint32_t>(
+        "final-splats", "N",
+        "Keep only so many splats for the last quarter of the run: those that show most at a pixel of a "
+        "training "
+        "image. 0: all",
+        kDecides, [](RunOptions& o) -> uint32_t& { return o.train.final_splats; }, 0, 1000000000);
+    option.before = "0";
+    return option;
+}
+
 RunOption moments_option() {
     const Member<int> member = [](RunOptions& o) -> int& { return o.train.moment_bits; };
     RunOption option =
@@ -301,6 +312,7 @@ std::vector<Row> rows() {
              "(3DGS-MCMC). none keeps the number of splats. auto is mcmc from 5000 steps on, else adc",
              [](RunOptions& o) -> Strategy& { return o.train.strategy; }, kStrategies)},
         {"Quality", "max_splats", max_splats_option()},
+        {"Quality", "final_splats", final_splats_option()},
         {"Quality", "sh_degree", sh_degree_option()},
         {"Quality", "absolute_gradients",
          flag("absgrad",

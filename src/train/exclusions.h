@@ -57,6 +57,9 @@ inline constexpr std::array kPointExclusions{
     core::Exclusion<TrainOptions>{"--points", has_points, core::Relation::excludes, "--revised-opacity",
                                   [](const TrainOptions& options) { return options.revised_opacity; },
                                   "a sphere has no opacity"},
+    core::Exclusion<TrainOptions>{"--points", has_points, core::Relation::excludes, "--final-splats",
+                                  [](const TrainOptions& options) { return options.final_splats > 0; },
+                                  "a sphere has no weight at a pixel"},
     core::Exclusion<TrainOptions>{"--points", has_points, core::Relation::excludes, "--refine-poses",
                                   [](const TrainOptions& options) { return options.refine_poses; },
                                   "spheres have no gradient by the camera"}};

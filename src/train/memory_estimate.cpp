@@ -247,7 +247,8 @@ MemoryEstimate MemoryEstimator::up_to(uint32_t max_splats) {
         const uint64_t second = grows ? array + kRefineBytes * estimate.splats : 0;
         estimate.frame = std::max(estimate.frame, sizes.total() - instances + std::max(instances, second));
     }
-    if (options.batch > 1 || options.bands > 1)
+    // Largest weights are found in a list of the splats that a view shows.
+    if (options.batch > 1 || options.bands > 1 || plan.pruned)
         estimate.frame +=
             ViewBuffers::most_bytes(plan, estimate.splats, uint64_t(options.batch), uint64_t(options.bands));
     estimate.images = image_bytes(dataset_, frames_, options);

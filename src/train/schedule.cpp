@@ -35,6 +35,7 @@ constexpr double kLastFading = 0.1;
 // PPISP and bilateral grids: steps of a full run in which their rates rise, and the rates' first and last factor.
 constexpr double kPpispWarmUp = 500, kGridWarmUp = 1000, kLastAppearanceRate = 0.01;
 constexpr size_t kMostPhotosOfRate = 400;
+constexpr double kPruneShare = 0.75;  // of the steps: 0.55 gave no better images (docs/training.md)
 
 double decayed(double first, double last, double share) {
     const double t = std::clamp(share, 0.0, 1.0);
@@ -60,7 +61,8 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
             .statistics = options.strategy == Strategy::adc,
             .absolute_gradients = options.absolute_gradients,
             .packed_moments = options.moment_bits == 16,
-            .regularised = options.strategy == Strategy::mcmc || few_photos(options, photos)};
+            .regularised = options.strategy == Strategy::mcmc || few_photos(options, photos),
+            .pruned = options.final_splats > 0};
 }
 
 void check_exclusions(const TrainOptions& options, int ranks) {
@@ -88,15 +90,18 @@ void check_training(const TrainOptions& options, int ranks) {
 }
 
 bool Schedule::densifies(int step) const {
-    return step > refine_start && step < refine_stop && (step - refine_start) % refine_every == 0;
+    return step > refine_start && step < refine_stop && may_refine(step) &&
+           (step - refine_start) % refine_every == 0;
 }
 
 bool Schedule::relocates(int step) const {
-    return step > refine_start && step < relocate_stop && (step - refine_start) % relocate_every == 0;
+    return step > refine_start && step < relocate_stop && may_refine(step) &&
+           (step - refine_start) % relocate_every == 0;
 }
 
 bool Schedule::resets_opacity(int step) const {
-    return opacity_reset_every > 0 && step < refine_stop && step % opacity_reset_every == 0;
+    return opacity_reset_every > 0 && step < refine_stop && may_refine(step) &&
+           step % opacity_reset_every == 0;
 }
 
 bool Schedule::was_reset(int step) const {
@@ -181,6 +186,7 @@ Schedule schedule_for(const TrainOptions& options, size_t photos) {
     if (options.opacity_reset_every > 0 && !options.render.points)
         s.opacity_reset_every =
             scaled(options.opacity_reset_every, std::min(options.opacity_reset_every, kLeastResetEvery));
+    if (options.final_splats > 0) s.prune_step = std::max(1, int(std::lround(kPruneShare * options.steps)));
     s.sh_degree_every = scaled(options.sh_degree_every, std::min(options.sh_degree_every, kLeastShEvery));
     s.sh_degree = options.sh_degree;
     s.halvings = options.halvings;

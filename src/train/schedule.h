@@ -31,6 +31,7 @@ struct Schedule {
     double growth = 1;       // of MCMC at each refinement, so that the whole run grows as much as a full run
     double copy_spread = 0;  // of MCMC
     int opacity_reset_every = 0;  // 0: never
+    int prune_step = 0;  // with TrainOptions::final_splats: the step after which splats are removed; 0: never
     int sh_degree_every = 0;
     int sh_degree = 0;  // the highest
     int halvings = 0, resolution_every = 0;
@@ -50,6 +51,9 @@ struct Schedule {
     /// MCMC: relocate and grow after this step?
     bool relocates(int step) const;
     bool resets_opacity(int step) const;
+    /// Remove splats down to TrainOptions::final_splats after this step? From then on their number stays.
+    bool prunes(int step) const { return step == prune_step; }
+    bool may_refine(int step) const { return prune_step == 0 || step < prune_step; }
     /// Has an opacity reset happened at or before this step? Only then does size prune.
     bool was_reset(int step) const;
     /// SH degree evaluated in this step.

@@ -128,6 +128,8 @@ Training::Training(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
                  .statistics = plan_.statistics}),
       several_(portions_, options.bands) {
     check_bands(options, tools_.cache.config(), images_.lowest());
+    if (options.final_splats > 0)
+        portions::check_portions(std::min(options.final_splats, portions_.splats()), portions_.all());
     // The first frame says how many there are. With a limit, a capacity for all splats might not fit.
     tools_.instance_capacity = first_capacity(portions_.streamed() ? 0 : ready.size());
     if (plan_.appearance == AppearanceModel::affine)

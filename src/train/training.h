@@ -155,6 +155,8 @@ class Training {
 
     void follow_up(int step);
     void control_density(int step);
+    /// Removes splats down to final_splats.
+    void prune(int step);
     /// refine: changes the numbers of the portions' splats.
     void refine(const std::function<void(const pipeline::Phase&)>& refine);
 

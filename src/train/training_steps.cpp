@@ -152,7 +152,8 @@ void Training::finish_all() {
 }
 
 bool Training::must_finish(int step) const {
-    return step == options_.steps || (options_.strategy == Strategy::mcmc && schedule_.relocates(step)) ||
+    return step == options_.steps || schedule_.prunes(step) ||
+           (options_.strategy == Strategy::mcmc && schedule_.relocates(step)) ||
            (options_.strategy == Strategy::adc &&
             (schedule_.densifies(step) || schedule_.resets_opacity(step)));
 }
@@ -310,7 +311,36 @@ void Training::refine(const std::function<void(const Phase&)>& refine) {
     if (portions_.streamed()) tools_.frame = {};
 }
 
+void Training::prune(int step) {
+    if (portions_.splats() <= options_.final_splats) return;
+    std::vector<std::vector<float>> largest(size_t(portions_.count()));
+    portions::StepParts parts = step_parts();
+    parts.submitted = [] {};
+    const auto at_once = size_t(portions_.ranks().size());
+    for (size_t first = 0; first < images_.count(); first += at_once) {
+        std::vector<portions::StepView> views;
+        for (size_t i = first; i < std::min(first + at_once, images_.count()); ++i) {
+            CameraUse camera = images_.full().camera(i);
+            if (plan_.motion) {
+                gpu::Recording recording(device_->limits());
+                camera = record_move_camera({recording, tools_.cache}, learned_.motions, uint32_t(i), camera);
+                tools_.executor.run(recording);
+            }
+            views.push_back({.inputs = {.camera = camera, .sh_degree = schedule_.degree(step)},
+                             .request = request_of(camera),
+                             .record_loss = {},
+                             .weight = {},
+                             .learned = {},
+                             .learn = {}});
+        }
+        several_.raise_weights(parts, views, largest);
+    }
+    if (fused()) several_.free_buffers();
+    refine([&](const Phase& phase) { keep_largest(portions_, phase, largest, options_.final_splats); });
+}
+
 void Training::follow_up(int step) {
+    if (schedule_.prunes(step)) return prune(step);
     if (options_.strategy == Strategy::adc) control_density(step);
     if (options_.strategy != Strategy::mcmc || !schedule_.relocates(step)) return;
     const McmcRules rules{.dead_opacity = options_.dead_opacity,

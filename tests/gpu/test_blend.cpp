@@ -187,6 +187,29 @@ TEST_P(BlendPass, EllipsoidsMatchTheReference) {
     EXPECT_LE(difference.over, size_t(c.width) * size_t(c.height) / 50);
 }
 
+TEST_P(BlendPass, LargestWeightsMatchTheReference) {
+    const BlendCase& c = GetParam();
+    const Lists lists(random_scene(1500 + c.splats, c.splats, c.kind, c.width, c.height));
+    Rig& r = rig();
+    // What other views have left stays where it is larger.
+    std::vector<float> before(std::max<size_t>(c.splats, 1));
+    for (size_t i = 0; i < before.size(); ++i) before[i] = i % 7 == 3 ? 0.01f : 0.0f;
+    Guarded largest("largest", before);
+    r.run([&](gpu::Recording& recording) {
+        r.cache.get<passes::Contribute>().record(
+            recording, {lists.records, lists.splats, lists.starts, largest}, lists.push());
+    });
+    EXPECT_TRUE(largest.intact());
+    const auto expected = reference::largest_weights(lists.cpu.projected, lists.cpu.instances);
+    const auto actual = largest.read<float>();
+    Difference difference;
+    for (size_t i = 0; i < c.splats; ++i)
+        difference.add(std::abs(actual[i] - std::max(expected[i], double(before[i]))), 4e-6);
+    printf("    largest weight %.1e (%zu over)\n", difference.worst, difference.over);
+    EXPECT_LE(difference.over, c.splats / 200);
+    EXPECT_LT(difference.worst, 1.0 / 255);  // one contribution at the cut
+}
+
 INSTANTIATE_TEST_SUITE_P(All, BlendPass, kCases, blend_case_name);
 
 constexpr size_t kSums = 11;  // of a slot

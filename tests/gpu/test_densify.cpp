@@ -305,6 +305,31 @@ TEST(DensifyEdges, WhatIsNotFiniteGoesAndAnEmptyGenerationIsNotWritten) {
     EXPECT_EQ(download_model(model, model.params).means, start.gaussians.means);
 }
 
+TEST(DensifyEdges, ANegativeNumberOfViewsPrunesAndNoneKeeps) {
+    Start start(2350, 600, 1);
+    std::vector<uint32_t> kept;
+    for (uint32_t i = 0; i < 600; ++i) {
+        start.statistics[2 * i] = 5;
+        start.statistics[2 * i + 1] = i % 3 == 1 ? -1.0f : 0.0f;
+        if (i % 3 != 1) kept.push_back(i);
+    }
+    start.model.statistics.upload(std::span<const float>(start.statistics));
+    DensifyRules rules = rules_for(1u << 20);
+    rules.prune_logit = std::numeric_limits<float>::lowest();
+    rules.prune_scale = 0;
+    ASSERT_EQ(run_densify(start.model, rules).after, kept.size());
+    const Gaussians after = download_model(start.model, start.model.params);
+    const auto moments =
+        start.model.moments1.download<float>(pipeline::parameter_bytes(uint32_t(kept.size()), 1) / 4);
+    for (uint32_t i = 0; i < kept.size(); ++i) {
+        ASSERT_EQ(after.means[3 * i], start.gaussians.means[3 * kept[i]]);
+        ASSERT_EQ(after.opacity_logits[i], start.gaussians.opacity_logits[kept[i]]);
+        const uint32_t planes = start.model.planes();
+        ASSERT_EQ(moments[pipeline::parameter_index(planes, 5, i)],
+                  start.moments1[pipeline::parameter_index(planes, 5, kept[i])]);
+    }
+}
+
 TEST(DensifyEdges, TheSeedAndTheStepChooseTheChildren) {
     const auto means = [](uint64_t seed, uint32_t step) {
         Start start(2400, 300, 0);

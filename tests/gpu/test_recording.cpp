@@ -598,12 +598,12 @@ TEST(FrameHazards, EveryPairHasABarrierBetween) {
         const auto pair = unordered_pair(commands);
         EXPECT_FALSE(pair.has_value()) << *pair;
     }
-    // All shaders but those of densification, which runs between frames, of a window's pictures, of meshes, of operators on
-    // arrays, and of the other kind of sort.
+    // All shaders but those of densification and removal, which run between frames, of a window's pictures, of meshes, of
+    // operators on arrays, and of the other kind of sort.
     const auto elsewhere = [](std::string_view name) {
         if (name.starts_with("radix_")) return name.ends_with("_ranked") != rig().config().ranked_sort;
-        for (const char* other : {"densify", "mcmc_", "pack", "trace_", "project_views", "harmonics",
-                                  "collect_records", "gather_slots", "blend_absolute"})
+        for (const char* other : {"contribute", "densify", "mcmc_", "pack", "trace_", "project_views",
+                                  "harmonics", "collect_records", "gather_slots", "blend_absolute"})
             if (name.starts_with(other)) return true;
         return false;
     };

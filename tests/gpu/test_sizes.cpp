@@ -446,6 +446,9 @@ TEST(Plan, IsDescribedByWhatItSkips) {
     PlanRequest request = request_for(Purpose::training);
     EXPECT_TRUE(skips(plan_for(request), "densification statistics"));
     EXPECT_TRUE(skips(plan_for(request), "opacity and scale regularisers"));
+    EXPECT_TRUE(skips(plan_for(request), "largest weights of splats in the training images"));
+    request.pruned = true;
+    EXPECT_FALSE(skips(plan_for(request), "largest weights of splats in the training images"));
     EXPECT_FALSE(skips(plan_for(request), "Adam's moments"));
     EXPECT_FALSE(skips(plan_for(request), "half of the bits of Adam's moments"));
     request.packed_moments = true;

@@ -117,6 +117,7 @@ TEST_P(RestoredTrainer, GoesOnAsIfNothingHadHappened) {
     options.refine_stop = 30000;
     options.grow_gradient = 1e-5;
     options.max_splats = 300;
+    options.final_splats = 100;
     options.sh_degree = 1;
     options.random_background = true;
     options.exposure = options.refine_poses = options.refine_focal = true;

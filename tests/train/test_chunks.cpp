@@ -155,6 +155,9 @@ void ppisp_views(TrainOptions& options) {
 void with_sky(TrainOptions& options) {
     options.sky = true;
 }
+void with_fewer(TrainOptions& options) {
+    options.final_splats = options.strategy == Strategy::mcmc ? 24000 : 18000;
+}
 void in_bands(TrainOptions& options) {
     options.bands = 2;
 }
@@ -169,6 +172,8 @@ INSTANTIATE_TEST_SUITE_P(Chunks, ChunksTrain,
                                          ChunksCase{Strategy::adc, 2, exposed_views, "_exposure"},
                                          ChunksCase{Strategy::adc, 2, ppisp_views, "_ppisp"},
                                          ChunksCase{Strategy::adc, 2, with_sky, "_sky"},
+                                         ChunksCase{Strategy::adc, 1, with_fewer, "_fewer"},
+                                         ChunksCase{Strategy::mcmc, 2, with_fewer, "_fewer"},
                                          ChunksCase{Strategy::adc, 1, in_bands, "_bands"}),
                          name_of_chunks_case);
 
@@ -194,6 +199,14 @@ TEST(Chunks, OfSeveralRanksHaveTheBytesOfOneThatFits) {
         EXPECT_LE(together.peak, 3 * kChunkMiB);
         expect_same_training(together, whole);
     }
+}
+
+/// It is said before the run, not after three quarters of it.
+TEST(Chunks, RefuseTooFewSplatsForTheEnd) {
+    TrainOptions options = busy_chunks(Strategy::adc, 2);
+    options.final_splats = 8;
+    expect_error<RunError>([&] { train_within(options, 3 * kChunkMiB, 20000, 0); },
+                           {"8 splats are too few", "parts"});
 }
 
 TEST(Chunks, GoOnFromAnyOtherLimit) {

@@ -318,6 +318,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                              {"steps", "7"},
                                              {"strategy", "adc"},
                                              {"max-splats", "8"},
+                                             {"final-splats", "5"},
                                              {"sh-degree", "2"},
                                              {"absgrad", "true"},
                                              {"revised-opacity", "true"},

@@ -115,6 +115,27 @@ TEST(Schedule, AFullRunIsThatOf3DGS) {
     EXPECT_EQ(s.degree(30000), 3);
 }
 
+TEST(Schedule, SplatsAreRemovedOnceAndTheirNumberThenStays) {
+    TrainOptions options;
+    options.refine_stop = options.relocate_stop = 30000;
+    EXPECT_TRUE(schedule_for(options).densifies(29900));
+    const Schedule whole = schedule_for(options);
+    for (int step = 1; step <= options.steps; ++step) ASSERT_FALSE(whole.prunes(step));
+    options.final_splats = 1000;
+    const Schedule s = schedule_for(options);
+    EXPECT_TRUE(s.prunes(22500));
+    EXPECT_FALSE(s.prunes(22499));
+    EXPECT_FALSE(s.prunes(22501));
+    EXPECT_TRUE(s.densifies(22400) && s.relocates(22400) && s.resets_opacity(21000));
+    EXPECT_FALSE(s.densifies(22600) || s.relocates(22600) || s.resets_opacity(24000));
+    for (const int steps : {1, 2, 7}) {
+        options.steps = steps;
+        int removals = 0;
+        for (int step = 1; step <= steps; ++step) removals += schedule_for(options).prunes(step);
+        EXPECT_EQ(removals, 1) << steps;
+    }
+}
+
 TEST(Schedule, AShortRunKeepsTheProportionsDownToItsFloors) {
     TrainOptions options;
     options.steps = 3000;

@@ -258,6 +258,39 @@ TEST(Trainer, GrowsUpToTheCapAndNotPastIt) {
     for (const float value : trainer.gaussians().means) EXPECT_TRUE(std::isfinite(value));
 }
 
+/// Three quarters of the way, splats that no image shows go first, and nothing grows afterwards.
+TEST(Trainer, TheLastQuarterHasTheSplatsThatShowMost) {
+    Gaussians start = shaken_start(small_capture(), 0.05, 1, 0);
+    for (size_t i = 0; i < start.size(); i += 4)
+        start.means[3 * i + 1] = 50.0f + float(i);  // above all cameras
+    for (const Strategy strategy : {Strategy::none, Strategy::adc, Strategy::mcmc}) {
+        TrainOptions options = quick(160);
+        options.strategy = strategy;
+        options.grow_gradient = 1e-6;
+        options.refine_stop = options.relocate_stop = 30000;
+        options.max_splats = 200;
+        options.final_splats = 30;
+        options.noise_rate = 0;
+        Trainer trainer(device(), small_capture().dataset, all_frames(small_capture().dataset), start,
+                        options);
+        for (int step = 1; step <= 160; ++step) {
+            const StepReport report = trainer.step();
+            if (step == 119) {
+                EXPECT_GE(report.splats, 40u);
+            }
+            if (step >= 120) {
+                ASSERT_EQ(report.splats, 30u) << "step " << step;
+            }
+        }
+        const Gaussians left = trainer.gaussians();
+        for (size_t i = 0; i < left.size(); ++i) EXPECT_LT(left.means[3 * i + 1], 10) << int(strategy);
+        EXPECT_GT(train_psnr(left), 15);
+    }
+    TrainOptions options = quick(8);
+    options.final_splats = 40;  // no fewer than there are
+    EXPECT_EQ(train(options, start, 8).report.splats, 40u);
+}
+
 TEST(Trainer, WithoutAStrategyTheNumberStays) {
     const Gaussians start = shaken_start(small_capture(), 0.05, 1, 0);
     TrainOptions options = quick(160);
@@ -312,6 +345,9 @@ TEST(Trainer, RefusesWhatItCannotTrain) {
     options.render.points = true;
     options.strategy = Strategy::mcmc;
     expect_error<InputError>(make({0}, start, 1000), {"--strategy mcmc", "--points"});
+    options.strategy = Strategy::adc;
+    options.final_splats = 10;
+    expect_error<InputError>(make({0}, start, 1000), {"--final-splats", "--points"});
 }
 
 std::vector<std::string> names(const std::vector<PlanLine>& plan) {
