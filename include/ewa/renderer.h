@@ -11,6 +11,7 @@
 #include "ewa/device.h"
 #include "ewa/gaussians.h"
 #include "ewa/image.h"
+#include "ewa/loss_weights.h"
 #include "ewa/plan.h"
 #include "ewa/render_options.h"
 
@@ -59,8 +60,9 @@ class Renderer {
 };
 
 struct LossGradient {
-    double loss = 0, l1 = 0, ssim = 0;
-    Gaussians gradient;  // dL/d(stored value) in place of each stored value
+    double loss = 0, l1 = 0;
+    double l2 = 0, ssim = 0;  // 0 if their weight is 0
+    Gaussians gradient;       // dL/d(stored value) in place of each stored value
     CameraMotion
         camera;  // dL/d(each value of the camera's motion), for no motion; zero with `points`, ray and march
     uint32_t skipped_nonfinite = 0;
@@ -70,7 +72,7 @@ struct LossGradient {
 /// background or, with alpha_is_weight, in which alpha says how much a pixel counts; of the camera's size.
 LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
                            const Camera& camera, const Image& target, const RenderOptions& options,
-                           bool alpha_is_weight = false);
+                           bool alpha_is_weight = false, const LossWeights& weights = {});
 
 /// What a Renderer of this scene skips, in colour images with these options.
 std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options);

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "ewa/appearance.h"
+#include "ewa/loss_weights.h"
 #include "ewa/render_options.h"
 
 namespace ewa {
@@ -58,6 +59,7 @@ struct TrainOptions {
     /// Bits of each of Adam's two moments, 16 or 32. With 16 a splat needs a third less memory.
     int moment_bits = 16;
     RenderOptions render{};  // background and kernel of training and evaluation
+    LossWeights loss{};
 
     // Learning rates of 3DGS (arguments/__init__.py). Those of the means are per unit of scene extent.
     double means_rate = 1.6e-4, means_rate_final = 1.6e-6;

@@ -16,6 +16,7 @@
 #include "core/words.h"
 #include "ewa/error.h"
 #include "options.h"
+#include "run/loss_option.h"
 #include "run/option_table.h"
 #include "scene/looks.h"
 
@@ -56,6 +57,21 @@ void set_background(RunOptions& options, nb::handle value) {
     options.train.render.background = colour ? background_of(value) : std::array<float, 3>{};
 }
 
+nb::object loss_value(const RunOptions& options) {
+    return nb::str(train::loss_text(options.train.loss).c_str());
+}
+
+void set_loss(RunOptions& options, nb::handle value) {
+    if (!nb::isinstance<nb::dict>(value)) {
+        options.train.loss = train::parse_loss(nb::cast<std::string>(value));
+        return;
+    }
+    std::string text;
+    for (const auto& [name, weight] : nb::cast<nb::dict>(value))
+        text += (text.empty() ? "" : ",") + nb::cast<std::string>(name) + "=" + number_text(weight);
+    options.train.loss = train::parse_loss(text);
+}
+
 /// Python's unit of memory is the byte.
 template <uint64_t TrainOptions::*member>
 constexpr Special bytes(const char* name) {
@@ -78,6 +94,7 @@ constexpr std::array kSpecials{
         },
         [](RunOptions& o, nb::handle value) { o.train.render.kernel = footprint_of(nb::cast<bool>(value)); }},
     Special{"background", "numpy.typing.ArrayLike | str", background_value, set_background},
+    Special{"loss", "str | dict[str, float]", loss_value, set_loss},
     bytes<&TrainOptions::image_cache_bytes>("image_cache_bytes"),
     bytes<&TrainOptions::device_memory_bytes>("device_memory_bytes")};
 
@@ -162,8 +179,9 @@ Json json_of(nb::handle value) {
 
 /// The value that a checkpoint from before the option lacks.
 void take_former(RunOptions& options, const std::string& name) {
-    const auto row = std::ranges::find(rows(), name, &RunOption::python);
-    if (row == rows().end() || row->before.empty()) throw InputError("its settings lack " + name);
+    const auto& all = train::run_options();
+    const auto row = std::ranges::find(all, name, &RunOption::python);
+    if (row == all.end() || row->before.empty()) throw InputError("its settings lack " + name);
     row->set(options, row->before);
 }
 

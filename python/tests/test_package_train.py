@@ -229,6 +229,10 @@ def test_the_cap_is_chosen_and_kept(still_life, tmp_path):
         ({"nearest": 4}, ewa.InputError, "nearest= is an option of points="),
         ({"points": True, "init_opacity": 0.5}, ewa.InputError, "init_opacity= and points= exclude each other"),
         ({"dense_start": "of"}, ewa.InputError, "dense_start='of': .*; did you mean on?"),
+        ({"loss": "l3=1"}, ewa.InputError, "loss='l3=1': 'l3' is no term of the loss; .*; did you mean l1?"),
+        ({"loss": {"l1": -1}}, ewa.InputError, "loss={'l1': -1}: l1: '-1' is not a number from 0"),
+        ({"loss": {"l1": "much"}}, TypeError, "loss={'l1': 'much'} is of the wrong type"),
+        ({"loss": 3}, TypeError, "loss=3 is of the wrong type"),
     ],
 )
 def test_wrong_options(still_life, options, error, message):
@@ -299,6 +303,21 @@ def test_exposures_are_learned(still_life):
     assert not np.array_equal(
         trainer.exposures(), np.tile(np.eye(3, 4, dtype=np.float32), (3, 1, 1))
     )
+
+
+def test_the_loss_has_weights(still_life, tmp_path):
+    trainer = ewa.Trainer(still_life, steps=3, loss={"l2": 1, "l1": 0.5}, train_frames=[0])
+    assert trainer.options["loss"] == "l1=0.5,l2=1"
+    trainer.step()
+    trainer.save_checkpoint(tmp_path / "a.ewa")
+    resumed = ewa.Trainer.resume(tmp_path / "a.ewa", still_life)
+    assert resumed.options == trainer.options
+    assert same(trained(resumed), trained(trainer))
+    as_text = ewa.Trainer(still_life, steps=3, loss="l1=0.5,l2=1", train_frames=[0])
+    assert same(trained(as_text), trainer.splats())
+    usual = ewa.Trainer(still_life, steps=3, train_frames=[0])
+    assert usual.options["loss"] == "l1=0.8,ssim=0.2"
+    assert not same(trained(usual), trainer.splats())
 
 
 def test_the_sky_is_learned(still_life):

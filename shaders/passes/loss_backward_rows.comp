@@ -1,10 +1,13 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
 // Gradient of the SSIM window along the rows, and the gradient of the whole loss by the render x:
-// dL/dx = ssim_scale (blur dS/d(mean x) + 2 x blur dS/d(mean x^2) + y blur dS/d(mean x y)) + l1_scale sign(x - y).
-// The first term applies where |x| is within SSIM_LIMIT, the last one in the image's own rows.
+// dL/dx = ssim_scale (blur dS/d(mean x) + 2 x blur dS/d(mean x^2) + y blur dS/d(mean x y)) + l1_scale sign(x - y)
+//         + 2 l2_scale clamp(x - y).
+// The first term needs LOSS_SSIM and applies where |x| is within SSIM_LIMIT. The others apply in the image's own rows, the
+// last one with LOSS_SQUARES. It clamps to SSIM_LIMIT: a square (x - y)^2 grows linearly from there.
 // One invocation owns LOSS_TEXELS texels of channel workgroup.z; one subgroup owns one partial sum of |x - y|
-// and, in a second row, one of (x - y)^2 with both clamped to [0, 1].
+// and, in a second row, one of (x - y)^2 with both clamped to [0, 1]. With LOSS_SQUARES a third row has (x - y)^2.
+// SPEC_MODE: LOSS_* bits.
 // It reads the blurred derivatives, the render and the target, and writes dL/d(image) and the partial sums.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
@@ -12,6 +15,8 @@
 #include "lib/ssim.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(constant_id = SPEC_MODE) const uint MODE = LOSS_SSIM;
+const bool SIMILARITY = (MODE & LOSS_SSIM) != 0u, SQUARES = (MODE & LOSS_SQUARES) != 0u;
 TEXELS(0, blurred);
 TEXELS(1, image);
 TEXELS(2, target);
@@ -26,10 +31,10 @@ void main() {
     const bool inside = item < row_items * push.image.size[1];
     // Differences in other rows than the band's own belong to another band.
     const bool counts = inside && item >= row_items * push.own[0] && item < row_items * push.own[1];
-    const float l1_scale = counts ? push.l1_scale : 0.0;
+    const float l1_scale = counts ? push.l1_scale : 0.0, l2_scale = counts ? push.l2_scale : 0.0;
     const int row = int(item / row_items) * int(row_texels), first = int(item % row_items * LOSS_TEXELS);
     vec4 m[DERIVATIVE_PLANES][LOSS_TEXELS];
-    [[unroll]] for (uint q = 0; q < DERIVATIVE_PLANES; ++q) {
+    if (SIMILARITY) [[unroll]] for (uint q = 0; q < DERIVATIVE_PLANES; ++q) {
         vec4 texels[ROW_SPAN];
         [[unroll]] for (int t = 0; t < ROW_SPAN; ++t) {
             const int c = first + t - 2;
@@ -38,25 +43,36 @@ void main() {
         }
         [[unroll]] for (int o = 0; o < int(LOSS_TEXELS); ++o) m[q][o] = blur_row(texels, o);
     }
-    vec4 differences = vec4(0.0), squares = vec4(0.0);
+    vec4 differences = vec4(0.0), shown_squares = vec4(0.0), squares = vec4(0.0);
     [[unroll]] for (int o = 0; o < int(LOSS_TEXELS); ++o) {
         const bool there = inside && first + o < int(row_texels);
         const int at = int(channel * plane) + row + first + o;
         const vec4 x = fetch_or_zero(image, there, at), y = fetch_or_zero(target, there, at);
-        const vec4 limit = vec4(SSIM_LIMIT), seen = vec4(lessThanEqual(abs(x), limit));
-        if (there)
-            image_gradient[at] = as_texel(push.ssim_scale * seen * (m[0][o] + 2.0 * clamp(x, -limit, limit) * m[1][o] +
-                                                           clamp(y, -limit, limit) * m[2][o]) +
-                                 l1_scale * sign(x - y));
+        vec4 gradient = l1_scale * sign(x - y);
+        if (SIMILARITY) {
+            const vec4 limit = vec4(SSIM_LIMIT), seen = vec4(lessThanEqual(abs(x), limit));
+            gradient = push.ssim_scale * seen * (m[0][o] + 2.0 * clamp(x, -limit, limit) * m[1][o] +
+                                                 clamp(y, -limit, limit) * m[2][o]) + gradient;
+        }
+        if (SQUARES) {
+            const vec4 size = min(abs(x - y), vec4(SSIM_LIMIT));
+            gradient += 2.0 * l2_scale * size * sign(x - y);
+            squares += size * (2.0 * abs(x - y) - size);
+        }
+        if (there) image_gradient[at] = as_texel(gradient);
         differences += abs(x - y);
         const vec4 shown = clamp(x, 0.0, 1.0) - clamp(y, 0.0, 1.0);
-        squares += shown * shown;
+        shown_squares += shown * shown;
     }
     const float sum = subgroup_sum(counts ? differences.x + differences.y + differences.z + differences.w : 0.0);
-    const float square_sum = subgroup_sum(counts ? squares.x + squares.y + squares.z + squares.w : 0.0);
+    const float shown_sum =
+        subgroup_sum(counts ? shown_squares.x + shown_squares.y + shown_squares.z + shown_squares.w : 0.0);
+    const float square_sum =
+        SQUARES ? subgroup_sum(counts ? squares.x + squares.y + squares.z + squares.w : 0.0) : 0.0;
     const uint group = (gl_WorkGroupID.z * gl_NumWorkGroups.y + gl_WorkGroupID.y) * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     if (LANE != 0u) return;
     const uint groups = gl_NumWorkGroups.x * gl_NumWorkGroups.y * gl_NumWorkGroups.z, at = group * (GROUP_SIZE / SUBGROUP) + SUBGROUP_INDEX;
     partials[at] = sum;
-    partials[groups * (GROUP_SIZE / SUBGROUP) + at] = square_sum;
+    partials[groups * (GROUP_SIZE / SUBGROUP) + at] = shown_sum;
+    if (SQUARES) partials[2u * groups * (GROUP_SIZE / SUBGROUP) + at] = square_sum;
 }

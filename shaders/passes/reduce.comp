@@ -26,5 +26,6 @@ void main() {
     if (push.target == REDUCE_TO_SUMS) sums[row * blocks + block] = sum;
     if (push.target == REDUCE_TO_L1 && row == 0u) counts.l1 = sum;
     if (push.target == REDUCE_TO_L1 && row == 1u) counts.squared = sum;
+    if (push.target == REDUCE_TO_L1 && row == 2u) counts.l2 = sum;
     if (push.target == REDUCE_TO_SSIM) counts.ssim = sum;
 }

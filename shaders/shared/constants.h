@@ -69,11 +69,10 @@ EWA_REAL(COMPENSATION_MIN, 1e-12);
 // A smaller scale counts as this, so that gradients are finite.
 EWA_REAL(SCALE_MIN, 1e-30);
 
-// Loss: (1 - SSIM_WEIGHT) * L1 + SSIM_WEIGHT * (1 - SSIM), mean over pixels and channels, images in [0, 1].
-EWA_REAL(SSIM_WEIGHT, 0.2);
+// SSIM, for images in [0, 1]. include/ewa/loss_weights.h has the loss.
 EWA_REAL(SSIM_C1, 0.01 * 0.01);
 EWA_REAL(SSIM_C2, 0.03 * 0.03);
-// SSIM clamps values to this: the square still has digits left for SSIM_C2.
+// SSIM clamps values to this, and squares of larger differences grow linearly: digits are left for SSIM_C2.
 EWA_REAL(SSIM_LIMIT, 16.0);
 EWA_REAL(SSIM_SIGMA, 1.5);  // standard deviation of the window (px)
 EWA_UINT(SSIM_RADIUS, 5u);  // window of 2 * SSIM_RADIUS + 1 taps, zero padded

@@ -127,6 +127,9 @@ EWA_UINT(SHAPE_WHITENERS,
 EWA_UINT(GATHER_ADD, 1u);       // adds to the gradients that are there
 EWA_UINT(GATHER_ABSOLUTE, 2u);  // the slots have absolute gradients
 EWA_UINT(GATHER_FOURTH, 4u);    // the slots have a fourth channel
+// loss_backward_rows.comp, bits
+EWA_UINT(LOSS_SSIM, 1u);     // SSIM is a term of the loss
+EWA_UINT(LOSS_SQUARES, 2u);  // so are squared differences
 // sum_slots.comp: 0 or UPDATE_ABSOLUTE
 // update.comp, and update_views.comp without UPDATE_GRADIENT_ONLY and UPDATE_MOTION: bits
 EWA_UINT(UPDATE_GRADIENT_ONLY, 1u);  // writes the gradient into moments1 and moves nothing
@@ -164,7 +167,7 @@ EWA_UINT(TOTAL_INSTANCES, 1u);  // Counts.instances
 EWA_UINT(TOTAL_SCAN, 2u);       // Counts.scan_total
 // ReducePush.target
 EWA_UINT(REDUCE_TO_SUMS, 0u);  // sums[block]
-EWA_UINT(REDUCE_TO_L1, 1u);    // Counts.l1, of a second row Counts.squared
+EWA_UINT(REDUCE_TO_L1, 1u);    // Counts.l1, of further rows Counts.squared and Counts.l2
 EWA_UINT(REDUCE_TO_SSIM, 2u);  // Counts.ssim
 
 // ---- Loss: what one invocation owns ----
@@ -256,6 +259,7 @@ struct Counts {
     uint limited_steps;      // steps of a mean, quaternion or scale that were shortened
     uint visible;            // splats that reach a tile; counted with PROJECT_DEBUG
     uint unfinished;         // strips of tiles with more splats than rays can walk
+    float l2;                // mean (x - y)^2, with LOSS_SQUARES
     // Not cleared by a frame that may begin before the host has read the counts of the one before. Once a frame
     // has too many instances, this is 1, later frames report 2^32 - 1 instances, and no pass changes the model.
     uint overflowed;
@@ -446,6 +450,7 @@ struct LossPush {
     ImageLayout image;
     float ssim_scale;  // d(loss)/d(SSIM of one pixel and channel)
     float l1_scale;    // d(loss)/d|x - y| of one pixel and channel
+    float l2_scale;    // d(loss)/d((x - y)^2) of one pixel and channel
     uint own[2];       // first and one-past-last of the rows that the loss counts
 };
 

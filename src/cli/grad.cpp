@@ -14,6 +14,7 @@
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
+#include "run/option_table.h"
 #include "scene/dataset_files.h"
 
 namespace ewa::cli {
@@ -23,6 +24,7 @@ struct GradArguments {
     ViewArguments views;
     std::filesystem::path output, json;
     std::string frame;
+    RunOptions run;  // of which it has the loss
 };
 
 /// dL/d(each value of the camera's motion).
@@ -51,21 +53,25 @@ int run(const GradArguments& arguments) {
     const Frame& frame = dataset.frames[size_t(index)];
     make_folder(arguments.output.parent_path());
 
+    const LossWeights& weights = arguments.run.train.loss;
     const LossGradient result =
         loss_gradient(open_device(arguments.views.device), gaussians, frame.camera, load_frame_image(frame),
-                      options, frame.masks == MaskUse::ignore);
+                      options, frame.masks == MaskUse::ignore, weights);
     save_splats(arguments.output, result.gradient,
                 {"ewa " EWA_VERSION, fmt::format("gradient of the training loss of frame {}", index)});
     if (!arguments.json.empty()) {
-        report::Json json{{"loss", result.loss}, {"l1", result.l1}, {"ssim", result.ssim}};
+        report::Json json{{"loss", result.loss}, {"l1", result.l1}};
+        if (weights.l2 > 0) json["l2"] = result.l2;
+        if (weights.ssim > 0) json["ssim"] = result.ssim;
         if (options.integrator == Integrator::splat && !options.points)
             json["camera"] = motion_json(result.camera);
         json["frame"] = index;
         json["name"] = frame.name;
         write_json(arguments.json, json);
     }
-    fmt::print("{}  loss {:.7g}  L1 {:.7g}  SSIM {:.7g}\n", core::one_line(frame.name), result.loss,
-               result.l1, result.ssim);
+    fmt::print("{}  loss {:.7g}  L1 {:.7g}{}{}\n", core::one_line(frame.name), result.loss, result.l1,
+               weights.l2 > 0 ? fmt::format("  L2 {:.7g}", result.l2) : "",
+               weights.ssim > 0 ? fmt::format("  SSIM {:.7g}", result.ssim) : "");
     if (result.skipped_nonfinite > 0)
         fmt::print("skipped {} with a value that is not finite\n",
                    core::counted(result.skipped_nonfinite, "splat"));
@@ -97,6 +103,13 @@ Action add_grad(CLI::App& app) {
         ->type_name("OUT.ply");
     app.add_option("--json", arguments->json, "Write loss, l1, ssim, frame (index) and name to this file")
         ->type_name("FILE");
+    const train::RunOption& loss = train::run_option("loss");
+    app.add_option_function<std::string>(
+           "--loss", [&loss, arguments](const std::string& text) { loss.set(arguments->run, text); },
+           loss.help)
+        ->check(accepted_by(loss))
+        ->type_name(loss.value)
+        ->default_str(train::value_text(loss, {}));
     add_view_options(app, arguments->views);
     return [&app, arguments] {
         resolve_views(app, arguments->views);

@@ -374,8 +374,8 @@ struct LossBackwardColumns {
     gpu::BufferPart derivatives, blurred;
 };
 
-/// Gradient of the whole loss by the render, and partial sums of absolute and of squared
-/// differences.
+/// Gradient of the whole loss by the render, and rows of partial sums: of absolute differences, of squared differences of
+/// clamped values, and with LOSS_SQUARES of squared differences. Variant: SPEC_MODE (LOSS_* bits).
 struct LossBackwardRows {
     static constexpr char shader[] = "loss_backward_rows";
     using Work = PerElement<loss_row_items, 3>;

@@ -86,12 +86,17 @@ void Exposures::set(uint32_t photo, std::span<const uint64_t> words) {
     }
 }
 
-double loss_of(double l1, double ssim) {
-    return (1 - shared::SSIM_WEIGHT) * l1 + shared::SSIM_WEIGHT * (1 - ssim);
+LossTerms terms_of(const shared::Counts& counts) {
+    return {counts.l1, counts.l2, counts.ssim};
 }
 
-double loss_of(const shared::Counts& counts) {
-    return loss_of(double(counts.l1), double(counts.ssim));
+double loss_of(const LossWeights& weights, const LossTerms& terms) {
+    const double loss = weights.l1 * terms.l1 + weights.ssim * (1 - terms.ssim);
+    return weights.l2 > 0 ? loss + weights.l2 * terms.l2 : loss;
+}
+
+double loss_of(const LossWeights& weights, const shared::Counts& counts) {
+    return loss_of(weights, terms_of(counts));
 }
 
 /// Turns frame.image_gradient from dL/d(exposed image) into dL/d(image). The exposure takes a step of Adam.
@@ -131,6 +136,29 @@ void FramePasses::mean_of_partials(uint32_t target, uint32_t rows, float scale) 
         {.items = s.reduce_blocks, .block = s.reduce_blocks, .target = target, .rows = rows, .scale = scale});
 }
 
+/// The terms of the loss that the plan has, and their gradient by the image.
+void FramePasses::compare(const gpu::Buffer& image, const shared::LossPush& push, float share) const {
+    const bool similarity = plan.loss.ssim > 0;
+    if (similarity) {
+        record(passes::LossColumns{.image = image, .target = frame.target, .moments = frame.moments}, push);
+        record(
+            passes::LossRows{
+                .moments = frame.moments, .derivatives = frame.derivatives, .partials = frame.partials},
+            push);
+        mean_of_partials(shared::REDUCE_TO_SSIM, 1, share);
+        record(passes::LossBackwardColumns{.derivatives = frame.derivatives, .blurred = frame.blurred}, push);
+    }
+    const uint32_t mode =
+        (similarity ? shared::LOSS_SSIM : 0) | (plan.loss.l2 > 0 ? shared::LOSS_SQUARES : 0);
+    // A binding that a mode does not use needs a buffer.
+    record(passes::LossBackwardRows{.blurred = similarity ? frame.blurred : frame.target,
+                                    .image = image,
+                                    .target = frame.target,
+                                    .image_gradient = frame.image_gradient,
+                                    .partials = frame.partials},
+           push, {{shared::SPEC_MODE, mode}});
+}
+
 void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse* exposure,
                        const AppearanceUse* appearance) const {
     const shared::ImageLayout layout = frame.sizes.image();
@@ -139,8 +167,9 @@ void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse*
     const uint32_t height = inputs.band.rows > 0 ? inputs.camera.height : layout.size[1];
     const double share = 1.0 / (3.0 * layout.size[0] * height);
     const shared::LossPush push{.image = layout,
-                                .ssim_scale = float(-shared::SSIM_WEIGHT * share),
-                                .l1_scale = float((1 - shared::SSIM_WEIGHT) * share),
+                                .ssim_scale = float(-plan.loss.ssim * share),
+                                .l1_scale = float(plan.loss.l1 * share),
+                                .l2_scale = float(plan.loss.l2 * share),
                                 .own = {band.own_begin, band.own_end}};
     const uint32_t first_pixel = band.first * layout.size[0];
     const shared::MaskPush mask{.image = layout, .first_pixel = first_pixel};
@@ -165,22 +194,10 @@ void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse*
                 .image = layout,
                 .first_pixel = first_pixel},
                colors);
-    record(passes::LossColumns{.image = image, .target = frame.target, .moments = frame.moments}, push);
-    record(
-        passes::LossRows{
-            .moments = frame.moments, .derivatives = frame.derivatives, .partials = frame.partials},
-        push);
-    mean_of_partials(shared::REDUCE_TO_SSIM, 1, float(share));
-    record(passes::LossBackwardColumns{.derivatives = frame.derivatives, .blurred = frame.blurred}, push);
-    record(passes::LossBackwardRows{.blurred = frame.blurred,
-                                    .image = image,
-                                    .target = frame.target,
-                                    .image_gradient = frame.image_gradient,
-                                    .partials = frame.partials},
-           push);
+    compare(image, push, float(share));
     if (masked)
         record(passes::MaskGradient{.photo = photo, .image_gradient = frame.image_gradient}, mask, colors);
-    mean_of_partials(shared::REDUCE_TO_L1, 2, float(share));
+    mean_of_partials(shared::REDUCE_TO_L1, plan.loss.l2 > 0 ? 3 : 2, float(share));
     if (exposure) expose_backward(*exposure);
     if (appearance) appearance_backward(*appearance);
 }

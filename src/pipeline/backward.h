@@ -51,8 +51,12 @@ struct Rates {
 /// SPEC_MODE of the update: UPDATE_* bits.
 uint32_t update_mode(const Plan& plan);
 
-/// (1 - SSIM_WEIGHT) l1 + SSIM_WEIGHT (1 - ssim).
-double loss_of(double l1, double ssim);
-double loss_of(const shared::Counts& counts);
+/// Terms of a loss before they are weighted.
+struct LossTerms {
+    double l1 = 0, l2 = 0, ssim = 0;
+};
+LossTerms terms_of(const shared::Counts& counts);
+double loss_of(const LossWeights& weights, const LossTerms& terms);
+double loss_of(const LossWeights& weights, const shared::Counts& counts);
 
 }  // namespace ewa::pipeline

@@ -85,6 +85,7 @@ struct FramePasses : passes::Recorder {
     void add_sky() const;
     gpu::SpecConstant degree() const;
     gpu::SpecConstant kernel() const { return {shared::SPEC_KERNEL, uint32_t(plan.kernel)}; }
+    void compare(const gpu::Buffer& image, const shared::LossPush& push, float share) const;
     void mean_of_partials(uint32_t target, uint32_t rows, float scale) const;
     void expose_backward(const ExposureUse& use) const;
     void apply_appearance(const AppearanceUse& use) const;

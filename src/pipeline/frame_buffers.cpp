@@ -185,7 +185,7 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
     s.planes = uint64_t(s.plane_floats) * s.image_planes * word;
     if (request.gradients && request.given_gradient) s.image_gradient = uint64_t(s.plane_floats) * 5 * word;
     if (request.gradients && !request.given_gradient) {
-        const auto groups = passes::LossRows::Work::groups(config, {s.image(), 0, 0, {}});
+        const auto groups = passes::LossRows::Work::groups(config, {s.image(), 0, 0, 0, {}});
         s.partials = groups[0] * groups[1] * groups[2] * (config.element_group / config.subgroup);
         s.reduce_block = 64 * config.subgroup;
         s.reduce_blocks = divide_up(s.partials, s.reduce_block);
@@ -195,11 +195,14 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
         s.exposure_blocks = divide_up(request.width * request.height, shared::EXPOSURE_BLOCK);
         s.grid_parts = grid_parts(request.width, request.height);
         s.exposure_sums = appearance_sums(request.appearance, s) * word;
-        s.moments = uint64_t(s.plane_floats) * 3 * shared::MOMENT_PLANES * word;
-        s.derivatives = uint64_t(s.plane_floats) * 3 * shared::DERIVATIVE_PLANES * word;
+        if (request.loss.ssim > 0) {
+            s.moments = uint64_t(s.plane_floats) * 3 * shared::MOMENT_PLANES * word;
+            s.derivatives = uint64_t(s.plane_floats) * 3 * shared::DERIVATIVE_PLANES * word;
+        }
         s.image_gradient = s.target;
-        s.partial_sums = 2 * uint64_t(s.partials) * word;  // of absolute and of squared differences
-        s.reduced = 2 * uint64_t(s.reduce_blocks) * word;
+        const uint64_t rows = request.loss.l2 > 0 ? 3 : 2;  // see LossBackwardRows
+        s.partial_sums = rows * s.partials * word;
+        s.reduced = rows * s.reduce_blocks * word;
     }
     if (request.gradients && request.motion) {
         constexpr uint64_t kRows = shared::MOTION_VALUES;

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "ewa/appearance.h"
+#include "ewa/loss_weights.h"
 #include "gpu/executor.h"
 #include "passes/pass.h"
 
@@ -25,6 +26,7 @@ struct FrameRequest {
     bool overlaid = false;
     bool motion = false;  // with gradients: that of the camera's motion
     bool rays = false;    // splats are integrated along rays
+    LossWeights loss{};   // with gradients: of the loss, whose terms of weight 0 have no buffers
 };
 
 /// How a radix sort is divided.

@@ -57,6 +57,7 @@ Plan plan_for(const PlanRequest& request) {
         return plan;
     }
     plan.gradients = true;
+    plan.loss = request.loss;
     plan.masks = request.masks;
     plan.appearance = request.appearance;
     // Spheres and integration along rays have no gradient by the camera.
@@ -97,6 +98,10 @@ std::vector<PlanLine> describe(const Plan& plan, int scene_degree, uint64_t spla
                          "all splats stay (--final-splats)", sizeof(float) * splats});
     if (plan.drawing != Drawing::depth)
         lines.push_back({"depth plane", "only colour and opacity were asked for", 0});
+    if (plan.gradients && plan.loss.ssim == 0)
+        lines.push_back({"SSIM passes and their moments", "its weight is 0 (--loss)", 0});
+    if (plan.gradients && plan.loss.l2 == 0)
+        lines.push_back({"squared differences in the loss", "their weight is 0 (--loss)", 0});
     if (plan.gradients && !plan.masks)
         lines.push_back(
             {"mask passes and the masked image", "every pixel of every training image counts", 0});

@@ -7,6 +7,7 @@
 
 #include "ewa/appearance.h"
 #include "ewa/gaussians.h"
+#include "ewa/loss_weights.h"
 #include "ewa/plan.h"
 #include "ewa/render_options.h"
 
@@ -30,6 +31,7 @@ struct PlanRequest {
     double splat_scale = 1;  // factor of every splat's scales, above 0
 
     // For a gradient or a training.
+    LossWeights loss{};
     bool masks = false;                                  // training images in which some pixels count less
     AppearanceModel appearance = AppearanceModel::none;  // of the training images, which is learned
     bool motion = false;  // the gradient by the camera's motion; in a training it is learned
@@ -58,6 +60,7 @@ struct Plan {
     bool absolute = false;        // of absolute gradients
     bool regularised = false;     // opacity and scale regularisers in the loss
     bool pruned = false;          // splats of small weight are removed near the end
+    LossWeights loss{};           // with gradients: a term of weight 0 has no passes
     bool masks = false;
     AppearanceModel appearance = AppearanceModel::none;
     bool motion = false;  // the gradient by the camera's motion

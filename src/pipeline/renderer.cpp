@@ -276,7 +276,7 @@ std::vector<PassTime> Renderer::pass_times() const {
 
 LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
                            const Camera& camera, const Image& target, const RenderOptions& options,
-                           bool alpha_is_weight) {
+                           bool alpha_is_weight, const LossWeights& weights) {
     if (target.width != camera.width || target.height != camera.height || target.channels < 3)
         throw InputError("the training image is " + std::to_string(target.width) + "x" +
                          std::to_string(target.height) + " with " + std::to_string(target.channels) +
@@ -287,6 +287,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
     const Plan plan = plan_for({.purpose = Purpose::gradient,
                                 .scene_degree = gaussians.sh_degree,
                                 .render = options,
+                                .loss = weights,
                                 .masks = alpha_is_weight && target.channels == 4,
                                 .motion = true});
     const Model model = upload_model(*device, gaussians, plan.moment_buffers(), false);
@@ -303,7 +304,8 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                             .masks = plan.masks,
                             .overlaid = true,
                             .motion = plan.motion,
-                            .rays = plan.rays()};
+                            .rays = plan.rays(),
+                            .loss = plan.loss};
     FrameBuffers frame;
     const shared::Counts counts =
         run_until_it_fits(cache, executor, frame, size, [&](const passes::Recorder& recorder) {
@@ -314,8 +316,9 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
         });
     LossGradient result;
     result.l1 = counts.l1;
+    result.l2 = counts.l2;
     result.ssim = counts.ssim;
-    result.loss = loss_of(counts);
+    result.loss = loss_of(plan.loss, counts);
     result.gradient = download_model(model, model.moments1);
     result.gradient.origin = glm::dvec3(0);  // a gradient has no origin
     if (plan.motion) result.camera = download_motion_gradient(frame);

@@ -67,27 +67,31 @@ shared::Counts run(const StepParts& parts, gpu::Recording& recording) {
 
 /// Parts of the loss of a view.
 struct PartLoss {
-    double l1 = 0, ssim = 0, squared = 0;
+    LossTerms terms;
+    double squared = 0;
 };
 
-constexpr size_t kLossWords = 3;
+using LossWords = std::array<uint64_t, sizeof(PartLoss) / sizeof(uint64_t)>;
+constexpr size_t kLossWords = std::tuple_size_v<LossWords>;
 
 PartLoss loss_from(std::span<const uint64_t, kLossWords> words) {
-    return {std::bit_cast<double>(words[0]), std::bit_cast<double>(words[1]),
-            std::bit_cast<double>(words[2])};
+    LossWords copy;
+    std::ranges::copy(words, copy.begin());
+    return std::bit_cast<PartLoss>(copy);
 }
 
 /// losses: of the bands of each view.
-void add_losses(std::span<const PartLoss> losses, size_t bands, StepSums& sums) {
+void add_losses(const LossWeights& weights, std::span<const PartLoss> losses, size_t bands, StepSums& sums) {
     const size_t views = losses.size() / bands;
     for (size_t first = 0; first < losses.size(); first += bands) {
         PartLoss view = losses[first];
         for (const PartLoss& band : losses.subspan(first + 1, bands - 1)) {
-            view.l1 += band.l1;
-            view.ssim += band.ssim;
+            view.terms.l1 += band.terms.l1;
+            view.terms.l2 += band.terms.l2;
+            view.terms.ssim += band.terms.ssim;
             view.squared += band.squared;
         }
-        sums.loss += loss_of(view.l1, view.ssim) / double(views);
+        sums.loss += loss_of(weights, view.terms) / double(views);
         sums.psnr += -10 * std::log10(view.squared) / double(views);
     }
 }
@@ -407,8 +411,8 @@ StepSums Step::draw(const StepParts& parts, std::span<const StepView> views) {
             if (turn.draws(int(own))) {
                 const ViewPart view_part = part_of(parts, of, begin + own);
                 const shared::Counts counts = draw_own(parts, view_part, turn);
-                const PartLoss loss{counts.l1, counts.ssim, double(counts.squared) / view_part.of.weight()};
-                std::ranges::copy(std::bit_cast<std::array<uint64_t, kLossWords>>(loss), sent.begin());
+                const PartLoss loss{terms_of(counts), double(counts.squared) / view_part.of.weight()};
+                std::ranges::copy(std::bit_cast<LossWords>(loss), sent.begin());
                 if (parts.learned > 0 && ranks > 1)
                     std::ranges::copy(view_part.of.learned(), sent.begin() + kLossWords);
             }
@@ -423,7 +427,7 @@ StepSums Step::draw(const StepParts& parts, std::span<const StepView> views) {
             }
         }
     }
-    add_losses(losses, bands_, sums);
+    add_losses(parts.plan.loss, losses, bands_, sums);
     return sums;
 }
 

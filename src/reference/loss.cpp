@@ -98,7 +98,7 @@ double ssim_sum(const Plane& rendered, const Plane& target, int width, int heigh
 
 }  // namespace
 
-Loss image_loss(const Raster& rendered, const Raster& target) {
+Loss image_loss(const Raster& rendered, const Raster& target, const LossWeights& terms) {
     assert(rendered.width == target.width && rendered.height == target.height);
     assert(rendered.channels == 3 && target.channels == 3);
     const double count = double(rendered.values.size());
@@ -107,31 +107,34 @@ Loss image_loss(const Raster& rendered, const Raster& target) {
     for (size_t i = 0; i < rendered.values.size(); ++i) {
         const double difference = rendered.values[i] - target.values[i];
         out.l1 += std::abs(difference) / count;
+        const double size = std::min(std::abs(difference), SSIM_LIMIT);
+        out.l2 += size * (2 * std::abs(difference) - size) / count;
         const double shown =
             std::clamp(rendered.values[i], 0.0, 1.0) - std::clamp(target.values[i], 0.0, 1.0);
         out.squared += shown * shown / count;
         const double sign = difference > 0 ? 1 : difference < 0 ? -1 : 0;
-        out.gradient.values[i] = (1 - SSIM_WEIGHT) * sign / count;
+        out.gradient.values[i] = (terms.l1 + 2 * terms.l2 * size) * sign / count;
     }
     for (int k = 0; k < 3; ++k) {
         Plane by_x;
         out.ssim +=
             ssim_sum(channel(rendered, k), channel(target, k), rendered.width, rendered.height, by_x) / count;
         for (size_t i = 0; i < by_x.size(); ++i)
-            out.gradient.values[3 * i + k] -= SSIM_WEIGHT * by_x[i] / count;
+            out.gradient.values[3 * i + k] -= terms.ssim * by_x[i] / count;
     }
-    out.loss = (1 - SSIM_WEIGHT) * out.l1 + SSIM_WEIGHT * (1 - out.ssim);
+    out.loss = terms.l1 * out.l1 + terms.l2 * out.l2 + terms.ssim * (1 - out.ssim);
     return out;
 }
 
-Loss image_loss(const Raster& rendered, const Raster& target, const Raster& weights) {
+Loss image_loss(const Raster& rendered, const Raster& target, const Raster& weights,
+                const LossWeights& terms) {
     assert(weights.width == rendered.width && weights.height == rendered.height && weights.channels == 1);
     Raster pulled = rendered;
     for (size_t i = 0; i < pulled.values.size(); ++i) {
         const double weight = weights.values[i / 3];
         pulled.values[i] = weight * rendered.values[i] + (1 - weight) * target.values[i];
     }
-    Loss out = image_loss(pulled, target);
+    Loss out = image_loss(pulled, target, terms);
     for (size_t i = 0; i < pulled.values.size(); ++i) out.gradient.values[i] *= weights.values[i / 3];
     return out;
 }

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The training loss of an image and its gradient.
 //
-//   L    = (1 - SSIM_WEIGHT) mean|x - y| + SSIM_WEIGHT (1 - mean SSIM)       means over pixels and RGB
+//   L    = l1 mean|x - y| + l2 mean (x - y)^2 + ssim (1 - mean SSIM)         means over pixels and RGB; LossWeights
 //   SSIM = (2 mx my + C1)(2 sxy + C2) / ((mx^2 + my^2 + C1)(sxx + syy + C2)) Wang et al. 2004, eq. 13
 // with mx = w * x, sxx = w * x^2 - mx^2, sxy = w * xy - mx my and so on. w is a Gaussian window whose weights
 // add up to 1, zero padded at the border (3DGS, utils/loss_utils.py), where the sums are therefore smaller.
-// The render x is not clamped to [0, 1]. SSIM clamps both images to [-SSIM_LIMIT, SSIM_LIMIT].
+// The render x is not clamped to [0, 1]. SSIM clamps both images to [-SSIM_LIMIT, SSIM_LIMIT]. The square of a difference
+// d > m = SSIM_LIMIT is m (2 d - m).
 //
 // w is symmetric. With mx, E[xx] and E[xy] as the variables of the partial derivatives:
 //   dSSIM/dx = w * (dSSIM/dmx) + 2 x (w * dSSIM/dE[xx]) + y (w * dSSIM/dE[xy])
@@ -16,21 +17,23 @@
 #include <array>
 #include <vector>
 
+#include "ewa/loss_weights.h"
 #include "reference/values.h"
 
 namespace ewa::reference {
 
 struct Loss {
-    double loss = 0, l1 = 0, ssim = 0;
+    double loss = 0, l1 = 0, l2 = 0, ssim = 0;
     double squared = 0;  // mean (x - y)^2, both clamped to [0, 1]
     Raster gradient;     // dL/d(rendered), RGB
 };
 
 /// Both RGB of one size.
-Loss image_loss(const Raster& rendered, const Raster& target);
+Loss image_loss(const Raster& rendered, const Raster& target, const LossWeights& terms = {});
 
 /// The same with weights of [0, 1], one channel of that size.
-Loss image_loss(const Raster& rendered, const Raster& target, const Raster& weights);
+Loss image_loss(const Raster& rendered, const Raster& target, const Raster& weights,
+                const LossWeights& terms = {});
 
 /// The window's 2 * SSIM_RADIUS + 1 taps along one axis.
 std::vector<double> ssim_window();

@@ -203,12 +203,13 @@ Rendered render_points(const Values& values, const Camera& camera, const RenderO
 }
 
 ReferenceGradient points_loss_gradient(const Values& values, const Camera& camera, const Image& target,
-                                       const RenderOptions& options) {
+                                       const RenderOptions& options, const LossWeights& weights) {
     ReferenceGradient out;
     out.rendered = render_points(values, camera, options);
-    const Loss loss = image_loss(out.rendered.blended.color, to_double(target));
+    const Loss loss = image_loss(out.rendered.blended.color, to_double(target), weights);
     out.loss = loss.loss;
     out.l1 = loss.l1;
+    out.l2 = loss.l2;
     out.ssim = loss.ssim;
     out.image_gradient = loss.gradient;
     const std::vector<Sphere> spheres = project_all(values, camera, options);

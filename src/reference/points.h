@@ -22,6 +22,6 @@ namespace ewa::reference {
 /// neither has ReferenceGradient::blend::instances.
 Rendered render_points(const Values& values, const Camera& camera, const RenderOptions& options);
 ReferenceGradient points_loss_gradient(const Values& values, const Camera& camera, const Image& target,
-                                       const RenderOptions& options);
+                                       const RenderOptions& options, const LossWeights& weights = {});
 
 }  // namespace ewa::reference

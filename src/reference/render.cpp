@@ -36,12 +36,13 @@ Rendered render(const Values& values, const Camera& camera, const RenderOptions&
 
 ReferenceGradient loss_gradient(const Values& values, const Camera& camera, const Image& target,
                                 const RenderOptions& options, const ReferenceOptions& reference) {
-    if (options.points) return points_loss_gradient(values, camera, target, options);
+    if (options.points) return points_loss_gradient(values, camera, target, options, reference.loss);
     ReferenceGradient out;
     out.rendered = render(values, camera, options, reference);
-    const Loss loss = image_loss(out.rendered.blended.color, to_double(target));
+    const Loss loss = image_loss(out.rendered.blended.color, to_double(target), reference.loss);
     out.loss = loss.loss;
     out.l1 = loss.l1;
+    out.l2 = loss.l2;
     out.ssim = loss.ssim;
     out.image_gradient = loss.gradient;
     if (options.integrator != Integrator::splat) {

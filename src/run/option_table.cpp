@@ -14,6 +14,7 @@
 #include "ewa/error.h"
 #include "ewa/metrics.h"
 #include "run/advanced_options.h"
+#include "run/loss_option.h"
 #include "run/option_rows.h"
 #include "scene/looks.h"
 
@@ -257,6 +258,18 @@ RunOption background_option() {
     return option;
 }
 
+RunOption loss_option() {
+    RunOption option{
+        "loss", "TERM=W,...",
+        "Weights of the loss: of the absolute differences (l1), the squared ones (l2) and 1 - SSIM "
+        "(ssim). A term that is not named has the weight 0",
+        kDecides};
+    option.get = [](const RunOptions& options) { return loss_text(options.train.loss); };
+    option.set = [](RunOptions& options, const std::string& text) { options.train.loss = parse_loss(text); };
+    option.before = loss_text({});
+    return option;
+}
+
 RunOption max_width_option() {
     RunOption option = number<int>(
         "max-width", "N",
@@ -323,6 +336,7 @@ std::vector<Row> rows() {
         {"Quality", "revised_opacity",
          flag("revised-opacity", "adc: both halves of a split splat are together as opaque as it was",
               [](RunOptions& o) -> bool& { return o.train.revised_opacity; })},
+        {"Quality", "loss", loss_option()},
         {"Quality", "appearance", appearance_option()},
         {"Quality", "exposure",
          flag("exposure", "The same as --appearance affine",

@@ -46,6 +46,7 @@ class Alignment {
           plan_(pipeline::plan_for({.purpose = pipeline::Purpose::gradient,
                                     .scene_degree = gaussians.sh_degree,
                                     .render = options.render,
+                                    .loss = options.loss,
                                     .masks = images_.any_masked(),
                                     .motion = true})),
           model_(pipeline::upload_model(*device, gaussians, plan_.moment_buffers(), false)),
@@ -76,7 +77,8 @@ class Alignment {
             .gradients = true,
             .masks = plan_.masks,
             .overlaid = true,
-            .motion = true};
+            .motion = true,
+            .loss = plan_.loss};
         run_until_it_fits(cache_, executor_, frame_, size, [&](const passes::Recorder& recorder) {
             const pipeline::FrameInputs inputs{
                 .camera = record_move_camera(recorder, motions_, use.photo, base),

@@ -241,7 +241,8 @@ MemoryEstimate MemoryEstimator::up_to(uint32_t max_splats) {
                                    .masks = frame.masks == MaskUse::ignore,
                                    .appearance = plan.appearance,
                                    .overlaid = true,
-                                   .motion = plan.motion};
+                                   .motion = plan.motion,
+                                   .loss = plan.loss};
         const Sizes sizes = sizes_for(config, request);
         const uint64_t instances = sizes.overlay + 2 * sizes.instance_words;
         const uint64_t second = grows ? array + kRefineBytes * estimate.splats : 0;

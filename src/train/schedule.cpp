@@ -54,6 +54,7 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
     return {.purpose = pipeline::Purpose::training,
             .scene_degree = start.sh_degree,
             .render = options.render,
+            .loss = options.loss,
             .masks = masks,
             .appearance = appearance_of(options),
             .motion = options.refine_poses,

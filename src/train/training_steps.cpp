@@ -73,7 +73,8 @@ FrameRequest Training::request_of(const CameraUse& camera) const {
             .masks = plan_.masks,
             .appearance = plan_.appearance,
             .overlaid = true,
-            .motion = plan_.motion};
+            .motion = plan_.motion,
+            .loss = plan_.loss};
 }
 
 void Training::record_fused(gpu::Recording& recording, int step, size_t index,
@@ -137,7 +138,7 @@ void Training::finish_oldest() {
         return;
     }
     in_flight_.pop_front();
-    log_.add({.loss = loss_of(counts),
+    log_.add({.loss = loss_of(plan_.loss, counts),
               .psnr = -10 * std::log10(double(counts.squared) / weight),
               .skipped_nonfinite = counts.skipped_nonfinite,
               .dropped_updates = counts.dropped_updates,

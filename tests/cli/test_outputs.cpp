@@ -120,6 +120,7 @@ TEST(Outputs, Grad) {
     EXPECT_NEAR(json["loss"].get<double>(),
                 0.8 * json["l1"].get<double>() + 0.2 * (1 - json["ssim"].get<double>()), 1e-5);
     EXPECT_TRUE(json.contains("frame"));
+    EXPECT_FALSE(json.contains("l2"));
     auto properties = [](const std::string& ply) {
         return ply.substr(ply.find("element"), ply.find("end_header") - ply.find("element"));
     };
@@ -129,6 +130,16 @@ TEST(Outputs, Grad) {
     double size = 0;
     for (const float v : gradient.opacity_logits) size += std::abs(v);
     EXPECT_GT(size, 0);
+    const Outcome other = run_ewa({"grad", folder / "s.ply", folder / "data", "--frame", "1", "-o",
+                                   folder / "h.ply", "--json", folder / "h.json", "--loss", "l1=0.25,l2=3"});
+    expect_success(other);
+    EXPECT_NE(other.out.find("  L2 "), std::string::npos) << other.out;
+    EXPECT_EQ(other.out.find("SSIM"), std::string::npos) << other.out;
+    const auto weighted = read_json(folder / "h.json");
+    EXPECT_FALSE(weighted.contains("ssim"));
+    EXPECT_EQ(weighted["l1"], json["l1"]);
+    EXPECT_NEAR(weighted["loss"].get<double>(),
+                0.25 * weighted["l1"].get<double>() + 3 * weighted["l2"].get<double>(), 1e-5);
 }
 
 TEST(Outputs, Info) {

@@ -151,7 +151,8 @@ void compile_training(Compiler& compiler) {
     compiler.compile<passes::LossColumns>();
     compiler.compile<passes::LossRows>();
     compiler.compile<passes::LossBackwardColumns>();
-    compiler.compile<passes::LossBackwardRows>();
+    compiler.compile<passes::LossBackwardRows>(
+        {{SPEC_MODE, {0, LOSS_SSIM, LOSS_SQUARES, LOSS_SSIM | LOSS_SQUARES}}});
     compiler.compile<passes::Reduce>();
     compiler.compile<passes::Expose>();
     compiler.compile<passes::ExposeBackward>();

@@ -70,7 +70,7 @@ TEST_P(Loss, ValueAndGradientMatchTheReference) {
     EXPECT_NEAR(counts.l1, cpu.l1, 2e-7 + 1e-6 * cpu.l1);
     EXPECT_NEAR(counts.squared, cpu.squared, 1e-7 + 1e-6 * cpu.squared);
     EXPECT_NEAR(counts.ssim, cpu.ssim, 5e-7);  // each value divides small differences of moments
-    EXPECT_NEAR(pipeline::loss_of(counts), cpu.loss, 1e-6);
+    EXPECT_NEAR(pipeline::loss_of({}, counts), cpu.loss, 1e-6);
 
     const auto gradient = frame.image_gradient.download<float>(frame.sizes.image_gradient / 4);
     const auto target = frame.target.download<float>(frame.sizes.target / 4);
@@ -87,6 +87,52 @@ TEST_P(Loss, ValueAndGradientMatchTheReference) {
     printf("    gradient %.1e of %.1e, ssim %.1e\n", worst, largest, std::abs(counts.ssim - cpu.ssim));
     EXPECT_LT(worst_target, 2e-7);
     EXPECT_LT(worst, 1e-5 * largest);  // variances are float32 differences of moments
+}
+
+/// Other weights than those of 3DGS. What a term of weight 0 needs is not there.
+TEST_P(Loss, OfOtherWeightsMatchesTheReference) {
+    const int width = GetParam().first, height = GetParam().second;
+    LossInputs in = random_inputs(uint64_t(width * 500 + height), width, height);
+    const gpu::Buffer photo = pipeline::upload_photo(*device(), in.photo);
+    Rig& r = rig();
+    for (const LossWeights& weights :
+         {LossWeights{0, 0, 1}, LossWeights{0.3, 2.5, 0.1}, LossWeights{1, 0, 0}, LossWeights{0.2, 1, 0}}) {
+        // A square grows linearly above 16.
+        if (weights.ssim == 0) in.image.at(width / 2, height / 2)[1] = 20;
+        SCOPED_TRACE(testing::Message() << weights.l1 << " " << weights.l2 << " " << weights.ssim);
+        pipeline::FrameRequest request{1, uint32_t(width), uint32_t(height), 1, true, false};
+        request.loss = weights;
+        GuardedFrame guarded(r.config(), request);
+        pipeline::FrameBuffers& frame = guarded.frame;
+        EXPECT_EQ(frame.sizes.moments > 0, weights.ssim > 0);
+        EXPECT_EQ(frame.sizes.partial_sums, (weights.l2 > 0 ? 12u : 8u) * frame.sizes.partials);
+        frame.planes.upload(std::span<const float>(pack_planes(in.image, 3, frame.sizes.stride)));
+        const pipeline::FrameInputs inputs{{nullptr, 0, uint32_t(width), uint32_t(height)}, in.background};
+        const pipeline::Plan plan{.loss = weights};
+        r.run([&](gpu::Recording& recording) {
+            recording.fill(frame.counts, 0, 0, sizeof(shared::Counts));
+            pipeline::FramePasses{{recording, r.cache}, plan, frame, inputs}.loss(photo);
+        });
+        EXPECT_TRUE(guarded.intact());
+        const reference::Loss cpu = reference::image_loss(in.image, in.target, weights);
+        const shared::Counts counts = frame.read_counts();
+        EXPECT_NEAR(counts.l1, cpu.l1, 2e-7 + 1e-6 * cpu.l1);
+        EXPECT_NEAR(counts.squared, cpu.squared, 1e-7 + 1e-6 * cpu.squared);
+        EXPECT_NEAR(counts.l2, weights.l2 > 0 ? cpu.l2 : 0, 1e-7 + 1e-6 * cpu.l2);
+        EXPECT_NEAR(counts.ssim, weights.ssim > 0 ? cpu.ssim : 0, 5e-7);
+        EXPECT_NEAR(pipeline::loss_of(weights, counts), cpu.loss, 2e-6 + 1e-6 * cpu.loss);
+        const auto gradient = frame.image_gradient.download<float>(frame.sizes.image_gradient / 4);
+        double worst = 0, largest = 0;
+        for (int c = 0; c < 3; ++c)
+            for (int y = 0; y < height; ++y)
+                for (int x = 0; x < width; ++x) {
+                    const size_t at =
+                        size_t(c) * frame.sizes.plane_floats + size_t(y) * frame.sizes.stride + size_t(x);
+                    worst = std::max(worst, std::abs(gradient[at] - cpu.gradient.at(x, y)[c]));
+                    largest = std::max(largest, std::abs(cpu.gradient.at(x, y)[c]));
+                }
+        EXPECT_LT(worst, 1e-5 * largest);
+    }
 }
 
 /// The training image's alpha as the weight of a pixel.
@@ -148,14 +194,17 @@ TEST_P(Loss, OfBandsAddsUpToThatOfTheView) {
     Rig& r = rig();
     const gpu::Buffer texels = pipeline::upload_photo(*device(), in.photo);
     const uint32_t tile_rows = (uint32_t(height) + r.config().tile_height - 1) / r.config().tile_height;
+    const pipeline::Plan plan{.loss = {0.7, 0.6, 0.2}};
     for (const bool masked : {false, true})
         for (const uint32_t bands : {1u, 2u, 3u, tile_rows}) {
             if (bands > tile_rows) continue;
-            double l1 = 0, squared = 0, ssim = 0;
+            double l1 = 0, l2 = 0, squared = 0, ssim = 0;
             reference::Raster gradient(width, height, 3);
             for (uint32_t b = 0; b < bands; ++b) {
                 const pipeline::Band band = pipeline::band_of(r.config(), uint32_t(height), bands, b);
-                GuardedFrame guarded(r.config(), {1, uint32_t(width), band.rows, 1, true, false, masked});
+                pipeline::FrameRequest request{1, uint32_t(width), band.rows, 1, true, false, masked};
+                request.loss = plan.loss;
+                GuardedFrame guarded(r.config(), request);
                 pipeline::FrameBuffers& frame = guarded.frame;
                 reference::Raster rows(width, int(band.rows), 3);
                 for (int y = 0; y < int(band.rows); ++y)
@@ -165,11 +214,12 @@ TEST_P(Loss, OfBandsAddsUpToThatOfTheView) {
                 pipeline::FrameInputs inputs{{nullptr, 0, uint32_t(width), uint32_t(height)}, in.background};
                 inputs.band = band;
                 r.run([&](gpu::Recording& recording) {
-                    pipeline::FramePasses{{recording, r.cache}, {}, frame, inputs}.loss(texels, masked);
+                    pipeline::FramePasses{{recording, r.cache}, plan, frame, inputs}.loss(texels, masked);
                 });
                 EXPECT_TRUE(guarded.intact());
                 const shared::Counts counts = frame.read_counts();
                 l1 += counts.l1;
+                l2 += counts.l2;
                 squared += counts.squared;
                 ssim += counts.ssim;
                 const auto own = frame.image_gradient.download<float>(frame.sizes.image_gradient / 4);
@@ -180,9 +230,10 @@ TEST_P(Loss, OfBandsAddsUpToThatOfTheView) {
                                 own[size_t(c) * frame.sizes.plane_floats + size_t(y) * frame.sizes.stride +
                                     size_t(x)];
             }
-            const reference::Loss cpu = masked ? reference::image_loss(in.image, photo, weights)
-                                               : reference::image_loss(in.image, in.target);
+            const reference::Loss cpu = masked ? reference::image_loss(in.image, photo, weights, plan.loss)
+                                               : reference::image_loss(in.image, in.target, plan.loss);
             EXPECT_NEAR(l1, cpu.l1, 2e-7 + 1e-6 * cpu.l1);
+            EXPECT_NEAR(l2, cpu.l2, 2e-7 + 1e-6 * cpu.l2);
             EXPECT_NEAR(squared, cpu.squared, 1e-7 + 1e-6 * cpu.squared);
             EXPECT_NEAR(ssim, cpu.ssim, 5e-7);
             double worst = 0, largest = 0;
@@ -232,7 +283,7 @@ TEST_P(Loss, MomentsAreBlurredDownTheColumns) {
         blurred("blurred", sizes.derivatives, gpu::Texel::rgba32f);
     // Any nine planes do as derivatives: the moments' first nine.
     r.run([&](gpu::Recording& recording) {
-        const shared::LossPush push{sizes.image(), 0, 0, {}};
+        const shared::LossPush push{sizes.image(), 0, 0, 0, {}};
         r.cache.get<passes::LossColumns>().record(recording, {image, target, moments}, push);
         r.cache.get<passes::LossBackwardColumns>().record(recording, {moments, blurred}, push);
     });
@@ -341,16 +392,16 @@ TEST(Reduce, AddsUpInAFixedOrder) {
     Rig& r = rig();
     for (const uint32_t items : {1u, 7u, 513u, 20000u}) {
         Random random(items);
-        std::vector<float> values(2 * items);  // in two rows
-        double sum[2] = {0, 0};
+        std::vector<float> values(3 * items);  // in three rows
+        double sum[3] = {0, 0, 0};
         for (size_t i = 0; i < values.size(); ++i) sum[i / items] += values[i] = float(random.uniform(-1, 2));
         const uint32_t block = 512, blocks = (items + block - 1) / block;
-        Guarded source("source", values), sums("sums", 2 * blocks * 4), unused("unused", 4),
+        Guarded source("source", values), sums("sums", 3 * blocks * 4), unused("unused", 4),
             counts = zero_counts();
         r.run([&](gpu::Recording& recording) {
             const auto reduce = r.cache.get<passes::Reduce>();
-            reduce.record(recording, {source, sums, counts}, {items, block, shared::REDUCE_TO_SUMS, 2, 1});
-            reduce.record(recording, {sums, unused, counts}, {blocks, blocks, shared::REDUCE_TO_L1, 2, 0.5f});
+            reduce.record(recording, {source, sums, counts}, {items, block, shared::REDUCE_TO_SUMS, 3, 1});
+            reduce.record(recording, {sums, unused, counts}, {blocks, blocks, shared::REDUCE_TO_L1, 3, 0.5f});
             reduce.record(recording, {sums, unused, counts},
                           {blocks, blocks, shared::REDUCE_TO_SSIM, 1, 2.0f});
         });
@@ -358,6 +409,7 @@ TEST(Reduce, AddsUpInAFixedOrder) {
         const auto read = counts.read<shared::Counts>()[0];
         EXPECT_NEAR(read.l1, 0.5 * sum[0], 1e-6 * items);
         EXPECT_NEAR(read.squared, 0.5 * sum[1], 1e-6 * items);
+        EXPECT_NEAR(read.l2, 0.5 * sum[2], 1e-6 * items);
         EXPECT_NEAR(read.ssim, 2 * sum[0], 4e-6 * items);
         EXPECT_EQ(unused.read<uint32_t>()[0], kPoison);
         EXPECT_EQ(read.instances, 0u);

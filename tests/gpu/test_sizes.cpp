@@ -409,6 +409,7 @@ TEST(Plan, IgnoresTheInputsOfOtherPurposes) {
     const Plan drawn = plan_for(request);
     request.masks = request.motion = request.statistics = request.regularised = request.sky = true;
     request.appearance = AppearanceModel::grid;
+    request.loss = {1, 0, 0};
     EXPECT_EQ(plan_for(request), drawn);
     request = request_for(Purpose::training);
     const Plan training = plan_for(request);

@@ -37,12 +37,16 @@ TEST_P(Gradient, IsTheSlopeOfTheReferencesLoss) {
     options.kernel = c.kernel;
     options.background = {0.3f, 0.6f, 0.1f};
     if (c.seed % 2 == 0) options.sky = std::make_shared<const SkyMap>(random_sky(c.seed, 16));
-    const LossGradient device_gradient = loss_gradient(device(), gaussians, camera, target, options);
-    const reference::ReferenceGradient cpu = reference::loss_gradient(gaussians, camera, target, options);
+    reference::ReferenceOptions other;
+    if (c.splats == 4) other.loss = {0.2, 4, 0.5};
+    const LossGradient device_gradient =
+        loss_gradient(device(), gaussians, camera, target, options, false, other.loss);
+    const reference::ReferenceGradient cpu =
+        reference::loss_gradient(gaussians, camera, target, options, other);
 
     // The loss jumps where a contribution crosses 1/255; the best of several steps is one that crosses none.
     reference::Values values = gaussians;
-    const auto loss = [&] { return reference::loss_gradient(values, camera, target, options).loss; };
+    const auto loss = [&] { return reference::loss_gradient(values, camera, target, options, other).loss; };
     const auto differences = [&](std::vector<double>& group, const std::vector<double>& claimed) {
         std::vector<double> out;
         for (size_t i = 0; i < group.size(); ++i)

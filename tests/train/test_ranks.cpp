@@ -125,6 +125,13 @@ template <AppearanceModel model>
 void with_model(TrainOptions& options) {
     options.appearance = model;
 }
+void with_squares(TrainOptions& options) {
+    options.loss = {0.5, 2, 0.1};
+    options.bands = 2;
+}
+void without_similarity(TrainOptions& options) {
+    options.loss = {1, 0, 0};
+}
 void under_sky(TrainOptions& options) {
     options.sky = true;
 }
@@ -183,6 +190,8 @@ INSTANTIATE_TEST_SUITE_P(
         RanksCase{Strategy::adc, 3, 2, with_model<AppearanceModel::ppisp>, "_ppisp"},
         RanksCase{Strategy::mcmc, 1, 2, with_model<AppearanceModel::ppisp>, "_ppisp"},
         RanksCase{Strategy::mcmc, 2, 3, with_model<AppearanceModel::grid>, "_grid"},
+        RanksCase{Strategy::adc, 2, 3, with_squares, "_squares"},
+        RanksCase{Strategy::mcmc, 2, 2, without_similarity, "_without_ssim"},
         RanksCase{Strategy::adc, 3, 2, under_sky, "_sky"}, RanksCase{Strategy::mcmc, 1, 2, under_sky, "_sky"},
         RanksCase{Strategy::mcmc, 2, 3, under_sky_with_model, "_sky_ppisp"},
         RanksCase{Strategy::none, 1, 4, wide_moments, "_wide"},

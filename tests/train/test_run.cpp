@@ -14,6 +14,7 @@
 #include "core/json.h"
 #include "ewa/error.h"
 #include "run/advanced_options.h"
+#include "run/loss_option.h"
 #include "run/option_table.h"
 #include "train/synthetic.h"
 
@@ -124,6 +125,7 @@ TEST(Run, StoppedAndResumedEndsWithTheSameBytes) {
     TempFolder folder;
     RunOptions whole = small_run(folder / "whole"), options = small_run(folder / "cut");
     whole.train.sky = options.train.sky = true;
+    whole.train.loss = options.train.loss = {0.5, 1, 0.1};
     run_training(whole);
     options.resume = true;  // starts, since there is no checkpoint
     for (const int last : {13, 27}) {
@@ -147,6 +149,10 @@ TEST(Run, StoppedAndResumedEndsWithTheSameBytes) {
 
     options.train.seed = 4;
     expect_error<InputError>([&] { run_training(options); }, {"--seed 3, not 4"});
+    options.train.seed = 3;
+    options.train.loss = {};
+    expect_error<InputError>([&] { run_training(options); },
+                             {R"(--loss "l1=0.5,l2=1,ssim=0.1", not "l1=0.8,ssim=0.2")"});
 }
 
 /// A run that is resumed keeps its cap. With more steps it has that of the longer run.
@@ -322,6 +328,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                              {"sh-degree", "2"},
                                              {"absgrad", "true"},
                                              {"revised-opacity", "true"},
+                                             {"loss", "l1=0.5,l2=2,ssim=0.25"},
                                              {"exposure", "true"},
                                              {"appearance", "grid"},
                                              {"resolution-schedule", "3"},
@@ -396,6 +403,25 @@ TEST(RunOptions, TableReadsWhatItWrites) {
     EXPECT_EQ(all.train.device_memory_bytes, uint64_t(256) << 20);
     EXPECT_EQ(all.train.render.kernel, Footprint::density);
     EXPECT_EQ(config.begin().key(), "dataset");
+}
+
+TEST(RunOptions, ALossHasTheTermsThatItNames) {
+    EXPECT_EQ(train::parse_loss(" L1 = 0.5 , ssim=1e-1"), (LossWeights{0.5, 0, 0.1}));
+    EXPECT_EQ(train::parse_loss("l2=1,ssim=0"), (LossWeights{0, 1, 0}));
+    EXPECT_EQ(train::loss_text({}), "l1=0.8,ssim=0.2");
+    const std::pair<const char*, const char*> wrong[] = {
+        {"", "'' is no term of the loss; l1, l2 and ssim are"},
+        {"sim=1", "did you mean ssim?"},
+        {"l1=1,", "'' is no term"},
+        {"l1", "'l1' has no weight; l1=0.5 has one"},
+        {"l1=1,ssim=1,L1=2", "'l1' is named twice"},
+        {"l1=-1", "l1: '-1' is not a number from 0 to"},
+        {"l1=", "l1: '' is not a number"},
+        {"ssim=nan", "ssim: 'nan' is not a number"},
+        {"l2=inf", "l2: 'inf' is not a number"},
+        {"l1=0,ssim=0", "'l1=0,ssim=0' has no weight above 0; l1=0.8,ssim=0.2 is the usual loss"}};
+    for (const auto& [text, message] : wrong)
+        expect_error<InputError>([&, t = text] { train::parse_loss(t); }, {message});
 }
 
 TEST(RunOptions, TableRefusesWhatIsOutOfRange) {

@@ -88,6 +88,30 @@ TEST(ReferenceLoss, GradientMatchesDifferences) {
     }
 }
 
+TEST(ReferenceLoss, HasTheWeightsOfItsTerms) {
+    const LossWeights weights{0.5, 3, 0.25};
+    Raster a = random_raster(30, 14, 11);
+    const Raster b = random_raster(31, 14, 11);
+    const Loss loss = image_loss(a, b, weights), usual = image_loss(a, b);
+    double l2 = 0;
+    for (size_t i = 0; i < a.values.size(); ++i)
+        l2 += (a.values[i] - b.values[i]) * (a.values[i] - b.values[i]) / double(a.values.size());
+    EXPECT_NEAR(loss.l2, l2, 1e-12);
+    EXPECT_NEAR(loss.loss, 0.5 * usual.l1 + 3 * l2 + 0.25 * (1 - usual.ssim), 1e-12);
+    std::vector<double> differences;
+    for (size_t i = 0; i < a.values.size(); ++i)
+        differences.push_back(test::best_central_difference([&] { return image_loss(a, b, weights).loss; },
+                                                            a.values[i], loss.gradient.values[i], 1e-4,
+                                                            1e-6));
+    EXPECT_TRUE(test::gradients_agree(loss.gradient.values, differences, {1e-10, 1e-6, 1e-5, 1e-6}));
+    // A square grows linearly above 16.
+    Raster far(1, 1, 3);
+    far.values = {0, 20, -40};
+    const Loss large = image_loss(far, Raster(1, 1, 3), LossWeights{0, 3, 0});
+    EXPECT_NEAR(large.l2, (16 * (40 - 16) + 16 * (80 - 16)) / 3.0, 1e-12);
+    EXPECT_EQ(large.gradient.values, (std::vector<double>{0, 32, -32}));
+}
+
 TEST(ReferenceLoss, GradientOfMaskedPicturesMatchesDifferences) {
     Raster a = random_raster(20, 15, 12), weights(15, 12, 1);
     const Raster b = random_raster(21, 15, 12);

@@ -432,7 +432,7 @@ StabilityTraining train_from(const std::shared_ptr<gpu::Device>& device, const S
     // The first run changes nothing: its rates are zero.
     FrameRun run(device, {one.gaussians, one.camera, stability_target(one.camera.width, one.camera.height)},
                  true, one.options);
-    result.first_loss = pipeline::loss_of(run.counts());
+    result.first_loss = pipeline::loss_of({}, run.counts());
     for (uint32_t step = 1; step <= uint32_t(steps); ++step) {
         // The rates of 3DGS for a scene of unit extent.
         run.set_rates({.mean = 1.6e-4f,
@@ -443,7 +443,7 @@ StabilityTraining train_from(const std::shared_ptr<gpu::Device>& device, const S
                        .sh_rest = 1.25e-4f,
                        .step = step});
         run.run();
-        result.last_loss = pipeline::loss_of(run.counts());
+        result.last_loss = pipeline::loss_of({}, run.counts());
         result.finite = result.finite && std::isfinite(result.last_loss);
         result.dropped_updates += run.counts().dropped_updates;
         result.limited_steps += run.counts().limited_steps;

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run/loss_option.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/text.h"
+#include "core/typing.h"
+#include "ewa/error.h"
+
+namespace ewa::train {
+namespace {
+
+constexpr double kMostWeight = 1e6;
+
+constexpr std::array kTerms{std::pair{"l1", &LossWeights::l1}, std::pair{"l2", &LossWeights::l2},
+                            std::pair{"ssim", &LossWeights::ssim}};
+
+std::vector<std::string> term_names() {
+    std::vector<std::string> names;
+    for (const auto& [name, member] : kTerms) names.emplace_back(name);
+    return names;
+}
+
+}  // namespace
+
+LossWeights parse_loss(const std::string& text) {
+    LossWeights weights{0, 0, 0};
+    std::vector<std::string> named;
+    for (size_t begin = 0, end = 0; end != std::string::npos; begin = end + 1) {
+        end = text.find(',', begin);
+        const std::string part = text.substr(begin, end - begin);
+        const size_t equals = part.find('=');
+        const std::string name = core::lower(core::trim(std::string_view(part).substr(0, equals)));
+        const auto term = std::ranges::find_if(kTerms, [&](const auto& each) { return name == each.first; });
+        if (term == kTerms.end())
+            throw InputError("'" + name + "' is no term of the loss; l1, l2 and ssim are" +
+                             core::did_you_mean(name, term_names()));
+        if (equals == std::string::npos)
+            throw InputError("'" + name + "' has no weight; " + name + "=0.5 has one");
+        if (std::ranges::find(named, name) != named.end()) throw InputError("'" + name + "' is named twice");
+        named.push_back(name);
+        std::string weight(core::trim(std::string_view(part).substr(equals + 1)));
+        const std::string problem = core::settle_number(weight, 0.0, kMostWeight);
+        if (!problem.empty()) throw InputError(name + ": " + problem);
+        weights.*(term->second) = core::parse_number(weight).value();
+    }
+    if (weights == LossWeights{0, 0, 0})
+        throw InputError("'" + text + "' has no weight above 0; l1=0.8,ssim=0.2 is the usual loss");
+    return weights;
+}
+
+std::string loss_text(const LossWeights& weights) {
+    std::string text;
+    for (const auto& [name, member] : kTerms)
+        if (weights.*member > 0)
+            text += fmt::format("{}{}={}", text.empty() ? "" : ",", name, weights.*member);
+    return text;
+}
+
+}  // namespace ewa::train
