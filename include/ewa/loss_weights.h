@@ -4,12 +4,16 @@
 
 namespace ewa {
 
+/// LossWeights::alpha: kUsualAlphaWeight where images are transparent, else 0.
+inline constexpr double kAutomaticAlphaWeight = -1, kUsualAlphaWeight = 0.2;
+
 /// Weights of the terms of the loss, 0 or more:
-///   l1 mean|x - y| + l2 mean (x - y)^2 + ssim (1 - mean SSIM)
+///   l1 mean|x - y| + l2 mean (x - y)^2 + ssim (1 - mean SSIM) + alpha mean|A - a|.
 /// x is the render and y the training image, with means over pixels and RGB. The usual values are those of 3DGS.
-/// The square of a difference above 16 grows linearly.
+/// The square of a difference above 16 grows linearly. A is the opacity of the render, and a the alpha of the training image.
+/// Images that are nowhere transparent, or whose alpha weights the pixels, have no such term.
 struct LossWeights {
-    double l1 = 0.8, l2 = 0, ssim = 0.2;
+    double l1 = 0.8, l2 = 0, ssim = 0.2, alpha = kAutomaticAlphaWeight;
 
     bool operator==(const LossWeights&) const = default;
 };

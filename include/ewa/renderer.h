@@ -61,8 +61,9 @@ class Renderer {
 
 struct LossGradient {
     double loss = 0, l1 = 0;
-    double l2 = 0, ssim = 0;  // 0 if their weight is 0
-    Gaussians gradient;       // dL/d(stored value) in place of each stored value
+    double l2 = 0, ssim = 0, alpha = 0;  // 0 if their weight is 0
+    LossWeights weights;                 // that apply to this view: that of alpha is not automatic
+    Gaussians gradient;                  // dL/d(stored value) in place of each stored value
     CameraMotion
         camera;  // dL/d(each value of the camera's motion), for no motion; zero with `points`, ray and march
     uint32_t skipped_nonfinite = 0;

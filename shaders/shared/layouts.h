@@ -166,9 +166,10 @@ EWA_UINT(TOTAL_NONE, 0u);
 EWA_UINT(TOTAL_INSTANCES, 1u);  // Counts.instances
 EWA_UINT(TOTAL_SCAN, 2u);       // Counts.scan_total
 // ReducePush.target
-EWA_UINT(REDUCE_TO_SUMS, 0u);  // sums[block]
-EWA_UINT(REDUCE_TO_L1, 1u);    // Counts.l1, of further rows Counts.squared and Counts.l2
-EWA_UINT(REDUCE_TO_SSIM, 2u);  // Counts.ssim
+EWA_UINT(REDUCE_TO_SUMS, 0u);   // sums[block]
+EWA_UINT(REDUCE_TO_L1, 1u);     // Counts.l1, of further rows Counts.squared and Counts.l2
+EWA_UINT(REDUCE_TO_SSIM, 2u);   // Counts.ssim
+EWA_UINT(REDUCE_TO_ALPHA, 3u);  // Counts.alpha
 
 // ---- Loss: what one invocation owns ----
 // A pass down the columns: one texel (4 pixels) of LOSS_ROWS rows. A pass along the rows: LOSS_TEXELS texels
@@ -260,6 +261,7 @@ struct Counts {
     uint visible;            // splats that reach a tile; counted with PROJECT_DEBUG
     uint unfinished;         // strips of tiles with more splats than rays can walk
     float l2;                // mean (x - y)^2, with LOSS_SQUARES
+    float alpha;             // mean |1 - T - alpha of the training image|
     // Not cleared by a frame that may begin before the host has read the counts of the one before. Once a frame
     // has too many instances, this is 1, later frames report 2^32 - 1 instances, and no pass changes the model.
     uint overflowed;
@@ -452,6 +454,13 @@ struct LossPush {
     float l1_scale;    // d(loss)/d|x - y| of one pixel and channel
     float l2_scale;    // d(loss)/d((x - y)^2) of one pixel and channel
     uint own[2];       // first and one-past-last of the rows that the loss counts
+};
+
+struct AlphaPush {
+    ImageLayout image;
+    uint first_pixel;  // of the photo: the image's first
+    uint own[2];       // first and one-past-last of the rows that the loss counts
+    float scale;       // d(loss)/d|difference of the alphas| of one pixel
 };
 
 struct ReducePush {

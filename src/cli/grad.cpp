@@ -63,6 +63,7 @@ int run(const GradArguments& arguments) {
         report::Json json{{"loss", result.loss}, {"l1", result.l1}};
         if (weights.l2 > 0) json["l2"] = result.l2;
         if (weights.ssim > 0) json["ssim"] = result.ssim;
+        if (result.weights.alpha > 0) json["alpha"] = result.alpha;
         if (options.integrator == Integrator::splat && !options.points)
             json["camera"] = motion_json(result.camera);
         json["frame"] = index;

@@ -133,7 +133,8 @@ inline uint64_t loss_column_items(const shared::LossPush& push) {
     return uint64_t(push.image.stride / 4) * ((height + shared::LOSS_ROWS - 1) / shared::LOSS_ROWS);
 }
 /// Items of a loss pass along the rows.
-inline uint64_t loss_row_items(const shared::LossPush& push) {
+template <class Push>
+uint64_t loss_row_items(const Push& push) {
     const uint32_t texels = push.image.stride / 4;
     return uint64_t((texels + shared::LOSS_TEXELS - 1) / shared::LOSS_TEXELS) * push.image.size[1];
 }

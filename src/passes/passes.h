@@ -363,7 +363,7 @@ struct LossColumns {
 /// SSIM, its derivatives by the moments, and partial sums of SSIM.
 struct LossRows {
     static constexpr char shader[] = "loss_rows";
-    using Work = PerElement<loss_row_items, 3>;
+    using Work = PerElement<loss_row_items<shared::LossPush>, 3>;
     gpu::BufferPart moments, derivatives, partials;
 };
 
@@ -378,8 +378,16 @@ struct LossBackwardColumns {
 /// clamped values, and with LOSS_SQUARES of squared differences. Variant: SPEC_MODE (LOSS_* bits).
 struct LossBackwardRows {
     static constexpr char shader[] = "loss_backward_rows";
-    using Work = PerElement<loss_row_items, 3>;
+    using Work = PerElement<loss_row_items<shared::LossPush>, 3>;
     gpu::BufferPart blurred, image, target, image_gradient, partials;
+};
+
+/// Gradient of the loss by the transmittance, from a training image's alpha, and partial sums of the differences.
+/// Variant: SPEC_COLOR_FLOATS.
+struct AlphaLoss {
+    static constexpr char shader[] = "alpha_loss";
+    using Work = PerElement<loss_row_items<shared::AlphaPush>>;
+    gpu::BufferPart photo, planes, image_gradient, partials;
 };
 
 /// Adds the floats of each row in a fixed order.

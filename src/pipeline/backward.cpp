@@ -87,12 +87,14 @@ void Exposures::set(uint32_t photo, std::span<const uint64_t> words) {
 }
 
 LossTerms terms_of(const shared::Counts& counts) {
-    return {counts.l1, counts.l2, counts.ssim};
+    return {counts.l1, counts.l2, counts.ssim, counts.alpha};
 }
 
 double loss_of(const LossWeights& weights, const LossTerms& terms) {
-    const double loss = weights.l1 * terms.l1 + weights.ssim * (1 - terms.ssim);
-    return weights.l2 > 0 ? loss + weights.l2 * terms.l2 : loss;
+    double loss = weights.l1 * terms.l1 + weights.ssim * (1 - terms.ssim);
+    if (weights.l2 > 0) loss += weights.l2 * terms.l2;
+    if (weights.alpha > 0) loss += weights.alpha * terms.alpha;
+    return loss;
 }
 
 double loss_of(const LossWeights& weights, const shared::Counts& counts) {
@@ -122,18 +124,13 @@ void FramePasses::expose_backward(const ExposureUse& use) const {
             .instance_capacity = frame.instance_capacity});
 }
 
-/// Adds each row of frame.partials, in two steps. target: shared::REDUCE_TO_*.
-void FramePasses::mean_of_partials(uint32_t target, uint32_t rows, float scale) const {
-    const Sizes& s = frame.sizes;
+/// Adds `items` floats of each row of frame.partials, in two steps. target: shared::REDUCE_TO_*.
+void FramePasses::mean_of_partials(uint32_t target, uint32_t items, uint32_t rows, float scale) const {
+    const uint32_t block = frame.sizes.reduce_block, blocks = (items + block - 1) / block;
     record(passes::Reduce{.source = frame.partials, .sums = frame.reduced, .counts = frame.counts},
-           {.items = s.partials,
-            .block = s.reduce_block,
-            .target = shared::REDUCE_TO_SUMS,
-            .rows = rows,
-            .scale = 1});
-    record(
-        passes::Reduce{.source = frame.reduced, .sums = frame.partials, .counts = frame.counts},
-        {.items = s.reduce_blocks, .block = s.reduce_blocks, .target = target, .rows = rows, .scale = scale});
+           {.items = items, .block = block, .target = shared::REDUCE_TO_SUMS, .rows = rows, .scale = 1});
+    record(passes::Reduce{.source = frame.reduced, .sums = frame.partials, .counts = frame.counts},
+           {.items = blocks, .block = blocks, .target = target, .rows = rows, .scale = scale});
 }
 
 /// The terms of the loss that the plan has, and their gradient by the image.
@@ -145,7 +142,7 @@ void FramePasses::compare(const gpu::Buffer& image, const shared::LossPush& push
             passes::LossRows{
                 .moments = frame.moments, .derivatives = frame.derivatives, .partials = frame.partials},
             push);
-        mean_of_partials(shared::REDUCE_TO_SSIM, 1, share);
+        mean_of_partials(shared::REDUCE_TO_SSIM, frame.sizes.partials, 1, share);
         record(passes::LossBackwardColumns{.derivatives = frame.derivatives, .blurred = frame.blurred}, push);
     }
     const uint32_t mode =
@@ -159,8 +156,28 @@ void FramePasses::compare(const gpu::Buffer& image, const shared::LossPush& push
            push, {{shared::SPEC_MODE, mode}});
 }
 
+/// The alpha of a cut-out photo as a term of the loss, and the gradient by the transmittance, which is 0 for other photos.
+void FramePasses::compare_alpha(const gpu::Buffer& photo, bool cut, const shared::MaskPush& at,
+                                const shared::LossPush& loss) const {
+    const uint64_t plane = uint64_t(at.image.plane_floats) * 4;
+    if (!cut) return recording.fill(frame.image_gradient, 0, shared::PLANE_T * plane, plane);
+    const uint32_t height = inputs.band.rows > 0 ? inputs.camera.height : at.image.size[1];
+    const double share = 1.0 / (double(at.image.size[0]) * height);
+    record(passes::AlphaLoss{.photo = photo,
+                             .planes = frame.planes,
+                             .image_gradient = frame.image_gradient,
+                             .partials = frame.partials},
+           {.image = at.image,
+            .first_pixel = at.first_pixel,
+            .own = {loss.own[0], loss.own[1]},
+            .scale = float(plan.loss.alpha * share)},
+           {{shared::SPEC_COLOR_FLOATS, photo.texel() == gpu::Texel::rgba32f ? 1u : 0u}});
+    // The partial sums of one channel.
+    mean_of_partials(shared::REDUCE_TO_ALPHA, frame.sizes.partials / 3, 1, float(share));
+}
+
 void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse* exposure,
-                       const AppearanceUse* appearance) const {
+                       const AppearanceUse* appearance, bool cut) const {
     const shared::ImageLayout layout = frame.sizes.image();
     const Band whole{.rows = layout.size[1], .own_end = layout.size[1]};
     const Band& band = inputs.band.rows > 0 ? inputs.band : whole;
@@ -197,7 +214,8 @@ void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse*
     compare(image, push, float(share));
     if (masked)
         record(passes::MaskGradient{.photo = photo, .image_gradient = frame.image_gradient}, mask, colors);
-    mean_of_partials(shared::REDUCE_TO_L1, plan.loss.l2 > 0 ? 3 : 2, float(share));
+    mean_of_partials(shared::REDUCE_TO_L1, frame.sizes.partials, plan.loss.l2 > 0 ? 3 : 2, float(share));
+    if (plan.loss.alpha > 0) compare_alpha(photo, cut, mask, push);
     if (exposure) expose_backward(*exposure);
     if (appearance) appearance_backward(*appearance);
 }
@@ -229,7 +247,9 @@ void FramePasses::integrate_backward(const Sorted& sorted, const passes::Constan
 void FramePasses::blend_backward(const Sorted& sorted) const {
     const passes::BlendBackwardBuffers buffers = blend_buffers(frame, sorted);
     const shared::BlendPush push = blend_push(cache.config(), frame, inputs.background);
-    const gpu::SpecConstant mode{shared::SPEC_MODE, plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0};
+    const gpu::SpecConstant mode{shared::SPEC_MODE,
+                                 (plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0) |
+                                     (plan.loss.alpha > 0 ? shared::BLEND_BACKWARD_ALPHA : 0)};
     const uint32_t group = march_group(inputs.samples, 8);
     if (plan.integrator == Integrator::ray)
         integrate_backward<passes::BlendRaysBackward>(sorted, {kernel()});

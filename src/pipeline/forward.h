@@ -49,8 +49,9 @@ struct FramePasses : passes::Recorder {
     /// weight of each pixel; `frame` must then be reserved with masks.
     /// exposure, appearance: of the training image, one of them if it is learned. It takes its own step of Adam; `frame`
     /// must be reserved with its model.
+    /// cut: the photo is composited, and its alpha is compared with the render's if the loss has that term.
     void loss(const gpu::Buffer& photo, bool masked = false, const ExposureUse* exposure = nullptr,
-              const AppearanceUse* appearance = nullptr) const;
+              const AppearanceUse* appearance = nullptr, bool cut = false) const;
 
     /// After the loss: leaves the gradient by the sky in the slot of its view in the step.
     void sky_gradient(const LearnedSky& sky, uint32_t slot) const;
@@ -86,7 +87,9 @@ struct FramePasses : passes::Recorder {
     gpu::SpecConstant degree() const;
     gpu::SpecConstant kernel() const { return {shared::SPEC_KERNEL, uint32_t(plan.kernel)}; }
     void compare(const gpu::Buffer& image, const shared::LossPush& push, float share) const;
-    void mean_of_partials(uint32_t target, uint32_t rows, float scale) const;
+    void compare_alpha(const gpu::Buffer& photo, bool cut, const shared::MaskPush& at,
+                       const shared::LossPush& loss) const;
+    void mean_of_partials(uint32_t target, uint32_t items, uint32_t rows, float scale) const;
     void expose_backward(const ExposureUse& use) const;
     void apply_appearance(const AppearanceUse& use) const;
     void appearance_backward(const AppearanceUse& use) const;

@@ -199,7 +199,7 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
             s.moments = uint64_t(s.plane_floats) * 3 * shared::MOMENT_PLANES * word;
             s.derivatives = uint64_t(s.plane_floats) * 3 * shared::DERIVATIVE_PLANES * word;
         }
-        s.image_gradient = s.target;
+        s.image_gradient = uint64_t(s.plane_floats) * (request.loss.alpha > 0 ? 4 : 3) * word;
         const uint64_t rows = request.loss.l2 > 0 ? 3 : 2;  // see LossBackwardRows
         s.partial_sums = rows * s.partials * word;
         s.reduced = rows * s.reduce_blocks * word;

@@ -94,6 +94,13 @@ Band band_of(const passes::KernelConfig& config, uint32_t height, uint32_t bands
     return {.first = first, .rows = last - first, .own_begin = begin - first, .own_end = end - first};
 }
 
+bool transparent(const Image& image) {
+    bool found = false;
+    for (size_t i = 3; image.channels == 4 && i < image.pixels.size(); i += 4)
+        found = found || image.pixels[i] < 1;
+    return found;
+}
+
 gpu::Buffer upload_photo(gpu::Device& device, const Image& image, bool round_to_8_bit) {
     const auto level = [](float value) { return std::round(std::clamp(value, 0.0f, 1.0f) * 255.0f); };
     bool eight_bit = true;

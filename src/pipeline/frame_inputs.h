@@ -58,6 +58,9 @@ FrameInputs inputs_of(const gpu::Buffer& block, const Camera& camera, const Rend
 /// alpha means.
 gpu::Buffer upload_photo(gpu::Device& device, const Image& image, bool round_to_8_bit = false);
 
+/// Whether a pixel of the image has an alpha below 1.
+bool transparent(const Image& image);
+
 /// Upper bound of the bytes that upload_photo allocates.
 uint64_t photo_bytes(int width, int height, bool round_to_8_bit);
 

@@ -58,6 +58,11 @@ Plan plan_for(const PlanRequest& request) {
     }
     plan.gradients = true;
     plan.loss = request.loss;
+    // Spheres and integration along rays have no gradient by the transmittance.
+    if (!request.alpha || request.render.points || plan.rays())
+        plan.loss.alpha = 0;
+    else if (plan.loss.alpha == kAutomaticAlphaWeight)
+        plan.loss.alpha = kUsualAlphaWeight;
     plan.masks = request.masks;
     plan.appearance = request.appearance;
     // Spheres and integration along rays have no gradient by the camera.
@@ -102,6 +107,8 @@ std::vector<PlanLine> describe(const Plan& plan, int scene_degree, uint64_t spla
         lines.push_back({"SSIM passes and their moments", "its weight is 0 (--loss)", 0});
     if (plan.gradients && plan.loss.l2 == 0)
         lines.push_back({"squared differences in the loss", "their weight is 0 (--loss)", 0});
+    if (plan.gradients && plan.loss.alpha == 0)
+        lines.push_back({"alpha in the loss and its gradient", "no training image is cut out", 0});
     if (plan.gradients && !plan.masks)
         lines.push_back(
             {"mask passes and the masked image", "every pixel of every training image counts", 0});

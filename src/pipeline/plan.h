@@ -33,6 +33,7 @@ struct PlanRequest {
     // For a gradient or a training.
     LossWeights loss{};
     bool masks = false;                                  // training images in which some pixels count less
+    bool alpha = false;                                  // training images whose alpha cuts pixels out
     AppearanceModel appearance = AppearanceModel::none;  // of the training images, which is learned
     bool motion = false;  // the gradient by the camera's motion; in a training it is learned
     bool sky = false;     // in a training: it is learned
@@ -60,7 +61,7 @@ struct Plan {
     bool absolute = false;        // of absolute gradients
     bool regularised = false;     // opacity and scale regularisers in the loss
     bool pruned = false;          // splats of small weight are removed near the end
-    LossWeights loss{};           // with gradients: a term of weight 0 has no passes
+    LossWeights loss{};           // with gradients: a term of weight 0 has no passes; alpha is not automatic
     bool masks = false;
     AppearanceModel appearance = AppearanceModel::none;
     bool motion = false;  // the gradient by the camera's motion

@@ -284,11 +284,13 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                          std::to_string(camera.height) + " RGB");
     passes::PassCache cache(*device);
     gpu::Executor executor(*device);
+    const bool cut = !alpha_is_weight && transparent(target);
     const Plan plan = plan_for({.purpose = Purpose::gradient,
                                 .scene_degree = gaussians.sh_degree,
                                 .render = options,
                                 .loss = weights,
                                 .masks = alpha_is_weight && target.channels == 4,
+                                .alpha = cut,
                                 .motion = true});
     const Model model = upload_model(*device, gaussians, plan.moment_buffers(), false);
     const gpu::Buffer block = upload_camera(*device, camera, cache.config(), model.origin);
@@ -311,13 +313,15 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
         run_until_it_fits(cache, executor, frame, size, [&](const passes::Recorder& recorder) {
             const FramePasses on{recorder, plan, frame, inputs};
             const Sorted sorted = on.forward(model);
-            on.loss(photo, plan.masks);
+            on.loss(photo, plan.masks, nullptr, nullptr, cut);
             on.backward(model, sorted, {});
         });
     LossGradient result;
     result.l1 = counts.l1;
     result.l2 = counts.l2;
     result.ssim = counts.ssim;
+    result.alpha = counts.alpha;
+    result.weights = plan.loss;
     result.loss = loss_of(plan.loss, counts);
     result.gradient = download_model(model, model.moments1);
     result.gradient.origin = glm::dvec3(0);  // a gradient has no origin

@@ -181,7 +181,7 @@ ScreenGradient screen_gradient(const Projected& splat, const Moments& m) {
 
 BlendGradients blend_backward(std::span<const Projected> projected, const Instances& instances,
                               const Blended& blended, const Raster& image_gradient,
-                              const Smoothing& smoothing) {
+                              const Smoothing& smoothing, const Raster& transmittance_gradient) {
     const int width = instances.grid.image_width, height = instances.grid.image_height;
     assert(image_gradient.width == width && image_gradient.height == height && image_gradient.channels == 3);
     BlendGradients out;
@@ -193,12 +193,16 @@ BlendGradients blend_backward(std::span<const Projected> projected, const Instan
             const double* up = image_gradient.at(x, y);
             const glm::dvec3 pixel_gradient(up[0], up[1], up[2]);
             glm::dvec3 behind(total[0], total[1], total[2]);
+            const double by_left = transmittance_gradient.values.empty()
+                                       ? 0
+                                       : *transmittance_gradient.at(x, y) * *blended.transmittance.at(x, y);
             walk_pixel(projected, whiteners, instances, x, y, smoothing, [&](const Contribution& c) {
                 const double weight = c.alpha.value * c.transmittance;
                 const glm::dvec3& color = projected[c.splat].color;
                 behind -= weight * color;
                 const double by_alpha =
-                    glm::dot(pixel_gradient, c.transmittance * color - behind / (1 - c.alpha.value));
+                    glm::dot(pixel_gradient, c.transmittance * color - behind / (1 - c.alpha.value)) -
+                    by_left / (1 - c.alpha.value);
                 const double g = by_alpha * c.alpha.slope * c.sample.raw;
                 const double u = c.sample.u, v = c.sample.v;
                 const auto [ux, uy, vy] = whiteners[c.splat];

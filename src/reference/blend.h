@@ -217,10 +217,12 @@ struct BlendGradients {
     std::vector<ScreenGradient> splats;  // per splat; its tiles are added in ascending order
 };
 
-/// `blended` is blend()'s result for the same arguments, `image_gradient` is dL/d(RGB) of each pixel.
+/// `blended` is blend()'s result for the same arguments, `image_gradient` is dL/d(RGB) of each pixel, and
+/// `transmittance_gradient` is dL/dT. T is behind all splats, as the background is: S has T more, times dL/dT in place of
+/// dL/dC. Without entries it is 0.
 BlendGradients blend_backward(std::span<const Projected> projected, const Instances& instances,
                               const Blended& blended, const Raster& image_gradient,
-                              const Smoothing& smoothing = {});
+                              const Smoothing& smoothing = {}, const Raster& transmittance_gradient = {});
 
 /// The largest weight alpha T that each splat has at a pixel; 0 for one that no pixel shows (Niemeyer et al. 2024, RadSplat).
 std::vector<double> largest_weights(std::span<const Projected> projected, const Instances& instances,

@@ -139,6 +139,18 @@ Loss image_loss(const Raster& rendered, const Raster& target, const Raster& weig
     return out;
 }
 
+AlphaLoss alpha_loss(const Raster& transmittance, const Raster& alpha) {
+    assert(alpha.values.size() == transmittance.values.size() && alpha.channels == 1);
+    const double count = double(alpha.values.size());
+    AlphaLoss out{0, Raster(alpha.width, alpha.height, 1)};
+    for (size_t i = 0; i < alpha.values.size(); ++i) {
+        const double difference = 1 - transmittance.values[i] - alpha.values[i];
+        out.difference += std::abs(difference) / count;
+        out.gradient.values[i] = (difference > 0 ? -1 : difference < 0 ? 1 : 0) / count;
+    }
+    return out;
+}
+
 Raster exposed(const Raster& image, const Exposure& e) {
     Raster out(image.width, image.height, 3);
     for (int y = 0; y < image.height; ++y)

@@ -35,6 +35,13 @@ Loss image_loss(const Raster& rendered, const Raster& target, const LossWeights&
 Loss image_loss(const Raster& rendered, const Raster& target, const Raster& weights,
                 const LossWeights& terms = {});
 
+struct AlphaLoss {
+    double difference = 0;  // mean |1 - T - alpha|
+    Raster gradient;        // d(difference)/dT, one channel
+};
+/// Both of one channel and one size.
+AlphaLoss alpha_loss(const Raster& transmittance, const Raster& alpha);
+
 /// The window's 2 * SSIM_RADIUS + 1 taps along one axis.
 std::vector<double> ssim_window();
 

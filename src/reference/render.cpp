@@ -34,12 +34,29 @@ Rendered render(const Values& values, const Camera& camera, const RenderOptions&
     return out;
 }
 
+namespace {
+
+Raster composited(const Image& rgba, const std::array<float, 3>& background) {
+    Raster out(rgba.width, rgba.height, 3);
+    for (size_t i = 0; i < out.values.size(); ++i) {
+        const double alpha = double(rgba.pixels[4 * (i / 3) + 3]);
+        out.values[i] =
+            alpha * double(rgba.pixels[4 * (i / 3) + i % 3]) + (1 - alpha) * double(background[i % 3]);
+    }
+    return out;
+}
+
+}  // namespace
+
 ReferenceGradient loss_gradient(const Values& values, const Camera& camera, const Image& target,
                                 const RenderOptions& options, const ReferenceOptions& reference) {
     if (options.points) return points_loss_gradient(values, camera, target, options, reference.loss);
     ReferenceGradient out;
     out.rendered = render(values, camera, options, reference);
-    const Loss loss = image_loss(out.rendered.blended.color, to_double(target), reference.loss);
+    const bool cut = reference.loss.alpha > 0;
+    const Loss loss =
+        image_loss(out.rendered.blended.color,
+                   cut ? composited(target, options.background) : to_double(target), reference.loss);
     out.loss = loss.loss;
     out.l1 = loss.l1;
     out.l2 = loss.l2;
@@ -50,8 +67,18 @@ ReferenceGradient loss_gradient(const Values& values, const Camera& camera, cons
         for (const Projected& each : out.rendered.projected) out.in_view.push_back(each.visible);
         return out;
     }
+    Raster by_left;
+    if (cut) {
+        Raster alpha(target.width, target.height, 1);
+        for (size_t i = 0; i < alpha.values.size(); ++i) alpha.values[i] = target.pixels[4 * i + 3];
+        const AlphaLoss of_alpha = alpha_loss(out.rendered.blended.transmittance, alpha);
+        out.alpha = of_alpha.difference;
+        out.loss += reference.loss.alpha * of_alpha.difference;
+        by_left = of_alpha.gradient;
+        for (double& value : by_left.values) value *= reference.loss.alpha;
+    }
     out.blend = blend_backward(out.rendered.projected, out.rendered.instances, out.rendered.blended,
-                               loss.gradient, reference.smoothing);
+                               loss.gradient, reference.smoothing, by_left);
     out.gradient = zeros_like(values);
     for (size_t i = 0; i < values.size(); ++i)
         write_splat(

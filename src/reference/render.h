@@ -13,7 +13,8 @@ namespace ewa::reference {
 Rendered render(const Values& values, const Camera& camera, const RenderOptions& options,
                 const ReferenceOptions& reference = {});
 
-/// `target` is RGB of the camera's size. Further channels are ignored.
+/// `target` is RGB of the camera's size. If the weight of alpha is above 0 it is RGBA, which is composited over the
+/// background. Otherwise further channels are ignored.
 ReferenceGradient loss_gradient(const Values& values, const Camera& camera, const Image& target,
                                 const RenderOptions& options, const ReferenceOptions& reference = {});
 

@@ -19,7 +19,7 @@ namespace {
 constexpr double kMostWeight = 1e6;
 
 constexpr std::array kTerms{std::pair{"l1", &LossWeights::l1}, std::pair{"l2", &LossWeights::l2},
-                            std::pair{"ssim", &LossWeights::ssim}};
+                            std::pair{"ssim", &LossWeights::ssim}, std::pair{"alpha", &LossWeights::alpha}};
 
 std::vector<std::string> term_names() {
     std::vector<std::string> names;
@@ -30,7 +30,8 @@ std::vector<std::string> term_names() {
 }  // namespace
 
 LossWeights parse_loss(const std::string& text) {
-    LossWeights weights{0, 0, 0};
+    LossWeights weights;
+    bool colors = false;
     std::vector<std::string> named;
     for (size_t begin = 0, end = 0; end != std::string::npos; begin = end + 1) {
         end = text.find(',', begin);
@@ -39,7 +40,7 @@ LossWeights parse_loss(const std::string& text) {
         const std::string name = core::lower(core::trim(std::string_view(part).substr(0, equals)));
         const auto term = std::ranges::find_if(kTerms, [&](const auto& each) { return name == each.first; });
         if (term == kTerms.end())
-            throw InputError("'" + name + "' is no term of the loss; l1, l2 and ssim are" +
+            throw InputError("'" + name + "' is no term of the loss; l1, l2, ssim and alpha are" +
                              core::did_you_mean(name, term_names()));
         if (equals == std::string::npos)
             throw InputError("'" + name + "' has no weight; " + name + "=0.5 has one");
@@ -48,17 +49,19 @@ LossWeights parse_loss(const std::string& text) {
         std::string weight(core::trim(std::string_view(part).substr(equals + 1)));
         const std::string problem = core::settle_number(weight, 0.0, kMostWeight);
         if (!problem.empty()) throw InputError(name + ": " + problem);
+        if (name != "alpha" && !std::exchange(colors, true)) weights = {0, 0, 0, weights.alpha};
         weights.*(term->second) = core::parse_number(weight).value();
     }
-    if (weights == LossWeights{0, 0, 0})
+    if (weights.l1 == 0 && weights.l2 == 0 && weights.ssim == 0)
         throw InputError("'" + text + "' has no weight above 0; l1=0.8,ssim=0.2 is the usual loss");
     return weights;
 }
 
 std::string loss_text(const LossWeights& weights) {
     std::string text;
+    const LossWeights absent{0, 0, 0, kAutomaticAlphaWeight};
     for (const auto& [name, member] : kTerms)
-        if (weights.*member > 0)
+        if (weights.*member != absent.*member)
             text += fmt::format("{}{}={}", text.empty() ? "" : ",", name, weights.*member);
     return text;
 }

@@ -7,10 +7,10 @@
 
 namespace ewa::train {
 
-/// Terms that the text does not name have the weight 0. Throws InputError.
+/// Terms of colour that the text does not name have the weight 0, if it names one of them. Throws InputError.
 LossWeights parse_loss(const std::string& text);
 
-/// The terms whose weight is not 0, as parse_loss reads them.
+/// The weights as parse_loss reads them.
 std::string loss_text(const LossWeights& weights);
 
 }  // namespace ewa::train

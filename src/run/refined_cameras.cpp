@@ -48,6 +48,7 @@ class Alignment {
                                     .render = options.render,
                                     .loss = options.loss,
                                     .masks = images_.any_masked(),
+                                    .alpha = images_.any_cut(),
                                     .motion = true})),
           model_(pipeline::upload_model(*device, gaussians, plan_.moment_buffers(), false)),
           motions_(*device, bases_of(gaussians, dataset, frames, options, extent)),
@@ -86,7 +87,7 @@ class Alignment {
                 .sh_degree = options_.render.sh_degree};
             const pipeline::FramePasses on{recorder, plan_, frame_, inputs};
             const auto sorted = on.forward(model_);
-            on.loss(photo.texels, photo.masked);
+            on.loss(photo.texels, photo.masked, nullptr, nullptr, photo.cut);
             on.backward(model_, sorted, {}, &use);
         });
     }

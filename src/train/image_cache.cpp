@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "core/random.h"
+#include "core/text.h"
 #include "ewa/error.h"
 #include "pipeline/frame_inputs.h"
 #include "scene/frame_images.h"
@@ -15,13 +16,6 @@
 
 namespace ewa::train {
 namespace {
-
-bool transparent(const Image& image) {
-    bool found = false;
-    for (size_t i = 3; image.channels == 4 && i < image.pixels.size(); i += 4)
-        found = found || image.pixels[i] < 1;
-    return found;
-}
 
 /// The mean square of alpha: what a mean over a masked image's squared differences is short of.
 double mean_weight(const Image& image) {
@@ -57,6 +51,11 @@ class ParallelLoader {
 
 }  // namespace
 
+bool may_be_cut(const Frame& frame) {
+    const std::string type = core::lower(frame.image_path.extension().string());
+    return frame.masks == MaskUse::cut && (!frame.mask_path.empty() || (type != ".jpg" && type != ".jpeg"));
+}
+
 ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, const Dataset& dataset,
                        const std::vector<int>& frames, uint64_t cache_bytes, const glm::dvec3& origin,
                        int reduction)
@@ -83,6 +82,7 @@ ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, 
         } else {
             ++on_disk_;
             any_masked_ = any_masked_ || frame.masks == MaskUse::ignore;
+            any_cut_ = any_cut_ || may_be_cut(frame);
         }
     }
     std::vector<const Frame*> to_load;
@@ -91,6 +91,7 @@ ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, 
     for (const size_t i : cached) {
         photos_[i] = upload(frames_[i], loader.next());
         any_masked_ = any_masked_ || photos_[i].masked;
+        any_cut_ = any_cut_ || photos_[i].cut;
     }
     cameras_ = gpu::Buffer(device, "cameras", blocks.size(), gpu::Texel::none, true);
     cameras_.upload(std::span<const std::byte>(blocks));
@@ -99,8 +100,9 @@ ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, 
 ImageCache::Photo ImageCache::upload(const Frame& frame, const Image& image) const {
     if (image.width != frame.camera.width || image.height != frame.camera.height)
         throw InputError("frame " + frame.name + " changed its size while it was read");
-    const bool masked = frame.masks == MaskUse::ignore && transparent(image);
-    return {pipeline::upload_photo(device_, image, frame.eight_bit), masked, masked ? mean_weight(image) : 1};
+    const bool partly = pipeline::transparent(image), masked = partly && frame.masks == MaskUse::ignore;
+    return {pipeline::upload_photo(device_, image, frame.eight_bit), masked,
+            partly && frame.masks == MaskUse::cut, masked ? mean_weight(image) : 1};
 }
 
 const ImageCache::Photo& ImageCache::photo(size_t i) {

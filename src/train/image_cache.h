@@ -12,6 +12,9 @@
 
 namespace ewa::train {
 
+/// Whether an image that is not read yet may have transparent pixels that cut it out.
+bool may_be_cut(const Frame& frame);
+
 /// Caches decoded images on the device up to a number of bytes: the first frames that fit. The others are read
 /// again at each use. Which images are cached changes no result. Besides the cache, one image is on the device
 /// and one is being read.
@@ -32,6 +35,7 @@ class ImageCache {
     struct Photo {
         gpu::Buffer texels;   // empty: on disk
         bool masked = false;  // its alpha weights the pixels, and some weigh less than 1
+        bool cut = false;     // its alpha cuts pixels out
         double weight = 1;    // with a mask: mean square of the pixels' weights
     };
     /// Reads image i if it is not cached. The device must be idle. Throws InputError.
@@ -41,6 +45,8 @@ class ImageCache {
 
     /// Whether an image may be masked.
     bool any_masked() const { return any_masked_; }
+    /// Whether an image may be cut out by its alpha.
+    bool any_cut() const { return any_cut_; }
     pipeline::CameraUse camera(size_t i) const;
 
   private:
@@ -50,7 +56,7 @@ class ImageCache {
     std::vector<Frame> frames_;
     std::vector<Photo> photos_;
     size_t on_disk_ = 0;
-    bool any_masked_ = false;
+    bool any_masked_ = false, any_cut_ = false;
     Photo visitor_;  // the last one from disk
     size_t coming_ = 0;
     std::future<Image> reading_;

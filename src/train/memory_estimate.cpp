@@ -220,7 +220,9 @@ MemoryEstimate MemoryEstimator::up_to(uint32_t max_splats) {
     TrainOptions options = options_;
     options.max_splats = max_splats;
     const bool grows = options.strategy != Strategy::none;
-    const Plan plan = plan_for(plan_request(start_, options, false));
+    const bool cut =
+        std::ranges::any_of(frames_, [&](int index) { return may_be_cut(dataset_.frames[size_t(index)]); });
+    const Plan plan = plan_for(plan_request(start_, options, false, SIZE_MAX, cut));
     const passes::KernelConfig config = passes::config_for(device_.limits());
     MemoryEstimate estimate;
     estimate.splats = final_splats(start_.size(), options);

@@ -50,12 +50,13 @@ bool few_photos(const TrainOptions& options, size_t photos) {
 }
 
 pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& options, bool masks,
-                                   size_t photos) {
+                                   size_t photos, bool cut) {
     return {.purpose = pipeline::Purpose::training,
             .scene_degree = start.sh_degree,
             .render = options.render,
             .loss = options.loss,
             .masks = masks,
+            .alpha = cut,
             .appearance = appearance_of(options),
             .motion = options.refine_poses,
             .sky = options.sky,

@@ -95,8 +95,9 @@ Schedule schedule_for(const TrainOptions& options, size_t photos = SIZE_MAX);
 /// Throws InputError if options exclude each other, or exclude several ranks.
 void check_training(const TrainOptions& options, int ranks = 1);
 
-/// The plan that a run asks for. masks: some training images have pixels that do not count. photos: for training.
+/// The plan that a run asks for. masks: some training images have pixels that do not count. photos: for training. cut: some
+/// training images are cut out by their alpha.
 pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& options, bool masks,
-                                   size_t photos = SIZE_MAX);
+                                   size_t photos = SIZE_MAX, bool cut = false);
 
 }  // namespace ewa::train

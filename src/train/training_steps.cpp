@@ -188,7 +188,7 @@ portions::StepView Training::view_of(int step, ImageCache& seen, int sh_degree, 
                 const auto& photo = seen.photo(index);
                 *weight = photo.weight;
                 on.loss(photo.texels, photo.masked, affine ? &exposure : nullptr,
-                        learned ? &appearance : nullptr);
+                        learned ? &appearance : nullptr, photo.cut);
                 if (plan_.sky) on.sky_gradient(learned_.sky, slot);
             },
         .weight = [weight] { return *weight; },

@@ -112,7 +112,9 @@ void compile_splatting(Compiler& compiler) {
     compiler.compile<passes::Blend>({{SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH, BLEND_COUNT, BLEND_ELLIPSOIDS}},
                                      {SPEC_KERNEL, {KERNEL_PEAK, KERNEL_DENSITY}}});
     compiler.compile<passes::BlendBackward>(
-        {{SPEC_MODE, {0, BLEND_BACKWARD_ABSOLUTE}}, {SPEC_KERNEL, {KERNEL_PEAK, KERNEL_DENSITY}}});
+        {{SPEC_MODE,
+          {0, BLEND_BACKWARD_ABSOLUTE, BLEND_BACKWARD_ALPHA, BLEND_BACKWARD_ABSOLUTE | BLEND_BACKWARD_ALPHA}},
+         {SPEC_KERNEL, {KERNEL_PEAK, KERNEL_DENSITY}}});
     compiler.compile<passes::Pack>();
 }
 
@@ -153,6 +155,7 @@ void compile_training(Compiler& compiler) {
     compiler.compile<passes::LossBackwardColumns>();
     compiler.compile<passes::LossBackwardRows>(
         {{SPEC_MODE, {0, LOSS_SSIM, LOSS_SQUARES, LOSS_SSIM | LOSS_SQUARES}}});
+    compiler.compile<passes::AlphaLoss>({{SPEC_COLOR_FLOATS, {0, 1}}});
     compiler.compile<passes::Reduce>();
     compiler.compile<passes::Expose>();
     compiler.compile<passes::ExposeBackward>();

@@ -414,11 +414,11 @@ struct FrameParts {
 SharedByTests<FrameParts>* const frame_parts = SharedByTests<FrameParts>::add();
 
 void record_gradient(const FrameParts& parts, gpu::Recording& recording, const pipeline::PlanRequest& request,
-                     const pipeline::FrameInputs& inputs, bool masked = false) {
+                     const pipeline::FrameInputs& inputs, bool masked = false, bool cut = false) {
     const auto plan = plan_for(request);
     const pipeline::FramePasses on{{recording, rig().cache}, plan, parts.frame, inputs};
     const auto sorted = on.forward(parts.model);
-    on.loss(parts.photo, masked);
+    on.loss(parts.photo, masked, nullptr, nullptr, cut);
     on.backward(parts.model, sorted, {});
 }
 
@@ -449,7 +449,8 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
                    .appearance = AppearanceModel::grid,  // whose sums have room for those of others
                    .overlaid = true,
                    .motion = true,
-                   .rays = true});
+                   .rays = true,
+                   .loss = {.l2 = 1, .alpha = 1}});
     const pipeline::FrameInputs inputs{.camera = {&camera, 0, 61, 47}};
     std::vector<std::vector<Command>> out;
 
@@ -535,6 +536,16 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     gpu::Recording gradient = r.recording();
     record_gradient(parts, gradient, request, inputs, true);
     out.push_back(gradient.commands());
+
+    // All terms of a loss.
+    request.alpha = true;
+    request.loss = {.l2 = 1, .alpha = 1};
+    gpu::Recording terms = r.recording();
+    record_gradient(parts, terms, request, inputs, false, true);
+    record_gradient(parts, terms, request, inputs);
+    out.push_back(terms.commands());
+    request.alpha = false;
+    request.loss = {};
 
     request.render.points = true;
     gpu::Recording points = r.recording();

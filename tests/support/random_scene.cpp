@@ -158,6 +158,17 @@ Image random_target(uint64_t seed, int width, int height) {
     return image;
 }
 
+Image cut_out(const Image& image, uint64_t seed) {
+    Random random(seed);
+    Image cut(image.width, image.height, 4);
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x) {
+            std::copy_n(image.at(x, y), 3, cut.at(x, y));
+            cut.at(x, y)[3] = x % 3 == 0 ? 0 : float(random.uniform());
+        }
+    return cut;
+}
+
 std::string seed_text(uint64_t seed) {
     return "seed " + std::to_string(seed);
 }

@@ -44,6 +44,9 @@ Gaussians random_gaussians(uint64_t seed, size_t count, SplatKind kind, const Ca
 /// RGB in [0, 1]: smooth waves and noise.
 Image random_target(uint64_t seed, int width, int height);
 
+/// The RGB image with an alpha: 0 in each third column, random elsewhere.
+Image cut_out(const Image& image, uint64_t seed);
+
 /// For SCOPED_TRACE.
 std::string seed_text(uint64_t seed);
 const char* name_of(SplatKind kind);

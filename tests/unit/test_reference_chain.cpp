@@ -20,7 +20,12 @@ struct Chain {
 
     double loss() const {
         const Rendered rendered = render(values, camera, options, reference);
-        return image_loss(rendered.blended.color, to_double(target)).loss;
+        if (reference.loss.alpha <= 0) return image_loss(rendered.blended.color, to_double(target)).loss;
+        Raster alpha(target.width, target.height, 1);
+        for (size_t i = 0; i < alpha.values.size(); ++i) alpha.values[i] = target.pixels[4 * i + 3];
+        return image_loss(rendered.blended.color, to_double(over_background(target, options.background)))
+                   .loss +
+               reference.loss.alpha * alpha_loss(rendered.blended.transmittance, alpha).difference;
     }
 };
 
@@ -81,6 +86,13 @@ TEST(ReferenceChain, MixedWithTheRamp) {
         chain.reference.smoothing.cut = AlphaCut::ramp;
         check(chain);
     }
+}
+
+TEST(ReferenceChain, AlphaOfACutOutImage) {
+    Chain chain = random_chain(70, test::SplatKind::ordinary, 12, 1, Footprint::peak);
+    chain.target = test::cut_out(chain.target, 71);
+    chain.reference.loss.alpha = 0.6;
+    check(chain);
 }
 
 TEST(ReferenceChain, TheModelItselfWhereNothingJumps) {
