@@ -1,20 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// A pinhole camera in the OpenCV convention: x right, y down, z forward, pixel centres at +0.5.
+// A camera in the OpenCV convention: x right, y down, z forward, pixel centres at +0.5.
 #pragma once
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
 namespace ewa {
-
-struct Camera {
-    int width = 0, height = 0;              // px
-    double fx = 0, fy = 0, cx = 0, cy = 0;  // px; (cx, cy) from the image's top left corner
-    glm::dmat3 rotation{1.0};               // world to camera: p_camera = rotation * p_world + translation
-    glm::dvec3 translation{0.0};            // world units
-
-    /// The camera's centre in world coordinates, -R^T t.
-    glm::dvec3 position() const { return -(glm::transpose(rotation) * translation); }
-};
 
 /// Lens models. src/scene/lens.h has the formulas.
 enum class Lens {
@@ -23,7 +13,10 @@ enum class Lens {
     fisheye624,  // six radial terms, then tangential and thin prism: COLMAP's RAD_TAN_THIN_PRISM_FISHEYE
     fov,         // Devernay and Faugeras 2001; k1 is omega (radians)
     division,    // Fitzgibbon 2001; k1
-    unified      // enhanced unified camera model, Khomutenko et al. 2016; k1 is alpha, k2 is beta
+    unified,     // enhanced unified camera model, Khomutenko et al. 2016; k1 is alpha, k2 is beta
+    // The next two are no distortions of a pinhole.
+    equirectangular,  // all directions: u = fx atan2(x, z) + cx, v = fy atan2(y, |(x, z)|) + cy (COLMAP's EQUIRECTANGULAR)
+    orthographic      // parallel rays along z: u = fx x + cx, v = fy y + cy; fx and fy are px per world unit
 };
 
 /// The distortion of a lens relative to a pinhole. Names and signs are OpenCV's (calib3d, "Detailed
@@ -36,6 +29,17 @@ struct Distortion {
     bool operator==(const Distortion&) const = default;
     /// Whether the lens is a pinhole.
     bool none() const { return *this == Distortion{}; }
+};
+
+struct Camera {
+    int width = 0, height = 0;              // px
+    double fx = 0, fy = 0, cx = 0, cy = 0;  // px; (cx, cy) from the image's top left corner
+    glm::dmat3 rotation{1.0};               // world to camera: p_camera = rotation * p_world + translation
+    glm::dvec3 translation{0.0};            // world units
+    Distortion distortion{};                // of the lens that images are rendered through; none: a pinhole
+
+    /// The camera's centre in world coordinates, -R^T t.
+    glm::dvec3 position() const { return -(glm::transpose(rotation) * translation); }
 };
 
 /// The same view at 1/factor of the resolution, to match downscale(Image, factor). Sizes are rounded down, to

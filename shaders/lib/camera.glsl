@@ -47,4 +47,10 @@ vec2 pixel_position(vec2 p, vec2 z, int axis) {
     const vec2 center = vec2(camera.center_hi[axis], camera.center_lo[axis]);
     return pixel_of(p, z, focal, center);
 }
+
+// The same of a position in the plane of a lens.
+vec2 pixel_in_plane(vec2 q, int axis) {
+    return df_add(df_mul(q, vec2(camera.focal_hi[axis], camera.focal_lo[axis])),
+                  vec2(camera.center_hi[axis], camera.center_lo[axis]));
+}
 #endif

@@ -6,6 +6,7 @@
 
 layout(constant_id = SPEC_TILE_WIDTH) const uint TILE_WIDTH = 8;
 layout(constant_id = SPEC_TILE_HEIGHT) const uint TILE_HEIGHT = 8;
+layout(constant_id = SPEC_WRAP) const uint WRAP = 0u;
 
 struct Footprint {
     vec2 mean;       // px
@@ -53,6 +54,20 @@ float border(Footprint f, float dy) {
     return f.k * dy + (sqrt(max(0.0, f.reach * f.reach - v * v)) + REACH_SLACK) / f.ux;
 }
 
+// The same in an image whose left and right border are one line of the scene: from the first tile to the last, which may lie
+// beyond the right border and then counts on from the left one.
+uvec2 tiles_around(float mean, float left, float right, uint tile, uint size) {
+    const uint tiles = (size + tile - 1u) / tile;
+    const uvec2 here = tiles_between(mean, left, right, tile, size);
+    const uvec2 above = tiles_between(mean + float(size), left, right, tile, size);
+    const uvec2 below = tiles_between(mean - float(size), left, right, tile, size);
+    const bool left_too = above.x < above.y, right_too = below.x < below.y;
+    if (!left_too && !right_too) return here;
+    // What lies at the right border, and what at the left.
+    const uint begin = left_too ? above.x : here.x, end = right_too ? below.y : here.y;
+    return left_too && right_too || begin <= end ? uvec2(0u, tiles) : uvec2(begin, tiles + end);
+}
+
 // Tile columns reached in a tile row. The border is concave in dy, so its maximum over the row's pixel centres is at its
 // peak, or at the nearer end if the peak is outside the row. The left border is the right one turned by 180 degrees.
 uvec2 columns_of(Footprint f, uint row, uvec2 size) {
@@ -65,7 +80,8 @@ uvec2 columns_of(Footprint f, uint row, uvec2 size) {
     const float peak = half_height * t / sqrt(1.0 + t * t);
     const float right = border(f, clamp(peak, low, high));
     const float left = -border(f, -clamp(-peak, low, high));
-    return tiles_between(f.mean.x, left, right, TILE_WIDTH, size.x);
+    return WRAP != 0u ? tiles_around(f.mean.x, left, right, TILE_WIDTH, size.x)
+                      : tiles_between(f.mean.x, left, right, TILE_WIDTH, size.x);
 }
 
 // Pairs (splat, tile) in tile rows [begin, end).

@@ -7,6 +7,15 @@
 #include "lib/density.glsl"
 #include "lib/view.glsl"
 
+// Where a lens shows a point, of cameras with SPEC_LENSES: lens.glsl fills it.
+struct LensImage {
+    vec2 x, y;              // in the plane, in units of the focal length; float pairs
+    vec3 jx, jy;            // rows of J, in the plane: of a point that LENS_BROWN clamps
+    vec3 exact_x, exact_y;  // the same of the point itself
+    float depth;            // by which splats are ordered (world units)
+    bool shown;
+};
+
 layout(constant_id = SPEC_KERNEL) const uint KERNEL = KERNEL_PEAK;
 
 struct Projection {
@@ -25,7 +34,37 @@ struct Projection {
     float ux, k, vy;       // as in the record (px)
     float factor;          // the kernel's factor
     vec3 scale;
+    LensImage image;       // with SPEC_LENSES; then tangent, tangent_clamped and focal_over_z are not set
 };
+
+// Chooses the unit in which no square of M overflows.
+void set_unit(inout Projection p) {
+    const vec3 wide = abs(p.m0) + abs(p.m1);
+    const float footprint = wide.x + wide.y + wide.z;
+    // A NaN fails this comparison.
+    p.footprint_in_range = footprint <= float(FOOTPRINT_MAX);
+    // A power of two, so that the product is exact.
+    p.unit = footprint > 1073741824.0 ? 9.094947017729282e-13 : 1.0;
+}
+
+// From M and its minors to the whitener. The factor is that of KERNEL_PEAK or KERNEL_ANTIALIAS.
+void set_covariance(inout Projection p, vec3 minors) {
+    const vec3 m0 = p.unit * p.m0, m1 = p.unit * p.m1;
+    const float aa = dot(m0, m0), cc = dot(m1, m1);
+    const float low_pass = p.unit * p.unit * p.low_pass;
+    p.a = aa + low_pass;
+    p.b = dot(m0, m1);
+    p.c = cc + low_pass;
+    p.minors = minors;
+    p.det0 = dot(p.minors, p.minors);
+    p.det = p.det0 + low_pass * (aa + cc) + low_pass * low_pass;
+    p.ux = p.unit * sqrt(0.5 * p.c / p.det);
+    p.k = p.b / p.c;
+    p.vy = p.unit * sqrt(0.5 / p.c);
+
+    p.factor = 1.0;
+    if (KERNEL == KERNEL_ANTIALIAS) p.factor = sqrt(max(0.0, p.det0 / p.det));
+}
 
 // directions: of the splat's axes in camera axes. cofactors: their cross products, direction k of k + 1 and k + 2; those
 // of a rotation are the directions themselves.
@@ -47,30 +86,12 @@ Projection project_shape(View view, Lens lens, mat3 directions, mat3 cofactors, 
     p.m1 = p.focal_over_z.y * vec3(p.axes[0].y - p.tangent.y * p.axes[0].z, p.axes[1].y - p.tangent.y * p.axes[1].z,
                                    p.axes[2].y - p.tangent.y * p.axes[2].z);
 
-    const vec3 wide = abs(p.m0) + abs(p.m1);
-    const float footprint = wide.x + wide.y + wide.z;
-    // A NaN fails this comparison.
-    p.footprint_in_range = footprint <= float(FOOTPRINT_MAX);
-    // A power of two, so that the product is exact.
-    p.unit = footprint > 1073741824.0 ? 9.094947017729282e-13 : 1.0;
-    const vec3 m0 = p.unit * p.m0, m1 = p.unit * p.m1;
-    const float aa = dot(m0, m0), cc = dot(m1, m1);
-    const float low_pass = p.unit * p.unit * p.low_pass;
-    p.a = aa + low_pass;
-    p.b = dot(m0, m1);
-    p.c = cc + low_pass;
+    set_unit(p);
     // det(M M^T) is the sum of the squared 2x2 minors of M (Cauchy-Binet). A minor is a product of two scales and of how
     // far the third axis points at the camera. No term cancels, however thin the splat and however wide the view.
     const vec3 x_scale = p.unit * p.focal_over_z.x * scale, y_scale = p.unit * p.focal_over_z.y * scale;
-    p.minors = (vec3(p.tangent, 1.0) * cofactors) * x_scale.yzx * y_scale.zxy;
-    p.det0 = dot(p.minors, p.minors);
-    p.det = p.det0 + low_pass * (aa + cc) + low_pass * low_pass;
-    p.ux = p.unit * sqrt(0.5 * p.c / p.det);
-    p.k = p.b / p.c;
-    p.vy = p.unit * sqrt(0.5 / p.c);
+    set_covariance(p, (vec3(p.tangent, 1.0) * cofactors) * x_scale.yzx * y_scale.zxy);
 
-    p.factor = 1.0;
-    if (KERNEL == KERNEL_ANTIALIAS) p.factor = sqrt(max(0.0, p.det0 / p.det));
     // A |J| / sqrt(det) with |J| = fx fy sqrt(1 + tx^2 + ty^2) / z^2, the determinant of the ray-space transform.
     if (KERNEL == KERNEL_DENSITY)
         p.factor = mean_shadow(scale, p.unit * p.focal_over_z) * sqrt((1.0 + dot(p.tangent, p.tangent)) / p.det);

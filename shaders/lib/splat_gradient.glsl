@@ -2,6 +2,7 @@
 // One view's gradient by a splat's mean, logit, quaternion and scales. Needs stored_splat.glsl and footprint_gradient.glsl.
 #ifndef EWA_LIB_SPLAT_GRADIENT
 #define EWA_LIB_SPLAT_GRADIENT
+#include "lib/lens_gradient.glsl"
 
 struct SplatGradient {
     vec3 mean;
@@ -25,13 +26,11 @@ SplatGradient splat_gradient(FootprintGradient f, StoredProjection stored, Store
                              vec3 direction_gradient) {
     const Projection p = stored.footprint;
     SplatGradient result;
-    result.view = view_point_gradient(f, p);
+    result.view = LENSES != 0u ? lens_point_gradient(f, p, g) : view_point_gradient(f, p);
     const mat3 to_world = transpose(camera_rotation());
     result.torque = f.beside * scale_ratios(splat.log_scale);
     result.quaternion = torque_on_quaternion(stored.unit_quaternion, result.torque) / stored.quaternion_norm;
-    const vec3 direction_part =
-        (direction_gradient - direction * dot(direction, direction_gradient)) / length(p.view.offset);
-    result.mean = to_world * result.view + direction_part;
+    result.mean = to_world * result.view + along_gradient(p, direction, direction_gradient);
     result.logit = g * (KERNEL == KERNEL_DENSITY ? log_softplus_slope(splat.logit) : transparency_of(splat.logit));
     result.log_scale = f.log_scale;
     return result;

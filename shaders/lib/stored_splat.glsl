@@ -5,6 +5,7 @@
 #define EWA_LIB_STORED_SPLAT
 #include "lib/camera.glsl"
 #include "lib/projection.glsl"
+#include "lib/lens.glsl"
 #include "lib/quaternion.glsl"
 
 struct StoredSplat {
@@ -40,6 +41,43 @@ vec3 scale_ratios(vec3 log_scale) {
     return twice_sinh(l.yzx - l.zxy);
 }
 
+Projection project_through_lens(View view, mat3 directions, vec3 scale) {
+    Projection p;
+    p.view = view;
+    p.low_pass = float(LOW_PASS);
+    p.scale = scale;
+    p.image = lens_image(view);
+    [[unroll]] for (int k = 0; k < 3; ++k) p.axes[k] = directions[k] * scale[k];
+    const vec3 x = camera.focal_hi[0] * p.image.jx, y = camera.focal_hi[1] * p.image.jy;
+    p.m0 = x * p.axes;
+    p.m1 = y * p.axes;
+    set_unit(p);
+    const vec3 both = cross(x, y);
+    const vec3 sizes = p.unit * scale;
+    set_covariance(p, (both * directions) * sizes.yzx * sizes.zxy);
+    if (KERNEL == KERNEL_DENSITY) {
+        const float root = sqrt(length(both));
+        p.factor = mean_shadow(scale, vec2(p.unit * root)) / sqrt(p.det);
+    }
+    return p;
+}
+
+// By which splats are ordered, in world units; they are in front of the camera where it is above NEAR_PLANE.
+float depth_of_splat(Projection p) { return LENSES != 0u ? p.image.depth : p.view.z.x; }
+
+// The direction in which the camera sees the splat.
+vec3 seen_along(Projection p) {
+    if (LENSES != 0u && camera.lens == LENS_ORTHOGRAPHIC)
+        return vec3(camera.rotation_hi[6], camera.rotation_hi[7], camera.rotation_hi[8]);
+    return normalize(p.view.offset);
+}
+
+// A gradient by that direction, as one by the mean. Parallel rays have one direction.
+vec3 along_gradient(Projection p, vec3 direction, vec3 gradient) {
+    if (LENSES != 0u && camera.lens == LENS_ORTHOGRAPHIC) return vec3(0.0);
+    return (gradient - direction * dot(direction, gradient)) / length(p.view.offset);
+}
+
 StoredProjection project_splat(StoredSplat splat) {
     StoredProjection p;
     const View view = view_point(splat.mean);
@@ -47,7 +85,10 @@ StoredProjection project_splat(StoredSplat splat) {
     const Lens lens = camera_lens();
     const mat3 directions = lens.rotation * rotation_of(p.unit_quaternion);
     const vec3 scale = exp(computable_log_scale(splat.log_scale));
-    p.footprint = project_shape(view, lens, directions, directions, scale, float(LOW_PASS));
+    if (LENSES != 0u)
+        p.footprint = project_through_lens(view, directions, scale);
+    else
+        p.footprint = project_shape(view, lens, directions, directions, scale, float(LOW_PASS));
     const vec3 far = abs(view.offset);
     // A NaN fails these comparisons.
     p.in_range = far.x <= float(VIEW_MAX) && far.y <= float(VIEW_MAX) && far.z <= float(VIEW_MAX) &&

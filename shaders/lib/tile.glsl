@@ -9,6 +9,7 @@
 #include "lib/density.glsl"
 layout(constant_id = SPEC_TILE_WIDTH) const uint TILE_WIDTH = 8;
 layout(constant_id = SPEC_TILE_HEIGHT) const uint TILE_HEIGHT = 8;
+layout(constant_id = SPEC_WRAP) const uint WRAP = 0u;  // dx is that of the nearer of the splat's images
 layout(constant_id = SPEC_KERNEL) const uint KERNEL = KERNEL_PEAK;
 const bool BY_DEPTH = KERNEL == KERNEL_DENSITY;  // a record's opacity is an optical depth
 layout(constant_id = SPEC_PARTS) const uint PARTS = 0;
@@ -103,7 +104,8 @@ Loaded load_batch(uint first, uint end) {
 
 LaneSplat lane_splat_of(vec4 record0, vec4 record1, vec4 record2, float ratio_step, vec2 pixel) {
     const float low = PARTS != 0u ? 0.0 : record0.z;
-    EXACT const float dx = (pixel.x - record0.x) - low;
+    EXACT float dx = (pixel.x - record0.x) - low;
+    if (WRAP != 0u) dx -= float(push.image.size[0]) * round(dx / float(push.image.size[0]));
     EXACT const float dy = (pixel.y - record0.y) - record0.w;
     EXACT const float u = record1.x * (dx - record1.y * dy);
     LaneSplat s;

@@ -45,7 +45,7 @@ void main() {
         // may land past the splat's own range.
         for (uint column = columns.x; column < columns.y; ++column) {
             if (at < first + count) {
-                keys[at] = row * push.tiles[0] + column;
+                keys[at] = row * push.tiles[0] + (WRAP != 0u && column >= push.tiles[0] ? column - push.tiles[0] : column);
                 splats[at] = splat;
             }
             ++at;

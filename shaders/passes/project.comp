@@ -31,19 +31,21 @@ bool project(uint i) {
     const vec3 log_scale = DEBUG ? p2.xyz + push.log_scale_shift : p2.xyz;
     const StoredProjection stored = project_splat(StoredSplat(p0.xyz, p0.w, p1, log_scale));
     const Projection p = stored.footprint;
-    const float z = p.view.z.x;
+    const float z = depth_of_splat(p);
     bool finite_color;
-    const vec3 color = sh_color(i, p2, normalize(p.view.offset), finite_color);
+    const vec3 color = sh_color(i, p2, seen_along(p), finite_color);
 
     float opacity = stored.peak * p.factor;
     // A NaN stays one.
     if (KERNEL == KERNEL_DENSITY) opacity = opacity > float(DEPTH_MAX) ? float(DEPTH_MAX) : opacity;
-    const vec2 x = pixel_position(p.view.x, p.view.z, 0), y = pixel_position(p.view.y, p.view.z, 1);
+    const bool lens = LENSES != 0u;
+    const vec2 x = lens ? pixel_in_plane(p.image.x, 0) : pixel_position(p.view.x, p.view.z, 0);
+    const vec2 y = lens ? pixel_in_plane(p.image.y, 1) : pixel_position(p.view.y, p.view.z, 1);
     const vec4 record0 = vec4(x.x, y.x, x.y, y.y), record1 = vec4(p.ux, p.k, p.vy, opacity);
     const uvec2 size = uvec2(camera.size[0], camera.size[1]);
 
     const bool stored_finite = is_finite(p0) && is_finite(p1) && is_finite(p2.xyz) && stored.in_range;
-    const bool in_front = z > float(NEAR_PLANE);
+    const bool in_front = z > float(NEAR_PLANE) && (LENSES == 0u || p.image.shown);
     const bool projected_finite = p.footprint_in_range && finite_color && is_finite(record0) && is_finite(record1) && p.ux > 0.0 && p.vy > 0.0;
     bool visible = stored_finite && in_front && projected_finite;
     // Footprints reach to an optical depth of CUT_OFF: that is a little further than an opacity of CUT_OFF.

@@ -80,7 +80,7 @@ MotionGradient update_splat(uint i) {
     const Projection p = stored.footprint;
     cut_off_gradient(stored, s);
     // The mean of an invisible splat may be anything. Zero times a direction that is not finite is not zero.
-    const vec3 direction = visible ? normalize(p.view.offset) : vec3(0.0);
+    const vec3 direction = visible ? seen_along(p) : vec3(0.0);
     // max(0, .) passes no gradient where the colour is zero.
     const vec3 shown = fetch(records, RECORD_TEXELS * i + 2u).rgb;
     const vec3 color_gradient = visible ? s.color * vec3(greaterThan(shown, vec3(0.0))) : vec3(0.0);
@@ -89,7 +89,7 @@ MotionGradient update_splat(uint i) {
 
     const FootprintGradient f = footprint_gradient(s, p);
     const SplatGradient g = splat_gradient(f, stored, splat, s.g, direction, direction_gradient);
-    const float depth = visible ? p.view.z.x : 3.4e38;
+    const float depth = visible ? depth_of_splat(p) : 3.4e38;
 
     const vec4 zero = vec4(0.0);
     move_splat(i, p0, p1, p2, visible ? vec4(g.mean, g.logit) : zero, visible ? g.quaternion : zero,

@@ -81,7 +81,7 @@ void main() {
         const StoredProjection stored = project_splat(splat);
         const Projection p = stored.footprint;
         cut_off_gradient(stored, s);
-        const vec3 direction = normalize(p.view.offset);
+        const vec3 direction = seen_along(p);
         const ShBasis basis = sh_basis_of(direction);
         vec3 direction_gradient = vec3(0.0);
         [[unroll]] for (uint plane = FIRST_SH_PLANE; plane < PLANES; ++plane) {
@@ -93,7 +93,7 @@ void main() {
         by_mean = added(first, by_mean, vec4(g.mean, g.logit));
         by_quaternion = added(first, by_quaternion, g.quaternion);
         by_scale = added(first, by_scale, vec4(g.log_scale, basis.value[0] * s.color.r));
-        depth = min(depth, p.view.z.x);
+        depth = min(depth, depth_of_splat(p));
         seen += statistics_of(f, 0.5 * vec2(camera.size[0], camera.size[1]));
     }
 

@@ -22,6 +22,8 @@ EWA_UINT(SPEC_SHARP, 12u);         // 1: some footprint is sharper than LOW_PASS
 EWA_UINT(SPEC_COLOR_FLOATS, 10u);  // a buffer of colours holds 0: 4 bytes a colour; 1: 4 floats
 EWA_UINT(SPEC_NEAREST, 13u);       // spheres that a pixel draws, at least 1
 EWA_UINT(SPEC_PARTS, 14u);         // 1: an instance counts in one part of its tile: see PART_SIZE
+EWA_UINT(SPEC_LENSES, 15u);        // 1: a camera is not a pinhole
+EWA_UINT(SPEC_WRAP, 16u);          // 1: the image's left and right border are one line of the scene
 
 // ---- A splat's parameters ----
 // Flat float f is component f % 4 of texel plane f / 4. Splats are stored in blocks of PARAM_BLOCK. Within a
@@ -220,6 +222,25 @@ EWA_UINT(MOTION_BASIS_FLOATS, 49u);
 EWA_UINT(RANKED_SUBGROUPS, 8u);
 EWA_UINT(RANKED_LANE_KEYS, 16u);
 
+// ---- Lenses, with SPEC_LENSES ----
+EWA_UINT(LENS_BROWN, 0u);  // of tangents; a pinhole has no terms
+EWA_UINT(LENS_FISHEYE, 1u);
+EWA_UINT(LENS_EQUIRECTANGULAR, 2u);
+EWA_UINT(LENS_ORTHOGRAPHIC, 3u);
+// Indices of the terms.
+EWA_UINT(LENS_K1, 0u);
+EWA_UINT(LENS_K2, 1u);
+EWA_UINT(LENS_P1, 2u);
+EWA_UINT(LENS_P2, 3u);
+EWA_UINT(LENS_K3, 4u);
+EWA_UINT(LENS_K4, 5u);
+EWA_UINT(LENS_K5, 6u);
+EWA_UINT(LENS_K6, 7u);
+EWA_UINT(LENS_S1, 8u);
+EWA_UINT(LENS_S2, 9u);
+EWA_UINT(LENS_S3, 10u);
+EWA_UINT(LENS_S4, 11u);
+
 struct CameraBlock {
     float rotation_hi[9];  // world to camera, rows; high and low parts of the float64 values
     float rotation_lo[9];
@@ -233,6 +254,10 @@ struct CameraBlock {
     float tan_max[2];
     uint size[2];  // px
     uint tiles[2];
+    float lens_hi[12];  // LENS_K1 ...: the terms of the lens
+    float lens_lo[12];
+    float lens_limit;  // LENS_BROWN: largest x^2 + y^2 of tangents; LENS_FISHEYE: largest angle (radians)
+    uint lens;         // LENS_*
 };
 
 // A view of the operators, whose matrix need not be a rotation. The values are as the caller gave them.

@@ -13,7 +13,7 @@ struct ProjectBuffers {
     gpu::BufferPart params, camera, records, depth_keys, tile_counts, counts;
 };
 
-/// Projects every splat into pixels. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (0 or PROJECT_DEBUG).
+/// Projects every splat into pixels. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (0 or PROJECT_DEBUG), SPEC_LENSES, SPEC_WRAP.
 struct Project : ProjectBuffers {
     static constexpr char shader[] = "project";
 };
@@ -32,7 +32,7 @@ struct UpdateBuffers {
         params_out, moments1_out, moments2_out, statistics, sorted_indices;
 };
 
-/// Gradient of Project. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (UPDATE_* bits).
+/// Gradient of Project. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (UPDATE_* bits), SPEC_LENSES.
 struct Update : UpdateBuffers {
     static constexpr char shader[] = "update";
     gpu::BufferPart motion_sums;
@@ -40,7 +40,7 @@ struct Update : UpdateBuffers {
 
 // A batch of views. Each view has a list of the splats that reach a tile of it.
 
-/// Counts the tiles of a view's band that each splat reaches, after Project.
+/// Counts the tiles of a view's band that each splat reaches, after Project. Variant: SPEC_WRAP.
 struct BandTiles {
     static constexpr char shader[] = "band_tiles";
     using Work = PerElement<&shared::BandTilesPush::splats>;
@@ -54,7 +54,7 @@ struct CollectVisible {
     gpu::BufferPart records, tile_counts, prefix, totals, list_indices, visible;
 };
 
-/// Depth keys and tile counts of a list of records.
+/// Depth keys and tile counts of a list of records. Variant: SPEC_WRAP.
 struct ReceiveRecords {
     static constexpr char shader[] = "receive_records";
     using Work = PerElement<&shared::ReceivePush::splats>;
@@ -69,7 +69,7 @@ struct SumSlots {
 };
 
 /// Gradient of the projection in all views, fused with Adam. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (UPDATE_*
-/// bits without UPDATE_GRADIENT_ONLY and UPDATE_MOTION).
+/// bits without UPDATE_GRADIENT_ONLY and UPDATE_MOTION), SPEC_LENSES.
 struct UpdateViews {
     static constexpr char shader[] = "update_views";
     using Work = PerElement<&shared::UpdateViewsPush::splats>;
@@ -188,7 +188,7 @@ struct RadixScatterRanked : ScatterBuffers {
 };
 
 /// Writes the (splat, tile) instances in depth order, each layer for a strip of tile rows. Variant: SPEC_MODE
-/// (0 or EMIT_FIRST_INSTANCES).
+/// (0 or EMIT_FIRST_INSTANCES), SPEC_WRAP.
 struct EmitInstances {
     static constexpr char shader[] = "emit_instances";
     struct Work : ElementGroup<shared::EmitPush> {
@@ -223,12 +223,12 @@ struct BlendBackwardBuffers : BlendBuffers {
     gpu::BufferPart image_gradient, slots;
 };
 
-/// Blends the splats of every tile into the image planes. Variant: SPEC_MODE (BLEND_*).
+/// Blends the splats of every tile into the image planes. Variant: SPEC_MODE (BLEND_*), SPEC_WRAP.
 struct Blend : BlendBuffers {
     static constexpr char shader[] = "blend";
 };
 
-/// Gradient of Blend. Variant: SPEC_MODE (BLEND_BACKWARD_* bits).
+/// Gradient of Blend. Variant: SPEC_MODE (BLEND_BACKWARD_* bits), SPEC_WRAP.
 struct BlendBackward : BlendBackwardBuffers {
     static constexpr char shader[] = "blend_backward";
 };

@@ -258,7 +258,7 @@ void FramePasses::blend_backward(const Sorted& sorted) const {
     else if (plan.points())
         record(passes::BlendPointsBackward{buffers}, push, {mode, {shared::SPEC_NEAREST, plan.nearest}});
     else
-        record(passes::BlendBackward{buffers}, push, {mode, kernel()});
+        record(passes::BlendBackward{buffers}, push, {mode, kernel(), wrap()});
 }
 
 void FramePasses::backward(const Model& model, const Sorted& sorted, const Rates& rates,
@@ -296,7 +296,7 @@ void FramePasses::backward(const Model& model, const Sorted& sorted, const Rates
     const gpu::SpecConstant mode{shared::SPEC_MODE, update_mode(plan)};
     if (plan.points()) return record(passes::UpdatePoints{buffers}, push, {degree(), mode});
     record(passes::Update{buffers, plan.motion ? frame.motion_sums : frame.partials}, push,
-           {degree(), mode, kernel()});
+           {degree(), mode, kernel(), lenses()});
     if (plan.motion) record_motion_sums(*this, frame);
     if (motion) record_motion_update(*this, frame, *motion);
 }

@@ -35,7 +35,7 @@ const gpu::Buffer& record_depth_order(const passes::Recorder& on, uint32_t splat
 }
 
 void record_instances(const passes::Recorder& on, bool gradients, uint32_t splats, const FrameBuffers& frame,
-                      const gpu::Buffer& order) {
+                      const gpu::Buffer& order, bool wraps) {
     const Sizes& s = frame.sizes;
     record_scan(on,
                 {.source = frame.tile_counts,
@@ -63,7 +63,8 @@ void record_instances(const passes::Recorder& on, bool gradients, uint32_t splat
                .strip_rows = s.strip_rows,
                .size = {s.width, s.height},
                .tiles = {s.tiles_x, s.tiles_y}},
-              {{shared::SPEC_MODE, gradients ? shared::EMIT_FIRST_INSTANCES : 0}});
+              {{shared::SPEC_MODE, gradients ? shared::EMIT_FIRST_INSTANCES : 0},
+               {shared::SPEC_WRAP, wraps ? 1u : 0u}});
 }
 
 /// The result is in the second buffers.
@@ -113,10 +114,10 @@ shared::BlendPush blend_push(const passes::KernelConfig& config, const FrameBuff
             .capacity = frame.instance_capacity};
 }
 
-void record_tile_lists(const passes::Recorder& on, bool gradients, uint32_t splats,
-                       const FrameBuffers& frame) {
+void record_tile_lists(const passes::Recorder& on, bool gradients, uint32_t splats, const FrameBuffers& frame,
+                       bool wraps) {
     const gpu::Buffer& order = record_depth_order(on, splats, frame);
-    record_instances(on, gradients, splats, frame, order);
+    record_instances(on, gradients, splats, frame, order, wraps);
     record_tile_order(on, gradients, frame);
 }
 
@@ -148,11 +149,11 @@ void FramePasses::project(const Model& model) const {
     else if (plan.points())
         record(passes::ProjectPoints{buffers}, push, {degree(), debug});
     else
-        record(passes::Project{buffers}, push, {degree(), debug, kernel()});
+        record(passes::Project{buffers}, push, {degree(), debug, kernel(), lenses(), wrap()});
 }
 
 Sorted FramePasses::draw(uint32_t splats) const {
-    record_tile_lists(*this, plan.gradients, splats, frame);
+    record_tile_lists(*this, plan.gradients, splats, frame, inputs.camera.wraps);
     const passes::BlendBuffers buffers{.records = frame.records,
                                        .splats = frame.instance_splats[1],
                                        .tile_starts = frame.tile_starts,
@@ -170,7 +171,7 @@ Sorted FramePasses::draw(uint32_t splats) const {
     } else if (plan.points()) {
         record(passes::BlendPoints{buffers}, push, {mode, {shared::SPEC_NEAREST, plan.nearest}});
     } else {
-        record(passes::Blend{buffers}, push, {mode, kernel()});
+        record(passes::Blend{buffers}, push, {mode, kernel(), wrap()});
     }
     if (inputs.sky) add_sky();
     return {.splats = &frame.instance_splats[1],

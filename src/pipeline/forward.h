@@ -77,7 +77,8 @@ struct FramePasses : passes::Recorder {
     void list_backward(uint32_t splats, const Sorted& sorted, const gpu::Buffer& sums,
                        uint32_t first_index) const;
     /// Moves the model by the mean gradient of the views. rates: of one view; batch_rates turns them into those of the step.
-    /// bands: lists of each view; list `view * bands + band`. It reads only the SH degree of the inputs.
+    /// bands: lists of each view; list `view * bands + band`. Of the inputs it reads the SH degree, and whether a
+    /// camera of the step is not a pinhole.
     void update_views(const Model& model, const ViewBuffers& buffers, const Rates& rates,
                       uint32_t bands = 1) const;
 
@@ -85,6 +86,8 @@ struct FramePasses : passes::Recorder {
     gpu::BufferPart camera() const;
     void add_sky() const;
     gpu::SpecConstant degree() const;
+    gpu::SpecConstant lenses() const { return {shared::SPEC_LENSES, inputs.camera.lens ? 1u : 0u}; }
+    gpu::SpecConstant wrap() const { return {shared::SPEC_WRAP, inputs.camera.wraps ? 1u : 0u}; }
     gpu::SpecConstant kernel() const { return {shared::SPEC_KERNEL, uint32_t(plan.kernel)}; }
     void compare(const gpu::Buffer& image, const shared::LossPush& push, float share) const;
     void compare_alpha(const gpu::Buffer& photo, bool cut, const shared::MaskPush& at,
@@ -101,8 +104,9 @@ struct FramePasses : passes::Recorder {
 /// The part between projection and blending: depth order, instances, tile order, tile starts. It reads frame's records,
 /// depth_keys[0] and tile_counts, and leaves each tile's splats in instance_splats[1] and tile_starts; with gradients also
 /// sorted_indices[1] and first_instances.
-void record_tile_lists(const passes::Recorder& on, bool gradients, uint32_t splats,
-                       const FrameBuffers& frame);
+/// wraps: as in CameraUse.
+void record_tile_lists(const passes::Recorder& on, bool gradients, uint32_t splats, const FrameBuffers& frame,
+                       bool wraps = false);
 
 /// Intervals of a ray that a march evaluates together; most: a power of two.
 uint32_t march_group(uint32_t samples, uint32_t most);

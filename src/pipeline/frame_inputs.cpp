@@ -3,9 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <vector>
 
 #include "ewa/error.h"
+#include "scene/native_lens.h"
 
 namespace ewa::pipeline {
 namespace {
@@ -26,6 +29,29 @@ void check(const Camera& camera) {
     if (!good)
         throw InputError(
             "a camera with a value that is not finite, or a size or focal length not above zero");
+    if (!scene::is_native(camera.distortion))
+        throw InputError("splats cannot be rendered through this lens; undistort its images");
+}
+
+uint32_t lens_of(const Distortion& lens) {
+    switch (lens.lens) {
+        case Lens::fisheye:
+            return shared::LENS_FISHEYE;
+        case Lens::equirectangular:
+            return shared::LENS_EQUIRECTANGULAR;
+        case Lens::orthographic:
+            return shared::LENS_ORTHOGRAPHIC;
+        default:
+            return shared::LENS_BROWN;
+    }
+}
+
+void set_lens(const Camera& camera, shared::CameraBlock& block) {
+    const Distortion& d = camera.distortion;
+    const double terms[] = {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4};
+    for (size_t i = 0; i < std::size(terms); ++i) split(terms[i], block.lens_hi[i], block.lens_lo[i]);
+    block.lens_limit = float(std::min(scene::lens_limit(camera), double(std::numeric_limits<float>::max())));
+    block.lens = lens_of(d);
 }
 
 template <class Value, class Convert>
@@ -55,15 +81,16 @@ shared::CameraBlock camera_block(const Camera& camera, const passes::KernelConfi
     const double focal[2] = {camera.fx, camera.fy}, center[2] = {camera.cx, camera.cy};
     const int size[2] = {camera.width, camera.height};
     const uint32_t tile[2] = {config.tile_width, config.tile_height};
+    const scene::TangentBounds bounds = scene::tangent_bounds(camera);
     for (int i = 0; i < 2; ++i) {
         split(focal[i], block.focal_hi[i], block.focal_lo[i]);
         split(center[i], block.center_hi[i], block.center_lo[i]);
-        const double margin = shared::JACOBIAN_MARGIN * size[i] / (2.0 * focal[i]);
-        block.tan_min[i] = float(-(center[i] / focal[i] + margin));
-        block.tan_max[i] = float((size[i] - center[i]) / focal[i] + margin);
+        block.tan_min[i] = float(bounds.low[i]);
+        block.tan_max[i] = float(bounds.high[i]);
         block.size[i] = uint32_t(size[i]);
         block.tiles[i] = (uint32_t(size[i]) + tile[i] - 1) / tile[i];
     }
+    set_lens(camera, block);
     return block;
 }
 
@@ -75,8 +102,17 @@ gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passe
     return buffer;
 }
 
+CameraUse use_of(const gpu::Buffer& blocks, uint64_t offset, const Camera& camera) {
+    return {.buffer = &blocks,
+            .offset = offset,
+            .width = uint32_t(camera.width),
+            .height = uint32_t(camera.height),
+            .lens = !camera.distortion.none(),
+            .wraps = scene::shows_all_around(camera)};
+}
+
 FrameInputs inputs_of(const gpu::Buffer& block, const Camera& camera, const RenderOptions& options) {
-    return {.camera = {.buffer = &block, .width = uint32_t(camera.width), .height = uint32_t(camera.height)},
+    return {.camera = use_of(block, 0, camera),
             .background = options.sky ? std::array<float, 3>{} : options.background,
             .sh_degree = options.sh_degree,
             .samples = uint32_t(std::max(options.samples, 1))};

@@ -17,7 +17,12 @@ struct CameraUse {
     const gpu::Buffer* buffer = nullptr;  // CameraBlocks
     uint64_t offset = 0;                  // bytes, aligned as the device requires for uniform blocks
     uint32_t width = 0, height = 0;       // px
+    bool lens = false;                    // not a pinhole
+    bool wraps = false;                   // the left and right border of the image are one line of the scene
 };
+
+/// The camera in this block of a buffer.
+CameraUse use_of(const gpu::Buffer& blocks, uint64_t offset, const Camera& camera);
 
 struct SkyTexels;
 
@@ -42,7 +47,8 @@ struct FrameInputs {
 Band band_of(const passes::KernelConfig& config, uint32_t height, uint32_t bands, uint32_t band);
 
 /// A camera as the shaders read it: each float64 value in two floats. origin: of the scene's means, world
-/// units. Throws InputError if a value is not finite, or a size or focal length is not positive.
+/// units. Throws InputError if a value is not finite, a size or focal length is not positive, or scene::is_native is false of the
+/// lens.
 shared::CameraBlock camera_block(const Camera& camera, const passes::KernelConfig& config,
                                  const glm::dvec3& origin = glm::dvec3(0));
 

@@ -103,7 +103,8 @@ void FramePasses::list(const Model& model, const ViewBuffers& buffers, const Lis
         record(passes::BandTiles{.records = frame.records,
                                  .depth_keys = frame.depth_keys[0],
                                  .tile_counts = frame.tile_counts},
-               {.splats = model.splats, .first_row = band.first, .size = {inputs.camera.width, band.rows}});
+               {.splats = model.splats, .first_row = band.first, .size = {inputs.camera.width, band.rows}},
+               {wrap()});
     record_scan(*this,
                 {.source = frame.tile_counts,
                  .order = nullptr,
@@ -134,7 +135,7 @@ Sorted FramePasses::draw_list(uint32_t splats) const {
     record(
         passes::ReceiveRecords{
             .records = frame.records, .depth_keys = frame.depth_keys[0], .tile_counts = frame.tile_counts},
-        {.splats = splats, .size = {frame.sizes.width, frame.sizes.height}});
+        {.splats = splats, .size = {frame.sizes.width, frame.sizes.height}}, {wrap()});
     return draw(splats);
 }
 
@@ -169,7 +170,7 @@ void FramePasses::update_views(const Model& model, const ViewBuffers& buffers, c
            update_views_push(model, rates, bands),
            {degree(),
             {shared::SPEC_MODE, update_mode(plan) | (bands > 1 ? shared::UPDATE_BANDS : 0)},
-            kernel()});
+            kernel(), lenses()});
 }
 
 Rates batch_rates(const Rates& rates) {

@@ -111,6 +111,7 @@ class Step {
     pipeline::ViewBuffers buffers_;  // of a portion
     gpu::Buffer own_sums_;           // of the part that this rank draws, unless all is in one portion
     std::vector<Seen> seen_;         // by part of a view
+    bool lenses_ = false;            // a camera of the step is not a pinhole
     Traffic traffic_;
 };
 

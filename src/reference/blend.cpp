@@ -39,7 +39,8 @@ Whitener whitener(const Projected& splat) {
 }
 
 Sample sample(const Projected& splat, const Whitener& w, const glm::dvec2& pixel) {
-    const glm::dvec2 d = pixel - splat.mean2d;
+    glm::dvec2 d = pixel - splat.mean2d;
+    if (splat.around > 0) d.x -= splat.around * std::round(d.x / splat.around);
     Sample s;
     s.u = w.ux * d.x + w.uy * d.y;
     s.v = w.vy * d.y;
@@ -79,7 +80,8 @@ std::vector<uint32_t> covered_tiles(const Projected& splat, const TileGrid& grid
     const double floor = raw_of(splat, alpha_floor(smoothing));
     if (!splat.visible || !(splat.opacity >= floor)) return tiles;
     const double r = std::sqrt(2 * std::log(splat.opacity / floor));
-    const Span xs = pixels_within(splat.mean2d.x, r * std::sqrt(splat.a), grid.image_width);
+    Span xs = pixels_within(splat.mean2d.x, r * std::sqrt(splat.a), grid.image_width);
+    if (splat.around > 0) xs = {0, grid.image_width};
     const Span ys = pixels_within(splat.mean2d.y, r * std::sqrt(splat.c), grid.image_height);
     if (xs.first >= xs.end || ys.first >= ys.end) return tiles;
     const Whitener w = whitener(splat);

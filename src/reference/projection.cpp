@@ -7,6 +7,7 @@
 #include <glm/matrix.hpp>
 #include <numbers>
 
+#include "scene/native_lens.h"
 #include "shared/constants.h"
 
 namespace ewa::reference {
@@ -121,8 +122,7 @@ void project_shape(const Splat& splat, const Camera& camera, ProjectionSteps& s)
     const double z = s.view.z;
     s.slope.x = clamp_slope(s.view.x / z, camera.fx, camera.cx, camera.width, s.slope_free.x);
     s.slope.y = clamp_slope(s.view.y / z, camera.fy, camera.cy, camera.height, s.slope_free.y);
-    const Rows jacobian{{camera.fx / z, 0, -camera.fx * s.slope.x / z},
-                        {0, camera.fy / z, -camera.fy * s.slope.y / z}};
+    const Rows& jacobian = s.image.jacobian;
 
     s.quaternion_norm = robust_norm(splat.quaternion);
     for (int k = 0; k < 4; ++k) s.unit_quaternion[k] = splat.quaternion[k] / s.quaternion_norm;
@@ -135,25 +135,26 @@ void project_shape(const Splat& splat, const Camera& camera, ProjectionSteps& s)
 }
 
 /// |J| of the ray-space transform.
-double ray_space_factor(const ProjectionSteps& s, const Camera& camera) {
-    return camera.fx / s.view.z * (camera.fy / s.view.z) * std::sqrt(1 + glm::dot(s.slope, s.slope));
+double ray_space_factor(const ProjectionSteps& s) {
+    return glm::length(glm::cross(s.image.jacobian.x, s.image.jacobian.y));
 }
 
-double kernel_factor(Footprint kernel, const ProjectionSteps& s, const Camera& camera, double det) {
+double kernel_factor(Footprint kernel, const ProjectionSteps& s, double det) {
     switch (kernel) {
         case Footprint::peak:
             return 1;
         case Footprint::antialias:
             return std::sqrt(std::max(0.0, s.det0 / det));
         case Footprint::density:
-            return mean_shadow(s.scale) * ray_space_factor(s, camera) / std::sqrt(det);
+            return mean_shadow(s.scale) * ray_space_factor(s) / std::sqrt(det);
     }
     return 0;
 }
 
-void evaluate_color(const Splat& splat, const RenderOptions& options, ProjectionSteps& s) {
+void evaluate_color(const Splat& splat, const Camera& camera, const RenderOptions& options, ProjectionSteps& s) {
     s.sh_degree = std::clamp(options.sh_degree, 0, splat.sh_degree);
-    s.direction = glm::normalize(s.offset);
+    s.parallel = camera.distortion.lens == Lens::orthographic;
+    s.direction = s.parallel ? glm::transpose(camera.rotation) * glm::dvec3(0, 0, 1) : glm::normalize(s.offset);
     const auto basis = sh_basis(s.sh_degree, s.direction);
     s.raw_color = glm::dvec3(COLOR_OFFSET);
     for (int j = 0; j < sh_coefficients(s.sh_degree); ++j) s.raw_color += basis[j] * splat.sh[j];
@@ -175,12 +176,14 @@ Projected project(const Splat& splat, const Camera& camera, const RenderOptions&
         return out;
     }
     s.view = camera.rotation * s.offset;
-    out.z = s.view.z;
-    if (!(out.z > NEAR_PLANE)) return out;
+    s.image = lens_image(camera, s.view);
+    out.z = s.image.depth;
+    if (!s.image.shown) return out;
 
-    out.mean2d = {camera.fx * s.view.x / out.z + camera.cx, camera.fy * s.view.y / out.z + camera.cy};
+    out.mean2d = s.image.pixel;
+    if (scene::shows_all_around(camera)) out.around = camera.width;
     project_shape(splat, camera, s);
-    evaluate_color(splat, options, s);
+    evaluate_color(splat, camera, options, s);
     if (!(sum_of_sizes(s.m) <= FOOTPRINT_MAX) || !within(COLOR_MAX, s.raw_color - COLOR_OFFSET)) {
         out.skipped_nonfinite = true;
         return out;
@@ -194,7 +197,7 @@ Projected project(const Splat& splat, const Camera& camera, const RenderOptions&
     out.det = s.det0 + LOW_PASS * trace + LOW_PASS * LOW_PASS;
 
     s.sigmoid = 1 / (1 + std::exp(-splat.opacity_logit));
-    s.kernel_factor = kernel_factor(options.kernel, s, camera, out.det);
+    s.kernel_factor = kernel_factor(options.kernel, s, out.det);
     out.density = options.kernel == Footprint::density;
     s.peak = out.density ? softplus(splat.opacity_logit) : s.sigmoid;
     out.opacity = s.peak * s.kernel_factor;
@@ -248,38 +251,31 @@ void shape_backward(const ProjectionSteps& s, const Rows& by_m, Splat& out) {
         out.quaternion[k] = (by_unit[k] - s.unit_quaternion[k] * along) / s.quaternion_norm;
 }
 
-/// dL/d(view position) through mean2d and through J.
+/// dL/d(view position) through mean2d and through J. by_log: dL/d ln(optical depth) of a density, whose |J| is
+/// |row0 x row1|; else 0.
 glm::dvec3 view_backward(const ProjectionSteps& s, const Camera& camera, const ScreenGradient& g,
-                         const Rows& by_m) {
-    const double z = s.view.z, fx = camera.fx, fy = camera.fy;
-    glm::dvec3 by_view{g.mean2d.x * fx / z, g.mean2d.y * fy / z, 0};
-    by_view.z = -(g.mean2d.x * fx * s.view.x + g.mean2d.y * fy * s.view.y) / (z * z);
-
+                         const Rows& by_m, double by_log) {
+    const LensImage& image = s.image;
+    glm::dvec3 by_view = g.mean2d.x * image.exact.x + g.mean2d.y * image.exact.y;
     // dL/dJ = dL/dM (W R S)^T, row by row.
     const glm::dmat3 wrs =
         camera.rotation *
         glm::dmat3(s.rotation[0] * s.scale[0], s.rotation[1] * s.scale[1], s.rotation[2] * s.scale[2]);
-    const glm::dvec3 by_jx = wrs * by_m.x, by_jy = wrs * by_m.y;
-    // J's entries are fx/z and -fx tx/z; the slope tx = x/z moves with x and z unless it is clamped.
-    by_view.z += -(fx * by_jx.x + fy * by_jy.y) / (z * z);
-    by_view.z += (fx * s.slope.x * by_jx.z + fy * s.slope.y * by_jy.z) / (z * z);
-    const double by_slope_x = s.slope_free.x ? -fx / z * by_jx.z : 0;
-    const double by_slope_y = s.slope_free.y ? -fy / z * by_jy.z : 0;
-    by_view.x += by_slope_x / z;
-    by_view.y += by_slope_y / z;
-    by_view.z += -(by_slope_x * s.view.x + by_slope_y * s.view.y) / (z * z);
+    Rows by_j{wrs * by_m.x, wrs * by_m.y};
+    if (by_log != 0) {
+        const glm::dvec3 n = glm::cross(image.jacobian.x, image.jacobian.y);
+        by_j.x += by_log / glm::dot(n, n) * glm::cross(image.jacobian.y, n);
+        by_j.y += by_log / glm::dot(n, n) * glm::cross(n, image.jacobian.x);
+    }
+    for (size_t c = 0; c < 3; ++c)
+        by_view += by_j.x[int(c)] * image.hessian[0][c] + by_j.y[int(c)] * image.hessian[1][c];
     return by_view;
 }
 
-/// Adds the gradient through A and |J|, given dL/d ln(optical depth).
-void density_backward(const ProjectionSteps& s, double by_log, glm::dvec3& log_scale, glm::dvec3& by_view) {
+/// Adds the gradient through A, given dL/d ln(optical depth).
+void shadow_backward(const ProjectionSteps& s, double by_log, glm::dvec3& log_scale) {
     const glm::dvec3 pairs = pair_ratios(s.scale), squares = pairs * pairs;
     log_scale += by_log * (1.0 - squares / (squares.x + squares.y + squares.z));
-    glm::dvec2 by_slope = by_log / (1 + glm::dot(s.slope, s.slope)) * s.slope;
-    if (!s.slope_free.x) by_slope.x = 0;
-    if (!s.slope_free.y) by_slope.y = 0;
-    const double z = s.view.z;
-    by_view += glm::dvec3(by_slope, -(by_slope.x * s.view.x + by_slope.y * s.view.y) / z - 2 * by_log) / z;
 }
 
 /// Sets the coefficients' gradient and returns dL/d(mean - camera position) through the direction.
@@ -294,6 +290,7 @@ glm::dvec3 color_backward(const Splat& splat, const ProjectionSteps& s, const gl
         out.sh[j] = basis[j] * by_color;
         by_direction += glm::dot(by_color, splat.sh[j]) * basis_gradient[j];
     }
+    if (s.parallel) return glm::dvec3(0);
     return (by_direction - s.direction * glm::dot(s.direction, by_direction)) / glm::length(s.offset);
 }
 
@@ -336,13 +333,11 @@ Splat project_backward(const Splat& splat, const Camera& camera, const RenderOpt
     const double by_logit = projected.density ? s.sigmoid : s.sigmoid * (1 - s.sigmoid);
     out.opacity_logit = gradient.opacity * s.kernel_factor * by_logit;
     const glm::dvec3 by_offset = color_backward(splat, s, gradient.color, out);
-    glm::dvec3 by_view = view_backward(s, camera, gradient, by_m);
-    if (projected.density) density_backward(s, gradient.opacity * projected.opacity, out.log_scale, by_view);
+    const double by_log = projected.density ? gradient.opacity * projected.opacity : 0;
+    const glm::dvec3 by_view = view_backward(s, camera, gradient, by_m, by_log);
+    if (projected.density) shadow_backward(s, by_log, out.log_scale);
     out.mean = glm::transpose(camera.rotation) * by_view + by_offset;
-    if (by_motion) {
-        const double by_log = projected.density ? gradient.opacity * projected.opacity : 0;
-        add_motion_gradient(s, camera, gradient, by_m, by_log, by_view, out.mean, *by_motion);
-    }
+    if (by_motion) add_motion_gradient(s, camera, gradient, by_m, by_log, by_view, out.mean, *by_motion);
     return out;
 }
 

@@ -6,6 +6,7 @@
 //   p          = W (mean - camera position)                   view coordinates
 //   mean2d     = (fx p.x / p.z + cx, fy p.y / p.z + cy)       px, not clamped
 //   J          = [fx/z 0 -fx tx/z; 0 fy/z -fy ty/z]           tx = clamp(p.x / z), ty = clamp(p.y / z)
+// Other lenses: mean2d and J are those of reference/lens.h.
 //   M          = J W R S                                      2 x 3; R: unit quaternion, S: exp(log scale)
 //   [a b; b c] = M M^T + LOW_PASS * I                         px^2
 //   det0       = det(M M^T) = |row0 x row1|^2                 Cauchy-Binet: squared 2 x 2 minors of M
@@ -14,8 +15,9 @@
 //   peak 1;  antialias sqrt(max(0, det0 / det))
 // With Footprint::density the splat is a density in space, and the optical depth takes the place of the opacity:
 //   depth = softplus(logit) A |J| / sqrt(det),  A = sqrt(((s1 s2)^2 + (s2 s3)^2 + (s3 s1)^2) / 3)
-//   |J|   = fx fy sqrt(1 + tx^2 + ty^2) / z^2             of the ray-space transform; depth is at most DEPTH_MAX
-// Colour is max(0, COLOR_OFFSET + sum_j sh_j Y_j(direction)), direction = normalise(mean - camera position).
+//   |J|   = |row0 x row1| of J = fx fy sqrt(1 + tx^2 + ty^2) / z^2     of the ray-space transform; depth is at most DEPTH_MAX
+// Colour is max(0, COLOR_OFFSET + sum_j sh_j Y_j(direction)), direction = normalise(mean - camera position), or the camera's axis
+// where the lens is orthographic.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -26,6 +28,7 @@
 #include "ewa/camera.h"
 #include "ewa/camera_motion.h"
 #include "ewa/render_options.h"
+#include "reference/lens.h"
 #include "reference/values.h"
 #include "scene/color.h"
 
@@ -33,7 +36,8 @@ namespace ewa::reference {
 
 using scene::sh_basis;
 
-/// If neither flag is set, the splat is culled: z is not above NEAR_PLANE, or the opacity is below ALPHA_MIN.
+/// If neither flag is set, the splat is culled: z is not above NEAR_PLANE, the lens does not show the mean, or the opacity is
+/// below ALPHA_MIN.
 /// The other members are valid for a visible splat.
 struct Projected {
     bool visible = false;
@@ -41,11 +45,12 @@ struct Projected {
     /// QUATERNION_MIN, or a mean beyond VIEW_MAX. In front of the camera, also for a footprint beyond
     /// FOOTPRINT_MAX, or a colour beyond COLOR_MAX or not finite.
     bool skipped_nonfinite = false;
-    double z = 0;                // view depth, world units
+    double z = 0;                // view depth, or the distance where the lens orders by it; world units
     glm::dvec2 mean2d{0};        // px from the image's top left corner
     double a = 0, b = 0, c = 0;  // covariance with the low-pass, px^2
     double det = 0;              // of that covariance
     double opacity = 0;          // peak of the footprint, before the clamp to ALPHA_MAX
+    double around = 0;           // px from the splat to its next image, where the lens shows all around the camera; else 0
     bool density = false;        // Footprint::density: `opacity` is the peak of the optical depth
     glm::dvec3 color{0};
 };
@@ -59,16 +64,12 @@ double softplus(double x);
 /// The root mean square over all directions of a splat's shadow, the product of its two standard deviations.
 double mean_shadow(const glm::dvec3& scale);
 
-/// A 2 x 3 matrix by rows.
-struct Rows {
-    glm::dvec3 x{0}, y{0};
-};
-
 /// Intermediate values for the backward pass.
 struct ProjectionSteps {
     glm::dvec3 offset{0};         // mean - camera position
     glm::dvec3 view{0};           // p
-    glm::dvec2 slope{0};          // (tx, ty)
+    LensImage image;
+    glm::dvec2 slope{0};          // (tx, ty); of a pinhole, as the next
     glm::bvec2 slope_free{true};  // the clamp did not move it
     double quaternion_norm = 0;
     std::array<double, 4> unit_quaternion{};
@@ -81,6 +82,7 @@ struct ProjectionSteps {
     double peak = 0;     // that, or with Footprint::density softplus of the logit
     double kernel_factor = 0;
     int sh_degree = 0;  // the lower of the request's and the scene's
+    bool parallel = false;  // every point is seen along the camera's axis
     glm::dvec3 direction{0};
     glm::dvec3 raw_color{0};  // before the max
 };

@@ -48,7 +48,7 @@ glm::dvec2 bend(const Distortion& d, glm::dvec2 q) {
     switch (d.lens) {
         case Lens::brown:
             return q * ((1 + polynomial(r2, d.k1, d.k2, d.k3)) / (1 + polynomial(r2, d.k4, d.k5, d.k6))) +
-                   tangential(d, q);
+                   tangential(d, q) + glm::dvec2(polynomial(r2, d.s1, d.s2), polynomial(r2, d.s3, d.s4));
         case Lens::fisheye:
             return q * (1 + polynomial(r2, d.k1, d.k2, d.k3, d.k4)) + tangential(d, q) +
                    r2 * glm::dvec2(d.s1, d.s3);
@@ -63,6 +63,9 @@ glm::dvec2 bend(const Distortion& d, glm::dvec2 q) {
             return q * (2 / (1 + std::sqrt(1 - 4 * d.k1 * r2)));
         case Lens::unified:
             return q / (d.k1 * std::sqrt(d.k2 * r2 + 1) + 1 - d.k1);
+        case Lens::equirectangular:
+        case Lens::orthographic:
+            break;  // no distortion of a plane
     }
     return q;
 }

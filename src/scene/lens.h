@@ -4,6 +4,7 @@
 // A lens takes a ray to the plane point q and bends that plane. q = (x, y), but for a fisheye q = angle * (x,
 // y) / |(x, y)|. With r2 = |q|^2 and T(q) = (2 p1 x y + p2 (r2 + 2 x^2), p1 (r2 + 2 y^2) + 2 p2 x y):
 //   brown       q (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3) + T(q)
+//               + r2 (s1 + r2 s2, s3 + r2 s4)
 //   fisheye     q (1 + k1 r2 + k2 r2^2 + k3 r2^3 + k4 r2^4) + T(q) + r2 (s1, s3)
 //   fisheye624  p + T(p) + |p|^2 (s1 + |p|^2 s2, s3 + |p|^2 s4) with p = q (1 + k1 r2 + ... + k6 r2^6)
 //   fov         q atan(2 r tan(k1 / 2)) / (r k1)

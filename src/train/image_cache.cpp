@@ -121,7 +121,7 @@ void ImageCache::prepare(size_t i) {
 
 pipeline::CameraUse ImageCache::camera(size_t i) const {
     const Camera& camera = frames_[i].camera;
-    return {&cameras_, i * camera_stride_, uint32_t(camera.width), uint32_t(camera.height)};
+    return pipeline::use_of(cameras_, i * camera_stride_, camera);
 }
 
 ImageLevels::ImageLevels(gpu::Device& device, const passes::KernelConfig& config, const Dataset& dataset,

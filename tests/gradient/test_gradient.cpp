@@ -11,6 +11,7 @@
 #include "gpu/test_device.h"
 #include "reference/render.h"
 #include "support/gradient_check.h"
+#include "support/random_lens.h"
 #include "support/random_scene.h"
 #include "support/random_sky.h"
 
@@ -129,6 +130,43 @@ INSTANTIATE_TEST_SUITE_P(All, Gradient,
                              return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_sh" +
                                     std::to_string(c.sh_degree) + "_kernel" + std::to_string(int(c.kernel));
                          });
+
+/// Through each lens: the device's and the reference's gradient against central differences of the reference's loss.
+TEST(GradientThroughALens, IsTheSlopeOfTheReferencesLoss) {
+    for (const Footprint kernel : {Footprint::peak, Footprint::antialias, Footprint::density})
+        for (const auto& [name, camera] : random_lenses(5200, 25, 17)) {
+            SCOPED_TRACE(name);
+            const Gaussians gaussians = gaussians_around(5201, 9, camera, 1);
+            const Image target = random_target(5202, 25, 17);
+            RenderOptions options;
+            options.kernel = kernel;
+            const LossGradient actual = loss_gradient(device(), gaussians, camera, target, options);
+            const reference::ReferenceGradient cpu =
+                reference::loss_gradient(gaussians, camera, target, options);
+            reference::Values values = gaussians;
+            const auto loss = [&] { return reference::loss_gradient(values, camera, target, options).loss; };
+            const auto check = [&](const char* group_name, std::vector<double>& group,
+                                   const std::vector<float>& of_device, const std::vector<double>& claimed) {
+                std::vector<double> slope;
+                for (size_t i = 0; i < group.size(); ++i)
+                    slope.push_back(best_central_difference(loss, group[i], claimed[i], 1e-4, 1e-7));
+                GradientTolerance tolerance;
+                tolerance.cosine = 1e-6;
+                tolerance.norm = 5e-4;
+                tolerance.element_relative = 2e-3;
+                tolerance.element_absolute = 2e-4;
+                EXPECT_TRUE(gradients_agree(claimed, slope, tolerance)) << group_name << " of the reference";
+                EXPECT_TRUE(gradients_agree(std::vector<double>(of_device.begin(), of_device.end()), slope, tolerance))
+                    << group_name << " of the device";
+            };
+            const Gaussians& g = actual.gradient;
+            check("means", values.means, g.means, cpu.gradient.means);
+            check("quaternions", values.quaternions, g.quaternions, cpu.gradient.quaternions);
+            check("log scales", values.log_scales, g.log_scales, cpu.gradient.log_scales);
+            check("opacities", values.opacity_logits, g.opacity_logits, cpu.gradient.opacity_logits);
+            check("sh", values.sh, g.sh, cpu.gradient.sh);
+        }
+}
 
 /// A slope of the device's own loss, all the way round: the gradient belongs to the picture that is drawn.
 TEST(GradientOfTheDevice, FollowsItsOwnLoss) {

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// What rendering through a lens needs to know of it, in place of an undistorted image. shaders/lib/lens.glsl has the formulas.
+#pragma once
+#include <glm/vec2.hpp>
+
+#include "ewa/camera.h"
+
+namespace ewa::scene {
+
+/// Whether splats can be rendered through this lens: a pinhole, brown, fisheye with its radial terms k1 to k4 alone,
+/// equirectangular or orthographic.
+bool is_native(const Distortion& lens);
+
+/// Whether the splats of a view are ordered by their distance from the camera. Else they are by z.
+bool ordered_by_distance(Lens lens);
+
+/// Whether the left and right border of the image are one line of the scene: an equirectangular image of all directions.
+bool shows_all_around(const Camera& camera);
+
+/// How far from the axis the lens shows a point. brown: the largest x^2 + y^2 of tangents, before the model folds over.
+/// fisheye: the largest angle in radians, before the model folds over, and little beyond the corners of the image. Others: infinite.
+double lens_limit(const Camera& camera);
+
+/// Bounds of x / z and y / z for the Jacobian of a pinhole or of brown: the image, and JACOBIAN_MARGIN half images on each side.
+struct TangentBounds {
+    glm::dvec2 low, high;
+};
+TangentBounds tangent_bounds(const Camera& camera);
+
+}  // namespace ewa::scene

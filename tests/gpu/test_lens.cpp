@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+// Images through lenses, against the CPU reference.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/constants.hpp>
+
+#include "ewa/error.h"
+#include "ewa/renderer.h"
+#include "gpu/test_device.h"
+#include "reference/render.h"
+#include "support/gradient_check.h"
+#include "support/random_lens.h"
+#include "support/random_scene.h"
+
+namespace ewa::test {
+namespace {
+
+/// The largest difference, but for `skipped` pixels in which a contribution may stand on the other side of ALPHA_MIN.
+double largest_difference(const Image& image, const reference::Raster& expected, size_t skipped) {
+    std::vector<double> worst;
+    for (size_t i = 0; i < image.pixels.size(); i += 3) {
+        double largest = 0;
+        for (size_t c = i; c < i + 3; ++c)
+            largest = std::max(largest, std::abs(double(image.pixels[c]) - expected.values[c]));
+        worst.push_back(largest);
+    }
+    std::ranges::sort(worst);
+    return worst[worst.size() - 1 - skipped];
+}
+
+double largest_difference(const Image& a, const Image& b) {
+    double worst = 0;
+    for (size_t i = 0; i < a.pixels.size(); ++i)
+        worst = std::max(worst, std::abs(double(a.pixels[i]) - double(b.pixels[i])));
+    return worst;
+}
+
+TEST(Lens, ImagesAreTheReferences) {
+    for (const uint64_t seed : {6100, 6200})
+        for (const Footprint kernel : {Footprint::peak, Footprint::antialias, Footprint::density})
+            for (const auto& [name, camera] : random_lenses(seed, 97, 61)) {
+                SCOPED_TRACE(name);
+                const Gaussians gaussians = gaussians_around(seed + 1, 300, camera, 2);
+                RenderOptions options;
+                options.kernel = kernel;
+                options.background = {0.1f, 0.3f, 0.2f};
+                Renderer renderer(device(), gaussians, options);
+                const Rendering actual = renderer.render(camera, true);
+                const reference::Rendered expected = reference::render(gaussians, camera, options);
+                size_t visible = 0;
+                for (const auto& splat : expected.projected) visible += splat.visible;
+                EXPECT_GT(visible, 60u);
+                EXPECT_LT(visible, name == "equirectangular" || name == "fisheye" ? 301u : 297u);
+                EXPECT_LT(largest_difference(actual.color, expected.blended.color, 2), 2e-5);
+                EXPECT_EQ(renderer.skipped_nonfinite(), 0u);
+            }
+}
+
+/// tests/gradient compares both with central differences.
+TEST(Lens, GradientsAreTheReferences) {
+    for (const Footprint kernel : {Footprint::peak, Footprint::antialias, Footprint::density})
+        for (const auto& [name, camera] : random_lenses(6600, 41, 29)) {
+            SCOPED_TRACE(name);
+            const Gaussians gaussians = gaussians_around(6601, 60, camera, 1);
+            const Image target = random_target(6602, 41, 29);
+            RenderOptions options;
+            options.kernel = kernel;
+            const Gaussians actual = loss_gradient(device(), gaussians, camera, target, options).gradient;
+            const reference::Values expected =
+                reference::loss_gradient(gaussians, camera, target, options).gradient;
+            GradientTolerance tolerance;
+            tolerance.cosine = 1e-6;
+            tolerance.norm = 1e-3;
+            tolerance.element_relative = 2e-3;
+            tolerance.element_absolute = 2e-4;
+            EXPECT_TRUE(splat_gradients_agree(actual, expected, tolerance));
+        }
+}
+
+/// The terms of a pinhole are zero. A term that changes nothing takes the kernels of a lens.
+TEST(Lens, WithoutDistortionIsAPinhole) {
+    const Camera pinhole = random_camera(6300, 97, 61);
+    Camera lens = pinhole;
+    lens.distortion.k3 = 1e-30;
+    const Gaussians gaussians = random_gaussians(6301, 400, SplatKind::mixed, pinhole, 1);
+    Renderer renderer(device(), gaussians, {});
+    const Image expected = renderer.render(pinhole).color;
+    EXPECT_LT(largest_difference(renderer.render(lens).color, expected), 1e-5);
+    lens.distortion.k3 = 0.1;
+    EXPECT_GT(largest_difference(renderer.render(lens).color, expected), 0.05);
+}
+
+/// A turn about the vertical axis moves the columns of a panorama round, across its seam. Tiles do not divide the width.
+TEST(Lens, APanoramaHasNoSeam) {
+    constexpr int kWidth = 100, kHeight = 50, kColumns = 37;
+    const Camera camera = random_lenses(6400, kWidth, kHeight)[4].camera;
+    ASSERT_EQ(camera.distortion.lens, Lens::equirectangular);
+    Camera turned = camera;
+    const double angle = 2 * glm::pi<double>() * kColumns / kWidth;
+    // Columns of the matrix; a point moves to the right.
+    const glm::dmat3 turn(std::cos(angle), 0, -std::sin(angle), 0, 1, 0, std::sin(angle), 0, std::cos(angle));
+    turned.rotation = turn * camera.rotation;
+    turned.translation = turn * camera.translation;
+    const Gaussians gaussians = gaussians_around(6401, 400, camera, 0);
+    Renderer renderer(device(), gaussians, {});
+    const Image before = renderer.render(camera).color, after = renderer.render(turned).color;
+    double worst = 0;
+    for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth; ++x)
+            for (int c = 0; c < 3; ++c)
+                worst = std::max(worst, std::abs(double(before.at(x, y)[c]) -
+                                                 double(after.at((x + kColumns) % kWidth, y)[c])));
+    EXPECT_LT(worst, 2e-4);
+}
+
+TEST(Lens, OthersAreRefused) {
+    const Gaussians gaussians = random_gaussians(6501, 3, SplatKind::ordinary, random_camera(6500), 0);
+    Renderer renderer(device(), gaussians, {});
+    Camera camera = random_camera(6500);
+    camera.distortion = {.k1 = 0.9, .lens = Lens::fov};
+    EXPECT_THROW(renderer.render(camera), InputError);
+    camera.distortion = {.p1 = 0.01, .lens = Lens::fisheye};
+    EXPECT_THROW(renderer.render(camera), InputError);
+}
+
+}  // namespace
+}  // namespace ewa::test
