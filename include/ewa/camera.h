@@ -16,7 +16,7 @@ enum class Lens {
     unified,     // enhanced unified camera model, Khomutenko et al. 2016; k1 is alpha, k2 is beta
     // The next two are no distortions of a pinhole.
     equirectangular,  // all directions: u = fx atan2(x, z) + cx, v = fy atan2(y, |(x, z)|) + cy (COLMAP's EQUIRECTANGULAR)
-    orthographic      // parallel rays along z: u = fx x + cx, v = fy y + cy; fx and fy are px per world unit
+    orthographic  // parallel rays along z: u = fx x + cx, v = fy y + cy; fx and fy are px per world unit
 };
 
 /// The distortion of a lens relative to a pinhole. Names and signs are OpenCV's (calib3d, "Detailed

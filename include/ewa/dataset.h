@@ -25,21 +25,29 @@ enum class MaskUse {
     none        // masks and alpha are not used
 };
 
+/// What becomes of images through other lenses than a pinhole.
+enum class LensUse {
+    /// native for 360 degrees and parallel rays, which no pinhole shows; else undistort
+    automatic,
+    native,    // splats are rendered through the lens; images stay as they are
+    undistort  // images are resampled to those of a pinhole
+};
+
 struct Frame {
     std::string name;                  // in the dataset, e.g. "0001.jpg"
     std::filesystem::path image_path;  // may not exist: see image_exists
     bool image_exists = false;
     int orientation = 1;    // EXIF orientation to apply; 1 unless the camera belongs to the turned image
     bool eight_bit = true;  // the file has at most 256 levels
-    Camera camera;          // the pinhole camera of load_frame_image's result
+    Camera camera;          // of load_frame_image's result: a pinhole, or with LensUse::native the lens
     Camera source;          // the camera of the file's pixels, before undistortion and downscaling
     bool reduced = false;   // DatasetOptions::max_width has made `source` smaller than the file
     std::filesystem::path mask_path;  // empty: none
     MaskUse masks = MaskUse::cut;     // the use of alpha in load_frame_image's result; never automatic
-    Distortion distortion;            // of the file
-    Camera pinhole;                   // after undistortion, before downscaling
-    int downscale = 1;  // factor that is applied to the file, which may be a smaller copy already
-    int split = 0;      // 1 train, 2 test; 0: split_frames decides
+    Distortion distortion;  // of the file, which load_frame_image takes out; none with LensUse::native
+    Camera pinhole;         // `camera` before downscaling
+    int downscale = 1;      // factor that is applied to the file, which may be a smaller copy already
+    int split = 0;          // 1 train, 2 test; 0: split_frames decides
 };
 
 struct PointCloud {
@@ -63,6 +71,7 @@ struct Dataset {
 struct DatasetOptions {
     int downscale = 1;  // >= 1
     MaskUse masks = MaskUse::automatic;
+    LensUse lens = LensUse::automatic;
     bool need_images = true;  // false: only cameras; frames without a file are kept if the size is known
     bool need_points =
         true;  // false: the points of a transforms.json, which are in a file of their own, are not read
@@ -83,7 +92,7 @@ struct DatasetOptions {
 /// made, an image that is cut off or no image counts as missing. Throws InputError.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options);
 
-/// Loads the frame's image as the pinhole `frame.camera` sees it: turned, reduced, undistorted and downscaled.
+/// Loads the frame's image as `frame.camera` sees it: turned, reduced, undistorted and downscaled.
 /// Undistortion is bilinear and keeps the focal lengths; the size changes so that no pixel is blank
 /// (src/scene/lens.h). The result has 3 channels, or 4 if the frame has a mask or the file has alpha. The
 /// fourth is their product, which is used as frame.masks says. Throws InputError, also if a value of the file is not

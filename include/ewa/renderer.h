@@ -65,7 +65,7 @@ struct LossGradient {
     LossWeights weights;                 // that apply to this view: that of alpha is not automatic
     Gaussians gradient;                  // dL/d(stored value) in place of each stored value
     CameraMotion
-        camera;  // dL/d(each value of the camera's motion), for no motion; zero with `points`, ray and march
+        camera;  // dL/d(each value of the camera's motion), for no motion; zero with `points`, ray, march and a lens
     uint32_t skipped_nonfinite = 0;
 };
 

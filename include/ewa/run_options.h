@@ -49,6 +49,7 @@ struct RunOptions {
     int downscale = 1;           // divides the images' width and height
     int max_width = 0;           // px; images that are wider after `downscale` are reduced to it; 0: none are
     MaskUse masks = MaskUse::automatic;
+    LensUse lens = LensUse::automatic;
     int test_every = 8;         // every K-th image in name order is held out; 0: none
     bool skip_blurred = false;  // training images are skipped that are blurred far more than the others
     int eval_every = 0;         // evaluates the held-out views every N steps; 0: only at the end

@@ -59,7 +59,7 @@ Images some_images(const Images& images, const nb::slice& key) {
 
 // Pickles, for processes that read the same files.
 
-using DatasetState = std::tuple<std::filesystem::path, int, int, bool, int>;
+using DatasetState = std::tuple<std::filesystem::path, int, int, bool, int, int>;
 
 LoadedDataset opened(const std::filesystem::path& path, const DatasetOptions& options) {
     auto dataset = std::make_shared<Dataset>(with_files([&] { return load_dataset(path, options); }));
@@ -67,19 +67,32 @@ LoadedDataset opened(const std::filesystem::path& path, const DatasetOptions& op
 }
 
 DatasetState pickled(const LoadedDataset& data) {
-    return {data.path, data.options.downscale, int(data.options.masks), data.options.need_images,
-            data.options.max_width};
+    return {data.path,
+            data.options.downscale,
+            int(data.options.masks),
+            data.options.need_images,
+            data.options.max_width,
+            int(data.options.lens)};
 }
 
 LoadedDataset opened(const DatasetState& state) {
-    const auto& [path, downscale, masks, need_images, max_width] = state;
+    const auto& [path, downscale, masks, need_images, max_width, lens] = state;
     return opened(path, {.downscale = downscale,
                          .masks = MaskUse(masks),
+                         .lens = LensUse(lens),
                          .need_images = need_images,
                          .max_width = max_width});
 }
 
-using CameraState = std::tuple<int, int, std::array<double, 16>>;
+using CameraState = std::tuple<int, int, std::array<double, 16>, int, std::array<double, 12>>;
+
+std::array<double, 12> terms_of(const Distortion& d) {
+    return {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4};
+}
+
+Distortion distortion_of(int lens, const std::array<double, 12>& k) {
+    return {k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7], k[8], k[9], k[10], k[11], Lens(lens)};
+}
 
 CameraState pickled(const Camera& c) {
     std::array<double, 16> values{c.fx, c.fy, c.cx, c.cy};
@@ -87,12 +100,13 @@ CameraState pickled(const Camera& c) {
         for (int k = 0; k < 3; ++k) values[size_t(4 + 3 * i + k)] = c.rotation[i][k];
         values[size_t(13 + i)] = c.translation[i];
     }
-    return {c.width, c.height, values};
+    return {c.width, c.height, values, int(c.distortion.lens), terms_of(c.distortion)};
 }
 
 Camera camera_of(const CameraState& state) {
-    const auto& [width, height, v] = state;
+    const auto& [width, height, v, lens, terms] = state;
     Camera c{.width = width, .height = height, .fx = v[0], .fy = v[1], .cx = v[2], .cy = v[3]};
+    c.distortion = distortion_of(lens, terms);
     for (int i = 0; i < 3; ++i) {
         for (int k = 0; k < 3; ++k) c.rotation[i][k] = v[size_t(4 + 3 * i + k)];
         c.translation[i] = v[size_t(13 + i)];
@@ -109,33 +123,28 @@ std::optional<std::filesystem::path> mask_path_of(const Frame& frame) {
 
 FrameState pickled(const Frame& f) {
     const Distortion& d = f.distortion;
-    return {f.name,
-            f.image_path,
-            mask_path_of(f),
-            f.image_exists,
-            f.eight_bit,
-            {f.orientation, int(f.masks), f.downscale, f.split, int(d.lens), int(f.reduced)},
-            {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4},
-            {pickled(f.camera), pickled(f.source), pickled(f.pinhole)}};
+    return {f.name,          f.image_path,
+            mask_path_of(f), f.image_exists,
+            f.eight_bit,     {f.orientation, int(f.masks), f.downscale, f.split, int(d.lens), int(f.reduced)},
+            terms_of(d),     {pickled(f.camera), pickled(f.source), pickled(f.pinhole)}};
 }
 
 Frame frame_of(const FrameState& state) {
     const auto& [name, image_path, mask_path, exists, eight_bit, n, k, cameras] = state;
-    return {
-        .name = name,
-        .image_path = image_path,
-        .image_exists = exists,
-        .orientation = n[0],
-        .eight_bit = eight_bit,
-        .camera = camera_of(cameras[0]),
-        .source = camera_of(cameras[1]),
-        .reduced = n[5] != 0,
-        .mask_path = mask_path.value_or(std::filesystem::path()),
-        .masks = MaskUse(n[1]),
-        .distortion = {k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7], k[8], k[9], k[10], k[11], Lens(n[4])},
-        .pinhole = camera_of(cameras[2]),
-        .downscale = n[2],
-        .split = n[3]};
+    return {.name = name,
+            .image_path = image_path,
+            .image_exists = exists,
+            .orientation = n[0],
+            .eight_bit = eight_bit,
+            .camera = camera_of(cameras[0]),
+            .source = camera_of(cameras[1]),
+            .reduced = n[5] != 0,
+            .mask_path = mask_path.value_or(std::filesystem::path()),
+            .masks = MaskUse(n[1]),
+            .distortion = distortion_of(n[4], k),
+            .pinhole = camera_of(cameras[2]),
+            .downscale = n[2],
+            .split = n[3]};
 }
 
 MaskUse mask_use(const std::string& word) {
@@ -143,11 +152,12 @@ MaskUse mask_use(const std::string& word) {
 }
 
 void open_dataset(LoadedDataset* self, const std::filesystem::path& path, int downscale,
-                  const std::string& masks, bool need_images, int max_width) {
+                  const std::string& masks, bool need_images, int max_width, const std::string& lens) {
     if (downscale < 1) throw InputError("downscale is less than 1");
     if (max_width < 0) throw InputError("max_width is less than 0");
     new (self) LoadedDataset(opened(path, {.downscale = downscale,
                                            .masks = mask_use(masks),
+                                           .lens = asked_for("lens", lens).lens,
                                            .need_images = need_images,
                                            .max_width = max_width}));
 }
@@ -264,10 +274,11 @@ void bind_dataset(nb::module_& module) {
                               "Images with cameras, and the points that they were reconstructed from.")
         .def("__init__", open_dataset, nb::arg("path"), nb::kw_only(), nb::arg("downscale") = 1,
              nb::arg("masks") = "auto", nb::arg("need_images") = true, nb::arg("max_width") = 0,
+             nb::arg("lens") = "auto",
              nb::sig(
                  "def __init__(self, path: str | os.PathLike[str], *, downscale: int = 1, "
                  "masks: typing.Literal['auto', 'ignore', 'cut', 'none'] = 'auto', need_images: bool = True, "
-                 "max_width: int = 0) "
+                 "max_width: int = 0, lens: typing.Literal['auto', 'native', 'undistort'] = 'auto') "
                  "-> None"),
              "Reads a COLMAP model or transforms.json: a folder, or the file. need_images False reads only "
              "cameras. Raises "

@@ -41,16 +41,13 @@ View view_point(vec3 mean) {
     return View(vec3(d[0].x, d[1].x, d[2].x), p[0], p[1], p[2]);
 }
 
-// Pixel position of axis 0 (x) or 1 (y): focal * p / z + centre, as a float pair.
-vec2 pixel_position(vec2 p, vec2 z, int axis) {
+// Pixel position along axis 0 (x) or 1 (y) of a point in the plane, in units of the focal length, as float pairs.
+vec2 pixel_in_plane(vec2 q, int axis) {
     const vec2 focal = vec2(camera.focal_hi[axis], camera.focal_lo[axis]);
     const vec2 center = vec2(camera.center_hi[axis], camera.center_lo[axis]);
-    return pixel_of(p, z, focal, center);
+    return df_add(df_mul(q, focal), center);
 }
 
-// The same of a position in the plane of a lens.
-vec2 pixel_in_plane(vec2 q, int axis) {
-    return df_add(df_mul(q, vec2(camera.focal_hi[axis], camera.focal_lo[axis])),
-                  vec2(camera.center_hi[axis], camera.center_lo[axis]));
-}
+// The same of a pinhole: focal * p / z + centre.
+vec2 pixel_position(vec2 p, vec2 z, int axis) { return pixel_in_plane(df_div(p, z), axis); }
 #endif

@@ -641,6 +641,9 @@ EWA_UINT(LIGHT_POINT, 1u);
 EWA_UINT(LIGHT_SPOT, 2u);
 EWA_UINT(LIGHT_TRIANGLE, 3u);
 
+// A ray through a lens, in the scene as packed: origin, direction of unit length; zeros where the lens shows nothing.
+EWA_UINT(PIXEL_RAY_FLOATS, 6u);
+
 struct TraceView {
     float rotation[9];                       // world to camera, rows
     float position[3];                       // relative to the origin of the triangles

@@ -292,6 +292,17 @@ void add_view_options(CLI::App& app, ViewArguments& arguments) {
            masks.help)
         ->transform(one_of(masks.choices))
         ->default_str("auto");
+    const train::RunOption& lens = train::run_option("lens");
+    app.add_option_function<std::string>(
+           "--lens",
+           [&lens, &arguments](const std::string& text) {
+               RunOptions run;
+               lens.set(run, text);
+               arguments.lens = run.lens;
+           },
+           lens.help)
+        ->transform(one_of(lens.choices))
+        ->default_str("auto");
     add_device_options(app, arguments.device);
 }
 
@@ -309,9 +320,10 @@ Views load_views(const ViewArguments& arguments, const std::string& which, int t
             if (interrupted()) throw Interrupted();
         }
     }
-    Dataset dataset = load_dataset(
-        folder,
-        {.downscale = arguments.downscale, .masks = arguments.masks, .max_width = arguments.max_width});
+    Dataset dataset = load_dataset(folder, {.downscale = arguments.downscale,
+                                            .masks = arguments.masks,
+                                            .lens = arguments.lens,
+                                            .max_width = arguments.max_width});
     io::RefinedUse refined;
     if (!arguments.refined_cameras.empty())
         refined = io::use_refined_cameras(dataset, arguments.refined_cameras);

@@ -101,6 +101,7 @@ struct ViewArguments {
     std::string run_frames = "all";              // --frames of the run SPLATS, if the dataset is its own
     int downscale = 1, max_width = 0;
     MaskUse masks = MaskUse::automatic;
+    LensUse lens = LensUse::automatic;
     DrawArguments draw;
     DeviceOptions device;
 };

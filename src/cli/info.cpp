@@ -185,8 +185,22 @@ const char* dataset_kind(const fs::path& path) {
 struct CameraGroup {
     int frames = 0;
     Camera camera;
-    bool distorted = false;
+    bool distorted = false;  // undistorted on loading
 };
+
+std::string_view lens_name(const Distortion& distortion) {
+    switch (distortion.lens) {
+        case Lens::fisheye:
+            return "a fisheye";
+        case Lens::equirectangular:
+            return "360 degrees";
+        case Lens::orthographic:
+            return "parallel rays";
+        default:
+            return "a lens with distortion";
+    }
+}
+
 std::vector<CameraGroup> camera_groups(const Dataset& dataset) {
     std::map<std::tuple<int, int, double, double, double, double, bool>, CameraGroup> groups;
     for (const Frame& frame : dataset.frames) {
@@ -233,7 +247,9 @@ void print_cameras(const Dataset& dataset) {
         const Camera& c = groups[i].camera;
         fmt::print("{:<16}{}x{}, fx {:.6g}, fy {:.6g}, cx {:.6g}, cy {:.6g}{} ({})\n",
                    i == 0 ? "cameras" : "", c.width, c.height, c.fx, c.fy, c.cx, c.cy,
-                   groups[i].distorted ? ", undistorted on loading" : "",
+                   groups[i].distorted   ? ", undistorted on loading"
+                   : c.distortion.none() ? std::string()
+                                         : fmt::format(", rendered through {}", lens_name(c.distortion)),
                    core::counted(uint64_t(groups[i].frames), "frame"));
     }
     if (groups.size() > kShown) fmt::print("{:<16}and {} more\n", "", groups.size() - kShown);

@@ -34,7 +34,7 @@ std::filesystem::path dataset_input(const std::filesystem::path& path);
 /// The dataset of a run. Throws InputError that says where it was searched.
 std::filesystem::path dataset_of(const live::Run& run);
 
-/// Gives --kernel, --background, --downscale, --max-width, --masks and --test-every the run's values, where `app` has the option
+/// Gives --kernel, --background, --downscale, --max-width, --masks, --lens and --test-every the run's values, where `app` has the option
 /// and the command line does not. Throws InputError for a value that the option refuses.
 void use_options_of(const live::Run& run, CLI::App& app);
 

@@ -581,8 +581,8 @@ struct SkyUpdate {
 };
 
 // Ray tracing of mesh scenes. Variant of each: SPEC_ALPHA_TESTED,
-// SPEC_COLOR_FLOATS. The number of workgroups follows from the
-// view's pixels, so record takes it.
+// SPEC_COLOR_FLOATS, SPEC_LENSES. The number of workgroups follows from the
+// view's pixels, so record takes it. pixel_rays: with SPEC_LENSES the rays of the pixels' corners, row after row.
 
 /// A mesh scene's buffers, bindings 0 to 5; shared/layouts.h describes their contents.
 struct MeshBuffers {
@@ -594,7 +594,7 @@ struct TracePaths {
     static constexpr char shader[] = "trace_paths";
     using Work = ElementGroup<shared::TracePush>;
     MeshBuffers mesh;
-    gpu::BufferPart lights, view, sums, counts;
+    gpu::BufferPart lights, view, sums, counts, pixel_rays;
 };
 
 /// What the centre of each pixel sees.
@@ -602,7 +602,7 @@ struct TraceDepth {
     static constexpr char shader[] = "trace_depth";
     using Work = ElementGroup<shared::TracePush>;
     MeshBuffers mesh;
-    gpu::BufferPart view, seen, counts;
+    gpu::BufferPart view, seen, counts, pixel_rays;
 };
 
 }  // namespace ewa::passes

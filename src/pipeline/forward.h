@@ -77,8 +77,8 @@ struct FramePasses : passes::Recorder {
     void list_backward(uint32_t splats, const Sorted& sorted, const gpu::Buffer& sums,
                        uint32_t first_index) const;
     /// Moves the model by the mean gradient of the views. rates: of one view; batch_rates turns them into those of the step.
-    /// bands: lists of each view; list `view * bands + band`. Of the inputs it reads the SH degree, and whether a
-    /// camera of the step is not a pinhole.
+    /// bands: lists of each view; list `view * bands + band`. It reads two of the inputs: the SH degree, and
+    /// whether a camera of the step is not a pinhole.
     void update_views(const Model& model, const ViewBuffers& buffers, const Rates& rates,
                       uint32_t bands = 1) const;
 

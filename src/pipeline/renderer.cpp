@@ -12,6 +12,7 @@
 #include "pipeline/image_reader.h"
 #include "pipeline/sky.h"
 #include "pipeline/views.h"
+#include "scene/looks.h"
 
 namespace ewa {
 namespace {
@@ -162,6 +163,7 @@ void Renderer::State::submit_parts(const Plan& plan, const FrameInputs& inputs, 
 
 template <class Record>
 void Renderer::State::submit(const Camera& camera, const Plan& plan, const RenderOptions& look, Record then) {
+    scene::check_lens(look, camera);
     const gpu::Buffer block = upload_camera(*device, camera, cache.config(), model.origin);
     FrameInputs inputs = inputs_of(block, camera, look);
     inputs.sky = sky_of(look);
@@ -282,6 +284,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                          std::to_string(target.height) + " with " + std::to_string(target.channels) +
                          " channels, the camera " + std::to_string(camera.width) + "x" +
                          std::to_string(camera.height) + " RGB");
+    scene::check_lens(options, camera);
     passes::PassCache cache(*device);
     gpu::Executor executor(*device);
     const bool cut = !alpha_is_weight && transparent(target);
@@ -291,7 +294,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                                 .loss = weights,
                                 .masks = alpha_is_weight && target.channels == 4,
                                 .alpha = cut,
-                                .motion = true});
+                                .motion = camera.distortion.none()});
     const Model model = upload_model(*device, gaussians, plan.moment_buffers(), false);
     const gpu::Buffer block = upload_camera(*device, camera, cache.config(), model.origin);
     const gpu::Buffer photo = upload_photo(*device, target);

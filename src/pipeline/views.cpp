@@ -170,7 +170,8 @@ void FramePasses::update_views(const Model& model, const ViewBuffers& buffers, c
            update_views_push(model, rates, bands),
            {degree(),
             {shared::SPEC_MODE, update_mode(plan) | (bands > 1 ? shared::UPDATE_BANDS : 0)},
-            kernel(), lenses()});
+            kernel(),
+            lenses()});
 }
 
 Rates batch_rates(const Rates& rates) {

@@ -67,9 +67,10 @@ Second angle(const Second& y, const Second& x) {
     const double yy = -2 * x.value * y.value / (q * q), xx = -yy,
                  xy = (y.value * y.value - x.value * x.value) / (q * q);
     Second out{std::atan2(y.value, x.value), by_y * y.gradient + by_x * x.gradient};
-    out.hessian = by_y * y.hessian + by_x * x.hessian + yy * glm::outerProduct(y.gradient, y.gradient) +
-                  xx * glm::outerProduct(x.gradient, x.gradient) +
-                  xy * (glm::outerProduct(y.gradient, x.gradient) + glm::outerProduct(x.gradient, y.gradient));
+    out.hessian =
+        by_y * y.hessian + by_x * x.hessian + yy * glm::outerProduct(y.gradient, y.gradient) +
+        xx * glm::outerProduct(x.gradient, x.gradient) +
+        xy * (glm::outerProduct(y.gradient, x.gradient) + glm::outerProduct(x.gradient, y.gradient));
     return out;
 }
 

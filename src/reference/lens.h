@@ -22,7 +22,8 @@ struct Rows {
 };
 
 struct LensImage {
-    bool shown = false;   // in front of the near plane, and where the lens is one to one; else the rest is not set
+    bool shown =
+        false;  // in front of the near plane, and where the lens is one to one; else the rest is not set
     double depth = 0;     // z, or for a fisheye and equirectangular images the distance; world units
     glm::dvec2 pixel{0};  // px
     Rows exact;           // d(pixel)/dp

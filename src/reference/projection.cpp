@@ -151,10 +151,12 @@ double kernel_factor(Footprint kernel, const ProjectionSteps& s, double det) {
     return 0;
 }
 
-void evaluate_color(const Splat& splat, const Camera& camera, const RenderOptions& options, ProjectionSteps& s) {
+void evaluate_color(const Splat& splat, const Camera& camera, const RenderOptions& options,
+                    ProjectionSteps& s) {
     s.sh_degree = std::clamp(options.sh_degree, 0, splat.sh_degree);
     s.parallel = camera.distortion.lens == Lens::orthographic;
-    s.direction = s.parallel ? glm::transpose(camera.rotation) * glm::dvec3(0, 0, 1) : glm::normalize(s.offset);
+    s.direction =
+        s.parallel ? glm::transpose(camera.rotation) * glm::dvec3(0, 0, 1) : glm::normalize(s.offset);
     const auto basis = sh_basis(s.sh_degree, s.direction);
     s.raw_color = glm::dvec3(COLOR_OFFSET);
     for (int j = 0; j < sh_coefficients(s.sh_degree); ++j) s.raw_color += basis[j] * splat.sh[j];

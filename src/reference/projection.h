@@ -50,8 +50,9 @@ struct Projected {
     double a = 0, b = 0, c = 0;  // covariance with the low-pass, px^2
     double det = 0;              // of that covariance
     double opacity = 0;          // peak of the footprint, before the clamp to ALPHA_MAX
-    double around = 0;           // px from the splat to its next image, where the lens shows all around the camera; else 0
-    bool density = false;        // Footprint::density: `opacity` is the peak of the optical depth
+    double around =
+        0;  // px from the splat to its next image, where the lens shows all around the camera; else 0
+    bool density = false;  // Footprint::density: `opacity` is the peak of the optical depth
     glm::dvec3 color{0};
 };
 
@@ -66,8 +67,8 @@ double mean_shadow(const glm::dvec3& scale);
 
 /// Intermediate values for the backward pass.
 struct ProjectionSteps {
-    glm::dvec3 offset{0};         // mean - camera position
-    glm::dvec3 view{0};           // p
+    glm::dvec3 offset{0};  // mean - camera position
+    glm::dvec3 view{0};    // p
     LensImage image;
     glm::dvec2 slope{0};          // (tx, ty); of a pinhole, as the next
     glm::bvec2 slope_free{true};  // the clamp did not move it
@@ -81,7 +82,7 @@ struct ProjectionSteps {
     double sigmoid = 0;  // of the logit
     double peak = 0;     // that, or with Footprint::density softplus of the logit
     double kernel_factor = 0;
-    int sh_degree = 0;  // the lower of the request's and the scene's
+    int sh_degree = 0;      // the lower of the request's and the scene's
     bool parallel = false;  // every point is seen along the camera's axis
     glm::dvec3 direction{0};
     glm::dvec3 raw_color{0};  // before the max

@@ -386,6 +386,13 @@ std::vector<Row> rows() {
              "background's colour. none: neither is used. auto: ignore if there are mask files, else cut",
              [](RunOptions& o) -> MaskUse& { return o.masks; }, scene::kMaskWords)},
         {"Data", "",
+         choice<LensUse>(
+             "lens",
+             "What becomes of images through other lenses than a pinhole. native: splats are rendered "
+             "through the "
+             "lens. undistort: the images are resampled. auto: native for 360 degrees, else undistort",
+             [](RunOptions& o) -> LensUse& { return o.lens; }, scene::kLensWords)},
+        {"Data", "",
          number<int>(
              "test-every", "K", "Hold out every K-th image in name order. 0: none", kDecides,
              [](RunOptions& o) -> int& { return o.test_every; }, 0, 1000000000)},

@@ -86,6 +86,7 @@ std::string dataset_fingerprint(const Dataset& dataset, const Split& split) {
             add_camera(hash, frame.camera);
             add_camera(hash, frame.source);
             add_distortion(hash, frame.distortion);
+            if (!frame.camera.distortion.none()) add_distortion(hash, frame.camera.distortion);
             hash.add(frame.orientation);
             hash.add(int(frame.masks));
             hash.add(int(frame.mask_path.empty()));

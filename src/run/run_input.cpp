@@ -338,9 +338,10 @@ RunInput load_run(const RunOptions& options) {
     RunInput input;
     input.options = options;
     input.name = run_name(options);
-    input.dataset = load_dataset(
-        options.dataset,
-        {.downscale = options.downscale, .masks = options.masks, .max_width = options.max_width});
+    input.dataset = load_dataset(options.dataset, {.downscale = options.downscale,
+                                                   .masks = options.masks,
+                                                   .lens = options.lens,
+                                                   .max_width = options.max_width});
     input.split = split_frames(input.dataset, options.test_every);
     if (input.split.train.empty())
         throw InputError(fmt::format("{}: of {} images ({} missing) none is left to train on",

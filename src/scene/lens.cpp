@@ -250,6 +250,8 @@ Distortion for_longer_focal(Distortion d, double factor) {
 
 Camera undistorted_camera(const Camera& source, const Distortion& distortion) {
     if (distortion.none()) return source;
+    if (!has_pinhole(distortion.lens))
+        throw InputError("a pinhole cannot show these images; take --lens native");
     if (source.width < 2 || source.height < 2)
         throw InputError("a distorted image needs at least 2 x 2 pixels");
     const Inner inner = inner_border(source, distortion);

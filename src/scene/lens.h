@@ -29,6 +29,11 @@ glm::dvec2 distort(const Distortion& lens, glm::dvec2 ray);
 /// behind.
 std::optional<glm::dvec2> undistort(const Distortion& lens, glm::dvec2 point);
 
+/// Whether a pinhole can show a part of what the lens shows.
+inline bool has_pinhole(Lens lens) {
+    return lens != Lens::equirectangular && lens != Lens::orthographic;
+}
+
 /// Whether the model keeps the orientation around that ray. If it does not, it has folded over.
 bool one_to_one(const Distortion& lens, glm::dvec2 ray);
 

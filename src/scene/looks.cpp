@@ -4,6 +4,7 @@
 #include <array>
 
 #include "core/exclusion.h"
+#include "ewa/error.h"
 
 namespace ewa::scene {
 namespace {
@@ -47,6 +48,17 @@ constexpr std::array kRows{
 
 void check_look(const Look& look) {
     core::check_exclusions(kRows, look);
+}
+
+void check_lens(const RenderOptions& render, const Camera& camera) {
+    if (camera.distortion.none()) return;
+    const std::string_view option = render.points                            ? "--points"
+                                    : render.integrator != Integrator::splat ? "--integrator"
+                                    : render.sky                             ? "--background sky"
+                                                                             : "";
+    if (!option.empty())
+        throw InputError(std::string(option) +
+                         " draws through pinholes only; take --lens undistort for images of another lens");
 }
 
 }  // namespace ewa::scene

@@ -17,6 +17,8 @@ inline const core::Words<MaskUse> kMaskWords{{"auto", MaskUse::automatic},
                                              {"ignore", MaskUse::ignore},
                                              {"cut", MaskUse::cut},
                                              {"none", MaskUse::none}};
+inline const core::Words<LensUse> kLensWords{
+    {"auto", LensUse::automatic}, {"native", LensUse::native}, {"undistort", LensUse::undistort}};
 
 /// The options of a render, and which of them are given, be it with the usual value.
 struct Look {
@@ -26,5 +28,8 @@ struct Look {
 
 /// Throws InputError for options that exclude each other, or need another one.
 void check_look(const Look& look);
+
+/// Throws InputError where splats cannot be drawn so through the camera's lens.
+void check_lens(const RenderOptions& render, const Camera& camera);
 
 }  // namespace ewa::scene

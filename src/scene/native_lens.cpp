@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
 #include <optional>
@@ -76,6 +77,68 @@ bool is_native(const Distortion& d) {
     return d.lens == Lens::brown || d.lens == Lens::equirectangular || d.lens == Lens::orthographic;
 }
 
+std::optional<glm::dvec2> pixel_of(const Camera& camera, const glm::dvec3& p) {
+    const Distortion& d = camera.distortion;
+    const double depth = ordered_by_distance(d.lens) ? glm::length(p) : p.z;
+    if (!(depth > shared::NEAR_PLANE)) return std::nullopt;
+    glm::dvec2 plane;
+    if (d.lens == Lens::fisheye) {
+        const double r = std::hypot(p.x, p.y), angle = std::atan2(r, p.z);
+        if (!(angle <= lens_limit(camera))) return std::nullopt;
+        plane = r > 0 ? fisheye_distance(d, angle) / r * glm::dvec2(p) : glm::dvec2(0);
+    } else if (d.lens == Lens::equirectangular) {
+        plane = {std::atan2(p.x, p.z), std::atan2(p.y, std::hypot(p.x, p.z))};
+    } else if (d.lens == Lens::orthographic) {
+        plane = p;
+    } else {
+        const glm::dvec2 tangent = glm::dvec2(p) / p.z;
+        if (!(glm::dot(tangent, tangent) <= lens_limit(camera))) return std::nullopt;
+        plane = d.none() ? tangent : distort(d, tangent);
+    }
+    return glm::dvec2(camera.fx * plane.x + camera.cx, camera.fy * plane.y + camera.cy);
+}
+
+namespace {
+
+/// The angle from the axis whose image is at that distance from the principal point. The distance grows with the angle up to the
+/// limit.
+std::optional<double> angle_at(const Camera& camera, double distance) {
+    double low = 0, high = lens_limit(camera);
+    if (fisheye_distance(camera.distortion, high) < distance) return std::nullopt;
+    for (int i = 0; i < 60; ++i) {
+        const double middle = 0.5 * (low + high);
+        (fisheye_distance(camera.distortion, middle) < distance ? low : high) = middle;
+    }
+    return 0.5 * (low + high);
+}
+
+}  // namespace
+
+std::optional<PixelRay> ray_of(const Camera& camera, double x, double y) {
+    const glm::dvec2 plane((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy);
+    switch (camera.distortion.lens) {
+        case Lens::orthographic:
+            return PixelRay{{plane, 0}, {0, 0, 1}};
+        case Lens::equirectangular:
+            return PixelRay{{},
+                            {std::sin(plane.x) * std::cos(plane.y), std::sin(plane.y),
+                             std::cos(plane.x) * std::cos(plane.y)}};
+        case Lens::fisheye: {
+            const double r = glm::length(plane);
+            const auto angle = angle_at(camera, r);
+            if (!angle) return std::nullopt;
+            const glm::dvec2 way = r > 0 ? plane / r : glm::dvec2(0);
+            return PixelRay{{}, {std::sin(*angle) * way, std::cos(*angle)}};
+        }
+        default: {
+            const std::optional<glm::dvec2> tangent =
+                camera.distortion.none() ? plane : undistort(camera.distortion, plane);
+            if (!tangent) return std::nullopt;
+            return PixelRay{{}, glm::normalize(glm::dvec3(*tangent, 1))};
+        }
+    }
+}
+
 bool ordered_by_distance(Lens lens) {
     return lens == Lens::fisheye || lens == Lens::equirectangular;
 }
@@ -93,7 +156,8 @@ double lens_limit(const Camera& camera) {
 }
 
 TangentBounds tangent_bounds(const Camera& camera) {
-    const glm::dvec2 focal(camera.fx, camera.fy), center(camera.cx, camera.cy), size(camera.width, camera.height);
+    const glm::dvec2 focal(camera.fx, camera.fy), center(camera.cx, camera.cy),
+        size(camera.width, camera.height);
     const glm::dvec2 margin = shared::JACOBIAN_MARGIN * size / (2.0 * focal);
     TangentBounds bounds{-(center / focal + margin), (size - center) / focal + margin};
     const Distortion& lens = camera.distortion;

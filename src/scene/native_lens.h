@@ -2,6 +2,8 @@
 // What rendering through a lens needs to know of it, in place of an undistorted image. shaders/lib/lens.glsl has the formulas.
 #pragma once
 #include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
 
 #include "ewa/camera.h"
 
@@ -10,6 +12,17 @@ namespace ewa::scene {
 /// Whether splats can be rendered through this lens: a pinhole, brown, fisheye with its radial terms k1 to k4 alone,
 /// equirectangular or orthographic.
 bool is_native(const Distortion& lens);
+
+/// The pixel of a point in camera coordinates, through the camera's lens. Empty behind the camera and where the lens does not show
+/// it. The lens must be native.
+std::optional<glm::dvec2> pixel_of(const Camera& camera, const glm::dvec3& point);
+
+/// What a position in the image sees: from `origin` along `direction`, of unit length, in camera coordinates. Empty where the lens
+/// shows nothing. x, y: px from the top left corner.
+struct PixelRay {
+    glm::dvec3 origin{0}, direction{0};
+};
+std::optional<PixelRay> ray_of(const Camera& camera, double x, double y);
 
 /// Whether the splats of a view are ordered by their distance from the camera. Else they are by z.
 bool ordered_by_distance(Lens lens);

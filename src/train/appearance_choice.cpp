@@ -11,6 +11,7 @@
 #include "core/parallel.h"
 #include "image/image_files.h"
 #include "scene/frame_images.h"
+#include "scene/native_lens.h"
 #include "scene/statistics.h"
 
 namespace ewa::train {
@@ -57,12 +58,15 @@ std::vector<SeenPoint> seen_points(const Camera& camera, const PointCloud& point
     std::vector<SeenPoint> seen;
     for (size_t i = 0; i < points.positions.size(); i += stride) {
         const glm::dvec3 p = camera.rotation * points.positions[i] + camera.translation;
-        if (!(p.z > 0)) continue;
-        const double x = camera.fx * p.x / p.z + camera.cx, y = camera.fy * p.y / p.z + camera.cy;
-        if (!(x >= 0 && y >= 0 && x < camera.width && y < camera.height)) continue;
-        seen.push_back({i, int(x), int(y), float(p.z)});
-        float& depth = nearest_at(int(x), int(y));
-        depth = std::min(depth, float(p.z));
+        const auto pixel = scene::pixel_of(camera, p);
+        if (!pixel ||
+            !(pixel->x >= 0 && pixel->y >= 0 && pixel->x < camera.width && pixel->y < camera.height))
+            continue;
+        const auto distance =
+            float(scene::ordered_by_distance(camera.distortion.lens) ? glm::length(p) : p.z);
+        seen.push_back({i, int(pixel->x), int(pixel->y), distance});
+        float& depth = nearest_at(int(pixel->x), int(pixel->y));
+        depth = std::min(depth, distance);
     }
     std::erase_if(seen, [&](const SeenPoint& p) { return p.depth > kHiddenBehind * nearest_at(p.x, p.y); });
     return seen;

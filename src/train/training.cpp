@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "ewa/error.h"
+#include "scene/looks.h"
 #include "train/appearance_choice.h"
 
 namespace ewa::train {
@@ -33,7 +34,8 @@ std::vector<uint32_t> cameras_of(const Dataset& dataset, const std::vector<int>&
                 const Camera &a = frame.source, &b = other->source;
                 return a.width == b.width && a.height == b.height &&
                        (!lenses || (a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy &&
-                                    frame.distortion == other->distortion));
+                                    frame.distortion == other->distortion &&
+                                    frame.camera.distortion == other->camera.distortion));
             });
             cameras.push_back(uint32_t(same - seen.begin()));
             if (same == seen.end()) seen.push_back(&frame);
@@ -41,6 +43,19 @@ std::vector<uint32_t> cameras_of(const Dataset& dataset, const std::vector<int>&
         if (!lenses || seen.size() * kPhotosPerCamera <= frames.size() || seen.size() == 1) return cameras;
     }
     return {};
+}
+
+/// Throws InputError where the training needs pinholes, and an image has another lens.
+void check_lenses(const TrainOptions& options, const Dataset& dataset, const std::vector<int>& frames) {
+    for (const int index : frames) {
+        const Frame& frame = dataset.frames[size_t(index)];
+        if (frame.camera.distortion.none()) continue;
+        scene::check_lens(options.render, frame.camera);
+        if (options.refine_poses || options.sky)
+            throw InputError(std::string(options.sky ? "--background sky" : "--refine-poses") +
+                             " takes pinholes only, and frame \"" + frame.name +
+                             "\" has another lens; take --lens undistort");
+    }
 }
 
 /// Throws InputError unless each band of each image has a row of tiles. images: of the lowest resolution.
@@ -128,6 +143,7 @@ Training::Training(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
                  .moments = plan_.moment_buffers(),
                  .statistics = plan_.statistics}),
       several_(portions_, options.bands) {
+    check_lenses(options, dataset, frames);
     check_bands(options, tools_.cache.config(), images_.lowest());
     if (options.final_splats > 0)
         portions::check_portions(std::min(options.final_splats, portions_.splats()), portions_.all());

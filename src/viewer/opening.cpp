@@ -80,6 +80,7 @@ DatasetOptions images_of(const live::Run& run) {
     if (width != run.config.end() && width->is_number_integer())
         options.max_width = std::clamp(width->get<int>(), 0, 65535);
     options.masks = core::find_value(scene::kMaskWords, run.text("masks")).value_or(options.masks);
+    options.lens = core::find_value(scene::kLensWords, run.text("lens")).value_or(options.lens);
     return options;
 }
 

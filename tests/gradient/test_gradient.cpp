@@ -156,7 +156,8 @@ TEST(GradientThroughALens, IsTheSlopeOfTheReferencesLoss) {
                 tolerance.element_relative = 2e-3;
                 tolerance.element_absolute = 2e-4;
                 EXPECT_TRUE(gradients_agree(claimed, slope, tolerance)) << group_name << " of the reference";
-                EXPECT_TRUE(gradients_agree(std::vector<double>(of_device.begin(), of_device.end()), slope, tolerance))
+                EXPECT_TRUE(gradients_agree(std::vector<double>(of_device.begin(), of_device.end()), slope,
+                                            tolerance))
                     << group_name << " of the device";
             };
             const Gaussians& g = actual.gradient;

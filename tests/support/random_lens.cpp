@@ -60,7 +60,8 @@ std::vector<NamedCamera> random_lenses(uint64_t seed, int width, int height) {
     for (const bool plain : {true, false}) {
         Camera& fisheye =
             plain ? add("fisheye", {.lens = Lens::fisheye})
-                  : add("fisheye_bent", {.k1 = -0.03, .k2 = 0.004, .k3 = -0.002, .k4 = 0.0003, .lens = Lens::fisheye});
+                  : add("fisheye_bent",
+                        {.k1 = -0.03, .k2 = 0.004, .k3 = -0.002, .k4 = 0.0003, .lens = Lens::fisheye});
         fisheye.fx = 0.5 * short_side / half;
         fisheye.fy = 1.03 * fisheye.fx;
     }

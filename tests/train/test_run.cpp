@@ -339,6 +339,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                              {"frames", "0-3"},
                                              {"downscale", "2"},
                                              {"masks", "cut"},
+                                             {"lens", "native"},
                                              {"test-every", "5"},
                                              {"skip-blurred", "true"},
                                              {"seed", "18446744073709551615"},

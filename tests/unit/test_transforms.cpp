@@ -188,10 +188,17 @@ TEST(Transforms, Lenses) {
 }
 
 TEST(Transforms, OtherLensesAreNamed) {
-    for (const char* model : {"EQUIRECTANGULAR", "ORTHOPHOTO"}) {
+    Scene other;
+    other.model["camera_model"] = "ORTHOPHOTO";
+    other.refuse({"frame 0", "ORTHOPHOTO", "undistort"});
+    // No pinhole shows these.
+    for (const auto& [model, lens] :
+         {std::pair{"EQUIRECTANGULAR", Lens::equirectangular}, {"ORTHOGRAPHIC", Lens::orthographic}}) {
         Scene scene;
         scene.model["camera_model"] = model;
-        scene.refuse({"frame 0", model, "undistort"});
+        const Frame frame = scene.load().frames[0];
+        EXPECT_EQ(frame.camera.distortion.lens, lens);
+        EXPECT_TRUE(frame.distortion.none());
     }
     for (const char* key : {"k4", "k5", "ftheta_p0"}) {
         Scene scene;

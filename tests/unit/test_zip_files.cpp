@@ -28,7 +28,7 @@ std::string with_directory_bytes(std::string zip, size_t offset, const std::stri
 }
 
 /// What is wrong with an archive.
-void refuse(const std::string& bytes, std::initializer_list<std::string> texts) {
+void refuse_zip(const std::string& bytes, std::initializer_list<std::string> texts) {
     const test::TempFolder folder;
     folder.write("a.zip", bytes);
     test::expect_error<InputError>([&] { io::check_zip(folder / "a.zip"); }, texts);
@@ -58,32 +58,32 @@ TEST(ZipFiles, AreUnpackedWithTheirFolders) {
 
 TEST(ZipFiles, NamesStayInTheFolder) {
     for (const char* name : {"../a", "/etc/a", "a/../../b", "C:\\a", "..\\a"})
-        refuse(zip_of({{"good", "x"}, {name, "x"}}), {"a.zip: \"", "leads out of the folder"});
-    refuse(zip_of({{"a\nb", "x"}}), {"control character"});
-    refuse(zip_of({{std::string(300, 'a'), "x"}}), {"is too long"});
-    refuse(zip_of({{"a", "x"}, {"a", "y"}}), {"\"a\" is there twice"});
-    refuse(zip_of({{"a", "x"}, {"a/b", "y"}}), {"\"a\" is both a file and a folder"});
+        refuse_zip(zip_of({{"good", "x"}, {name, "x"}}), {"a.zip: \"", "leads out of the folder"});
+    refuse_zip(zip_of({{"a\nb", "x"}}), {"control character"});
+    refuse_zip(zip_of({{std::string(300, 'a'), "x"}}), {"is too long"});
+    refuse_zip(zip_of({{"a", "x"}, {"a", "y"}}), {"\"a\" is there twice"});
+    refuse_zip(zip_of({{"a", "x"}, {"a/b", "y"}}), {"\"a\" is both a file and a folder"});
     const std::string link = std::string("\0\0\xff\xa1", 4);  // mode 120777
-    refuse(with_directory_bytes(zip_of({{"a", "/etc/passwd"}}), 38, link), {"\"a\" is a link"});
+    refuse_zip(with_directory_bytes(zip_of({{"a", "/etc/passwd"}}), 38, link), {"\"a\" is a link"});
 }
 
 TEST(ZipFiles, BombsAreRefusedUnread) {
     const std::string zip = zip_of({{"a", "x"}});
     const std::string huge = "\xff\xff\xff\x7f", some = std::string("\0\0\1\0", 4);
-    refuse(with_directory_bytes(zip, 24, huge), {"a.zip: claims to unpack from", "2.15 GB"});
-    refuse(with_directory_bytes(zip, 20, some), {"\"a\" claims bytes that the archive does not have"});
-    refuse(with_directory_bytes(zip, 8, "\1"), {"\"a\" is encrypted"});
-    refuse(with_directory_bytes(zip, 10, "\x0c"), {"packed with method 12"});
+    refuse_zip(with_directory_bytes(zip, 24, huge), {"a.zip: claims to unpack from", "2.15 GB"});
+    refuse_zip(with_directory_bytes(zip, 20, some), {"\"a\" claims bytes that the archive does not have"});
+    refuse_zip(with_directory_bytes(zip, 8, "\1"), {"\"a\" is encrypted"});
+    refuse_zip(with_directory_bytes(zip, 10, "\x0c"), {"packed with method 12"});
 }
 
 TEST(ZipFiles, DamageIsAnError) {
     const std::string zip = zip_of({{"a", "some bytes"}, {"b", "more"}});
     std::string changed = zip;
     changed[changed.find("some")] = 'S';
-    refuse(changed, {"\"a\" is damaged or cut off"});
+    refuse_zip(changed, {"\"a\" is damaged or cut off"});
     // The last bytes are those of a comment, and zeros.
-    for (size_t size = 0; size + 4 < zip.size(); ++size) refuse(zip.substr(0, size), {"a.zip"});
-    refuse("PK\5\6" + std::string(18, '\0'), {"not a zip archive, or its directory at byte 22"});
+    for (size_t size = 0; size + 4 < zip.size(); ++size) refuse_zip(zip.substr(0, size), {"a.zip"});
+    refuse_zip("PK\5\6" + std::string(18, '\0'), {"not a zip archive, or its directory at byte 22"});
 }
 
 }  // namespace

@@ -69,6 +69,9 @@ class ColmapBuilder {
 
 using D = Distortion;
 
+/// Its two parameters are the width and height again.
+constexpr std::string_view kEquirectangular = "EQUIRECTANGULAR";
+
 // In the order of COLMAP's model ids. The terms are in the order of the file, after the principal point
 // (COLMAP, src/colmap/sensor/models.h).
 constexpr ColmapLens kLenses[] = {
@@ -94,7 +97,8 @@ constexpr ColmapLens kLenses[] = {
     {"DIVISION", 2, Lens::division, {&D::k1}},
     {"SIMPLE_FISHEYE", 1, Lens::fisheye, {}},
     {"FISHEYE", 2, Lens::fisheye, {}},
-    {"EUCM", 2, Lens::unified, {&D::k1, &D::k2}}};
+    {"EUCM", 2, Lens::unified, {&D::k1, &D::k2}},
+    {kEquirectangular, 0, Lens::equirectangular, {}}};
 
 constexpr uint64_t kMaxSize = 1u << 20;  // px
 
@@ -119,10 +123,14 @@ void ColmapBuilder::add_camera(uint32_t id, const ColmapLens& lens, uint64_t wid
     Camera camera;
     camera.width = static_cast<int>(width);
     camera.height = static_cast<int>(height);
-    camera.fx = parameters[0];
-    camera.fy = parameters[lens.focal_lengths - 1];
-    camera.cx = parameters[lens.focal_lengths];
-    camera.cy = parameters[lens.focal_lengths + 1];
+    if (lens.focal_lengths == 0) {
+        set_equirectangular(camera);
+    } else {
+        camera.fx = parameters[0];
+        camera.fy = parameters[lens.focal_lengths - 1];
+        camera.cx = parameters[lens.focal_lengths];
+        camera.cy = parameters[lens.focal_lengths + 1];
+    }
     Distortion distortion;
     for (size_t i = lens.focal_lengths + 2; i < parameters.size(); ++i)
         distortion.*lens.terms[i - lens.focal_lengths - 2] = parameters[i];

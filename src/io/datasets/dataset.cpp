@@ -14,6 +14,7 @@
 #include "io/datasets/image_records.h"
 #include "scene/camera.h"
 #include "scene/lens.h"
+#include "scene/native_lens.h"
 
 namespace ewa {
 
@@ -119,37 +120,53 @@ void fit_to_file(Frame& frame) {
     camera.cy *= y;
 }
 
-/// Cached pinhole cameras, one per lens: finding one takes some milliseconds, and most datasets have few
+/// The cameras that images are rendered through, one per lens: finding one takes some milliseconds, and most datasets have few
 /// lenses.
-class PinholeCache {
+class CameraCache {
   public:
+    explicit CameraCache(LensUse use) : use_(use) {}
+    /// A pinhole, or `source` with its lens.
     Camera of(const Camera& source, const Distortion& distortion) {
+        if (distortion.none()) return source;
         const auto known = std::find_if(known_.begin(), known_.end(), [&](const Known& k) {
             const Camera& c = k.source;
             return k.distortion == distortion && c.width == source.width && c.height == source.height &&
                    c.fx == source.fx && c.fy == source.fy && c.cx == source.cx && c.cy == source.cy;
         });
         if (known == known_.end()) {
-            known_.push_back({source, distortion, scene::undistorted_camera(source, distortion)});
-            return known_.back().pinhole;
+            known_.push_back({source, distortion, chosen(source, distortion)});
+            return known_.back().camera;
         }
-        Camera camera = known->pinhole;
+        Camera camera = known->camera;
         camera.rotation = source.rotation;
         camera.translation = source.translation;
         return camera;
     }
 
   private:
+    Camera chosen(const Camera& source, const Distortion& distortion) const {
+        Camera native = source;
+        native.distortion = distortion;
+        if (use_ == LensUse::native) {
+            if (!scene::is_native(distortion))
+                throw InputError("splats cannot be rendered through this lens model; take --lens undistort");
+            return native;
+        }
+        if (use_ == LensUse::automatic && !scene::has_pinhole(distortion.lens)) return native;
+        return scene::undistorted_camera(source, distortion);
+    }
+
     struct Known {
         Camera source;
         Distortion distortion;
-        Camera pinhole;
+        Camera camera;
     };
+    LensUse use_;
     std::vector<Known> known_;
 };
 
 Frame make_frame(const io::ImageRecord& image, const ImageFile& file, const DatasetOptions& options,
-                 PinholeCache& pinholes) {
+                 CameraCache& cameras) {
     Frame frame;
     frame.name = image.name;
     frame.image_path = file.path;
@@ -168,10 +185,10 @@ Frame make_frame(const io::ImageRecord& image, const ImageFile& file, const Data
         frame.source = narrowed(frame.source, int64_t(options.max_width) * frame.downscale);
         frame.reduced = frame.source.width < width;
     }
-    frame.distortion = image.distortion;
     frame.split = image.split;
     try {
-        frame.pinhole = pinholes.of(frame.source, frame.distortion);
+        frame.pinhole = cameras.of(frame.source, image.distortion);
+        if (frame.pinhole.distortion.none()) frame.distortion = image.distortion;
         frame.camera = downscale(frame.pinhole, frame.downscale);
     } catch (const InputError& error) {
         throw InputError(core::one_line("frame \"" + image.name + "\": " + error.what()));
@@ -274,7 +291,7 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
     dataset.first_dropped_point = std::move(model.dropped.first);
     std::stable_sort(model.images.begin(), model.images.end(),
                      [](const io::ImageRecord& a, const io::ImageRecord& b) { return a.name < b.name; });
-    PinholeCache pinholes;
+    CameraCache cameras(options.lens);
     const bool captured = is_file(dataset.root / "capture.json");
     for (const io::ImageRecord& image : model.images) {
         ImageFile file = find_image(image, model.folder, options.downscale);
@@ -282,7 +299,7 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
         dataset.missing_images += !file.exists;
         const bool usable = image.camera.width > 0 && (file.exists || !options.need_images);
         if (!usable) continue;
-        dataset.frames.push_back(make_frame(image, file, options, pinholes));
+        dataset.frames.push_back(make_frame(image, file, options, cameras));
         dataset.frames.back().mask_path = find_mask(image, model.folder, options.downscale);
     }
     settle_masks(dataset, options.masks);

@@ -88,6 +88,8 @@ Distortion read_lens(const Entry& entry) {
         return std::find(std::begin(list), std::end(list), name) != std::end(list);
     };
     const std::string model = entry.text("camera_model");
+    if (model == "EQUIRECTANGULAR") return {.lens = Lens::equirectangular};
+    if (model == "ORTHOGRAPHIC") return {.lens = Lens::orthographic};
     const json* flag = entry.find("is_fisheye");
     const bool fisheye = holds(kFisheye, model) || (flag && *flag != json(false) && *flag != json(0));
     if (!fisheye && !holds(kPerspective, model))
@@ -163,6 +165,10 @@ void read_intrinsics(const Entry& entry, ImageRecord& image) {
         camera.width = size.width;
         camera.height = size.height;
     } else {
+        return;
+    }
+    if (image.distortion.lens == Lens::equirectangular) {
+        io::set_equirectangular(camera);
         return;
     }
     if (const auto fl_x = entry.number("fl_x"))
@@ -282,8 +288,30 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
     return result;
 }
 
+namespace {
+
+/// The model of a native lens, with its terms.
+Json model_of(const Distortion& d) {
+    if (d.lens == Lens::equirectangular) return {{"camera_model", "EQUIRECTANGULAR"}};
+    if (d.lens == Lens::orthographic) return {{"camera_model", "ORTHOGRAPHIC"}};
+    if (d.lens == Lens::fisheye)
+        return {{"camera_model", "OPENCV_FISHEYE"}, {"k1", d.k1}, {"k2", d.k2}, {"k3", d.k3}, {"k4", d.k4}};
+    if (d.none()) return {{"camera_model", "PINHOLE"}};
+    return {{"camera_model", "FULL_OPENCV"},
+            {"k1", d.k1},
+            {"k2", d.k2},
+            {"p1", d.p1},
+            {"p2", d.p2},
+            {"k3", d.k3},
+            {"k4", d.k4},
+            {"k5", d.k5},
+            {"k6", d.k6}};
+}
+
+}  // namespace
+
 void write_transforms(const std::filesystem::path& path, const TransformsFile& file) {
-    Json top = {{"camera_model", "PINHOLE"}};
+    Json top = model_of(file.frames.empty() ? Distortion() : file.frames[0].camera.distortion);
     for (const auto& [key, text] : file.remarks) top[key] = text;
     if (!file.color_depends_on_view) top["view_dependent"] = false;
     if (!file.points.empty()) top["ply_file_path"] = file.points;
