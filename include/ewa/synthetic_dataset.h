@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ewa/appearance.h"
+#include "ewa/camera.h"
 #include "ewa/dataset.h"
 #include "ewa/device.h"
 
@@ -29,6 +30,11 @@ struct SyntheticOptions {
     /// ppisp: each image has an exposure and colours of its own, and all share a vignette and a response. Their means over
     /// all images change nothing. none: images are as develop makes them.
     AppearanceModel appearance = AppearanceModel::none;
+    /// The lens of all cameras, which scene::is_native accepts. Parallel rays give a world unit at the scene's middle the size that
+    /// the pinhole gives it.
+    Distortion lens{};
+    double fisheye_degrees =
+        180;             // what a fisheye's image shows along its smaller side: above 0, at most 360
     bool sky = false;    // images show the sky, and have no alpha; else they are transparent there
     bool force = false;  // replaces the views of another scene or of other options in the folder
 };
@@ -52,7 +58,7 @@ bool is_mesh_scene(const std::filesystem::path& path);
 /// transport.
 /// - images/*.png: 8 bit, sRGB's curve over min(1, radiance * 2^exposure), with alpha where the sky is
 ///   visible, unless SyntheticOptions::sky shows it.
-/// - depth/*.exr: camera z in world units, 0 for the sky.
+/// - depth/*.exr: camera z in world units, through another lens than a pinhole the distance; 0 for the sky.
 /// - points.ply: initial points.
 /// - appearance.json, with SyntheticOptions::appearance: what was applied to each image.
 /// - `photographs.json` identifies scene and options. A matching folder is continued. Views of another scene or of

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Finds what the centre of each pixel sees.
 // One invocation owns one pixel. It reads the mesh and the view. It writes the camera's z, the triangle and the weights
-// of its corners 1 and 2, floats by their bits. Without a triangle, z is 0.
+// of its corners 1 and 2, floats by their bits. Without a triangle, z is 0. Through a lens, z is the distance along the ray.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/traversal.glsl"
@@ -11,7 +11,9 @@ layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 6, scalar) uniform ViewUniform { TraceView view; };
 layout(set = 0, binding = 7, scalar) writeonly buffer Seen { uvec4 seen[]; };
 layout(set = 0, binding = 8, scalar) buffer Counted { TraceCounts counts; };
+layout(set = 0, binding = 9, scalar) readonly buffer PixelRays { float pixel_rays[]; };
 layout(push_constant, scalar) uniform Push { TracePush push; };
+#include "lib/pixel_rays.glsl"
 
 void main() {
     const uint pixel = item_index();
@@ -24,9 +26,12 @@ void main() {
     // The direction has z = 1, so distances along it are depths.
     const Ray ray = Ray(vec3(view.position[0], view.position[1], view.position[2]), d.x * row0 + d.y * row1 + row2, 3e38,
                         true, false, DEPTH_ALPHA, 0u);
-    const Hit hit = trace(ray, push.max_steps);
+    const PixelRay own = pixel_ray(at);
+    const bool sees = LENSES == 0u || own.direction != vec3(0.0);
+    const Hit hit = trace(LENSES == 0u ? ray : Ray(own.origin, own.direction, sees ? 3e38 : 0.0, true, false, DEPTH_ALPHA, 0u),
+                          push.max_steps);
     if (hit.unfinished) atomicAdd(counts.unfinished_rays, 1u);
-    const bool met = hit.triangle != NO_TRIANGLE;
+    const bool met = sees && hit.triangle != NO_TRIANGLE;
     seen[pixel] = met ? uvec4(floatBitsToUint(hit.distance), hit.triangle, floatBitsToUint(hit.barycentric))
                       : uvec4(0u, NO_TRIANGLE, 0u, 0u);
 }

@@ -17,7 +17,9 @@ layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 7, scalar) uniform ViewUniform { TraceView view; };
 layout(set = 0, binding = 8, scalar) buffer Sums { vec4 sums[]; };
 layout(set = 0, binding = 9, scalar) buffer Counted { TraceCounts counts; };
+layout(set = 0, binding = 10, scalar) readonly buffer PixelRays { float pixel_rays[]; };
 layout(push_constant, scalar) uniform Push { TracePush push; };
+#include "lib/pixel_rays.glsl"
 
 struct Path {
     vec3 origin, direction, throughput, radiance;
@@ -39,6 +41,10 @@ vec3 sky(vec3 direction) {
 
 Path start(uint pixel, uint sample_index) {
     const vec2 at = vec2(pixel % view.size[0], pixel / view.size[0]) + pair(pixel, sample_index, 0u);
+    if (LENSES != 0u) {
+        const PixelRay ray = pixel_ray(at);
+        return Path(ray.origin, ray.direction, vec3(1.0), vec3(0.0), 0.0, 0.0, 0.0, 0u);
+    }
     const vec3 d = vec3((at - vec2(view.center[0], view.center[1])) / vec2(view.focal[0], view.focal[1]), 1.0);
     const vec3 row0 = vec3(view.rotation[0], view.rotation[1], view.rotation[2]);
     const vec3 row1 = vec3(view.rotation[3], view.rotation[4], view.rotation[5]);
@@ -71,6 +77,7 @@ vec3 lit(Path path, uint pixel, uint sample_index, Reflector r, mat3 frame, vec3
 
 // Extends the path by one surface. Returns whether the path continues.
 bool meet(inout Path path, uint pixel, uint sample_index) {
+    if (LENSES != 0u && path.direction == vec3(0.0)) return false;
     const uvec4 chance = words(pixel ^ 0x5bd1e995u, sample_index * 32u + path.turn);
     const Hit hit = search(path.origin, path.direction, 3e38, path.turn == 0u, false, chance.x);
     if (hit.triangle == NO_TRIANGLE) {

@@ -4,6 +4,9 @@
 #include <CLI/CLI.hpp>
 
 #include <memory>
+#include <sstream>
+#include <string>
+#include <vector>
 
 #include "cli/arguments.h"
 #include "cli/command.h"
@@ -18,12 +21,44 @@ namespace fs = std::filesystem;
 
 struct DatasetArguments {
     fs::path scene, output;
-    std::string size = "256x256", exposure = "auto";
+    std::string size = "256x256", exposure = "auto", lens;
     int views = -1;
     SyntheticOptions options;
     DeviceOptions device;
     bool varied = false, quiet = false;
 };
+
+constexpr const char* kLensForms = "fisheye[:DEGREES], equirect, ortho or opencv:K1[,K2[,P1,P2]]";
+
+/// From text such as fisheye:190.
+void set_lens(const std::string& text, SyntheticOptions& options) {
+    const size_t colon = text.find(':');
+    const std::string name = text.substr(0, colon);
+    std::vector<double> numbers;
+    std::stringstream list(colon == std::string::npos ? "" : text.substr(colon + 1));
+    for (std::string word; std::getline(list, word, ',');) {
+        const auto number = core::parse_number(word);
+        if (!number) throw InputError("--lens: '" + word + "' is not a number; expected " + kLensForms);
+        numbers.push_back(*number);
+    }
+    const size_t most = name == "fisheye" ? 1 : name == "opencv" ? 4 : 0;
+    const bool good = name == "fisheye" || name == "equirect" || name == "ortho" ||
+                      (name == "opencv" && !numbers.empty() && numbers.size() != 3);
+    if (!good || numbers.size() > most)
+        throw InputError("--lens: '" + text + "' is no lens; expected " + kLensForms);
+    Distortion& lens = options.lens;
+    if (name == "fisheye") {
+        lens.lens = Lens::fisheye;
+        if (!numbers.empty()) options.fisheye_degrees = numbers[0];
+    } else if (name == "equirect") {
+        lens.lens = Lens::equirectangular;
+    } else if (name == "ortho") {
+        lens.lens = Lens::orthographic;
+    } else {
+        numbers.resize(4);
+        lens = {.k1 = numbers[0], .k2 = numbers[1], .p1 = numbers[2], .p2 = numbers[3]};
+    }
+}
 
 int run(const DatasetArguments& arguments) {
     io::check_not_inside_dataset("-o", arguments.output);
@@ -32,6 +67,7 @@ int run(const DatasetArguments& arguments) {
     options.width = size.width;
     options.height = size.height;
     if (arguments.views >= 0) options.views = arguments.views;
+    if (!arguments.lens.empty()) set_lens(arguments.lens, options);
     if (arguments.varied) options.appearance = AppearanceModel::ppisp;
     if (arguments.exposure != "auto") {
         options.exposure = core::parse_number(arguments.exposure);
@@ -79,6 +115,9 @@ Action add_dataset(CLI::App& app) {
         "--vary-appearance", arguments->varied,
         "Give each image an exposure and colours of its own, and the camera a vignette and a response. "
         "DIR/appearance.json has them");
+    app.add_option("--lens", arguments->lens,
+                   std::string("The lens of all cameras, in place of a pinhole: ") + kLensForms)
+        ->type_name("LENS");
     app.add_flag("--sky", options.sky, "Show the sky in the images, which else are transparent there");
     app.add_option("--seed", options.seed,
                    "Seed of random numbers. The same seed on the same device gives the same bytes")

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "ewa/error.h"
+#include "scene/native_lens.h"
 
 namespace ewa::pathtracer {
 
@@ -78,15 +79,38 @@ gpu::Buffer PathTracer::view_of(const Camera& camera, double brightest) {
     return buffer;
 }
 
-shared::TraceCounts PathTracer::trace_paths(const gpu::Buffer& view, uint64_t pixels, int samples,
-                                            uint64_t seed) {
+PathTracer::View PathTracer::see(const Camera& camera, double brightest) {
+    View view{view_of(camera, brightest), {}, variant_};
+    const bool lens = !camera.distortion.none();
+    view.variant.push_back({shared::SPEC_LENSES, lens ? 1u : 0u});
+    std::vector<float> rays(lens ? 0 : shared::PIXEL_RAY_FLOATS);
+    const glm::dmat3 to_world = glm::transpose(camera.rotation);
+    for (int y = 0; lens && y <= camera.height; ++y)
+        for (int x = 0; x <= camera.width; ++x) {
+            const auto ray = scene::ray_of(camera, x, y);
+            const glm::dvec3 origin =
+                (camera.position() + (ray ? to_world * ray->origin : glm::dvec3(0)) - origin_) / unit_;
+            const glm::dvec3 direction = ray ? to_world * ray->direction : glm::dvec3(0);
+            for (int i = 0; i < 3; ++i) rays.push_back(float(origin[i]));
+            for (int i = 0; i < 3; ++i) rays.push_back(float(direction[i]));
+        }
+    view.rays = gpu::Buffer(*device_, "pixel rays", rays.size() * sizeof(float));
+    view.rays.upload(std::span<const float>(rays));
+    return view;
+}
+
+shared::TraceCounts PathTracer::trace_paths(const View& view, uint64_t pixels, int samples, uint64_t seed) {
     shared::TracePush push{};
     push.max_steps = steps_for(cache_.config(), samples_at_once_);
     push.lights = light_count_;
     push.seed[0] = uint32_t(seed);
     push.seed[1] = uint32_t(seed >> 32);
-    const passes::TracePaths buffers{
-        .mesh = mesh(), .lights = lights_, .view = view, .sums = sums_, .counts = counts_.buffer()};
+    const passes::TracePaths buffers{.mesh = mesh(),
+                                     .lights = lights_,
+                                     .view = view.block,
+                                     .sums = sums_,
+                                     .counts = counts_.buffer(),
+                                     .pixel_rays = view.rays};
     const passes::Groups groups = passes::element_groups(cache_.config(), pixels);
     for (int first = 0; first < samples; first += samples_at_once_) {
         push.first_sample = uint32_t(first);
@@ -97,7 +121,7 @@ shared::TraceCounts PathTracer::trace_paths(const gpu::Buffer& view, uint64_t pi
             recording.fill(sums_, 0, 0, pixels * 16);
             counts_.clear(recording);
         }
-        cache_.get<passes::TracePaths>(variant_).record(recording, buffers, push, groups);
+        cache_.get<passes::TracePaths>(view.variant).record(recording, buffers, push, groups);
         if (first + samples_at_once_ >= samples) counts_.record(recording);
         executor_.run(recording);
     }
@@ -105,7 +129,7 @@ shared::TraceCounts PathTracer::trace_paths(const gpu::Buffer& view, uint64_t pi
 }
 
 Image PathTracer::radiance(const Camera& camera, int samples, uint64_t seed, double brightest) {
-    const gpu::Buffer view = view_of(camera, brightest);
+    const View view = see(camera, brightest);
     const uint64_t pixels = uint64_t(camera.width) * uint64_t(camera.height);
     if (!sums_ || sums_.bytes() < pixels * 16) {
         sums_ = {};
@@ -125,16 +149,21 @@ Image PathTracer::radiance(const Camera& camera, int samples, uint64_t seed, dou
 }
 
 PathTracer::Seen PathTracer::seen(const Camera& camera) {
-    const gpu::Buffer view = view_of(camera, 0);
+    const View view = see(camera, 0);
     const uint64_t pixels = uint64_t(camera.width) * uint64_t(camera.height);
     const gpu::Buffer found(*device_, "seen", pixels * 16);
     shared::TracePush push{};
     push.max_steps = cache_.config().loop_limit - 1;
     gpu::Recording recording(device_->limits());
     counts_.clear(recording);
-    cache_.get<passes::TraceDepth>(variant_).record(
-        recording, {.mesh = mesh(), .view = view, .seen = found, .counts = counts_.buffer()}, push,
-        passes::element_groups(cache_.config(), pixels));
+    cache_.get<passes::TraceDepth>(view.variant)
+        .record(recording,
+                {.mesh = mesh(),
+                 .view = view.block,
+                 .seen = found,
+                 .counts = counts_.buffer(),
+                 .pixel_rays = view.rays},
+                push, passes::element_groups(cache_.config(), pixels));
     counts_.record(recording);
     executor_.run(recording);
     unfinished_ += counts_.read().unfinished_rays;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A packed scene on a device, and renders of it through pinholes.
+// A packed scene on a device, and renders of it through any lens.
 #pragma once
 #include <memory>
 #include <optional>
@@ -27,7 +27,8 @@ class PathTracer {
     Image radiance(const Camera& camera, int samples, uint64_t seed, double brightest);
 
     struct Seen {
-        Image depth;  // one channel: camera z of the pixel's centre in world units, 0: nothing
+        Image
+            depth;  // one channel: camera z of the pixel's centre, or through a lens its distance, in world units; 0: nothing
         std::vector<uint32_t> triangles;  // sorted index in PackedScene::order, 0xffffffff: none
     };
     Seen seen(const Camera& camera);
@@ -38,8 +39,13 @@ class PathTracer {
 
   private:
     gpu::Buffer upload(const char* name, const std::vector<uint32_t>& words, gpu::Texel texel);
+    struct View {
+        gpu::Buffer block, rays;
+        passes::Constants variant;
+    };
+    View see(const Camera& camera, double brightest);
     gpu::Buffer view_of(const Camera& camera, double brightest);
-    shared::TraceCounts trace_paths(const gpu::Buffer& view, uint64_t pixels, int samples, uint64_t seed);
+    shared::TraceCounts trace_paths(const View& view, uint64_t pixels, int samples, uint64_t seed);
     passes::MeshBuffers mesh() const;
 
     std::shared_ptr<gpu::Device> device_;

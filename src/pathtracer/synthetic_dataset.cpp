@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
@@ -23,6 +25,7 @@
 #include "pathtracer/path_tracer.h"
 #include "pathtracer/virtual_camera.h"
 #include "scene/camera.h"
+#include "scene/native_lens.h"
 #include "shared/constants.h"
 
 namespace ewa {
@@ -46,11 +49,36 @@ void check(const SyntheticOptions& o) {
     within("height", o.height, 1, 16384);
     within("samples", o.samples, 1, 65536);
     within("points", o.points, 0, 10000000);
+    if (!scene::is_native(o.lens)) throw InputError("lens: splats cannot be rendered through it");
+    if (!(o.fisheye_degrees > 0 && o.fisheye_degrees <= 360))
+        throw InputError("lens: the angle is not in 0 .. 360");
     if (o.exposure && !(std::abs(*o.exposure) <= 60)) throw InputError("exposure: is not in -60 .. 60 stops");
 }
 
-std::vector<Camera> cameras_for(const scene::MeshScene& scene, const SyntheticOptions& o,
-                                const std::string& name) {
+/// The view of the pinhole through the lens. middle: of the scene.
+Camera through_lens(Camera camera, const SyntheticOptions& o, const glm::dvec3& middle) {
+    camera.distortion = o.lens;
+    if (o.lens.lens == Lens::fisheye)
+        camera.fx = camera.fy = std::min(camera.width, camera.height) / glm::radians(o.fisheye_degrees);
+    if (o.lens.lens == Lens::equirectangular) io::set_equirectangular(camera);
+    if (o.lens.lens == Lens::orthographic) {
+        const double distance = std::max(1e-9, glm::length(camera.position() - middle));
+        camera.fx /= distance;
+        camera.fy /= distance;
+    }
+    return camera;
+}
+
+/// What a position in the image sees at this depth.
+glm::dvec3 point_at(const Camera& camera, double x, double y, double depth) {
+    if (camera.distortion.none()) return world_point(camera, x, y, depth);
+    const auto ray = scene::ray_of(camera, x, y);
+    if (!ray) return camera.position();
+    return glm::transpose(camera.rotation) * (ray->origin + depth * ray->direction - camera.translation);
+}
+
+std::vector<Camera> pinholes_for(const scene::MeshScene& scene, const SyntheticOptions& o,
+                                 const std::string& name) {
     const size_t in_file = scene.cameras.size();
     const bool from_file = o.views ? *o.views == 0 : in_file >= kEnoughCameras;
     if (!from_file)
@@ -61,6 +89,15 @@ std::vector<Camera> cameras_for(const scene::MeshScene& scene, const SyntheticOp
     std::vector<Camera> cameras;
     for (const scene::FileCamera& camera : scene.cameras)
         cameras.push_back(pathtracer::pinhole_of(camera, o.width, o.height));
+    return cameras;
+}
+
+std::vector<Camera> cameras_for(const scene::MeshScene& scene, const SyntheticOptions& o,
+                                const std::string& name) {
+    std::vector<Camera> cameras = pinholes_for(scene, o, name);
+    if (o.lens.none()) return cameras;
+    const glm::dvec3 middle = scene::bounds_of(scene).center();
+    for (Camera& camera : cameras) camera = through_lens(camera, o, middle);
     return cameras;
 }
 
@@ -114,6 +151,11 @@ std::string RenderJob::fingerprint() const {
     hash.add(options.exposure.value_or(1e9));
     if (options.appearance != AppearanceModel::none) hash.add(double(options.appearance));
     if (options.sky) hash.add(std::string("sky"));
+    if (const Distortion& d = options.lens; !d.none()) {
+        hash.add(int(d.lens));
+        for (const double term : {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4})
+            hash.add(term);
+    }
     char text[17];
     std::snprintf(text, sizeof(text), "%016llx", static_cast<unsigned long long>(hash.value()));
     return text;
@@ -295,7 +337,7 @@ class DatasetJob {
                 const int x = int(u[0] * camera.width), y = int(u[1] * camera.height);
                 const double z = double(depth.at(x, y)[0]);
                 if (!(z > 0) || (image.channels == 4 && image.at(x, y)[3] < 0.5f)) continue;
-                cloud.positions.push_back(world_point(camera, x + 0.5, y + 0.5, z));
+                cloud.positions.push_back(point_at(camera, x + 0.5, y + 0.5, z));
                 std::array<uint8_t, 3> color;
                 for (size_t c = 0; c < 3; ++c)
                     color[c] = uint8_t(std::lround(double(image.at(x, y)[c]) * 255));

@@ -10,6 +10,7 @@
 
 #include "core/random.h"
 #include "scene/color.h"
+#include "scene/native_lens.h"
 #include "scene/statistics.h"
 
 namespace ewa::pathtracer {
@@ -73,8 +74,9 @@ float developed(double value) {
 void show_sky(Image& radiance, const Camera& camera, const scene::Sky& sky) {
     for (int y = 0; y < radiance.height; ++y)
         for (int x = 0; x < radiance.width; ++x) {
-            const glm::dvec3 ray((x + 0.5 - camera.cx) / camera.fx, (y + 0.5 - camera.cy) / camera.fy, 1);
-            const float up = float(glm::normalize(glm::transpose(camera.rotation) * ray).y);
+            const auto ray = scene::ray_of(camera, x + 0.5, y + 0.5);
+            if (!ray) continue;
+            const float up = float((glm::transpose(camera.rotation) * ray->direction).y);
             const glm::vec3 color = glm::mix(sky.horizon, up >= 0 ? sky.zenith : sky.ground, std::abs(up));
             float* pixel = radiance.at(x, y);
             for (int c = 0; c < 3; ++c) pixel[c] += (1 - pixel[3]) * color[c];

@@ -78,6 +78,60 @@ TEST(Dataset, SkyIsVisibleOrTransparent) {
     EXPECT_EQ(run_ewa(visible).status, 2) << "images of other options are not replaced";
 }
 
+/// Points are where the rays of the lens meet the surfaces: on those that pinholes see from the same places.
+TEST(Dataset, IsRenderedThroughLenses) {
+    const Folder folder;
+    const auto rendered = [&](const std::string& name, const std::vector<std::string>& more) {
+        std::vector<std::string> all{"dataset",   kScenes + "tea_table.gltf",
+                                     "-o",        folder / name,
+                                     "--views",   "0",
+                                     "--size",    "96x48",
+                                     "--samples", "1",
+                                     "--points",  "2000"};
+        all.insert(all.end(), more.begin(), more.end());
+        const Outcome made = run_ewa(all);
+        EXPECT_EQ(made.status, 0) << made.err;
+        return ewa::load_dataset(folder / name, {.lens = ewa::LensUse::native});
+    };
+    const ewa::Dataset pinholes = rendered("pinhole", {});
+    for (const auto& [text, lens] : {std::pair{"fisheye:190", ewa::Lens::fisheye},
+                                     {"equirect", ewa::Lens::equirectangular},
+                                     {"ortho", ewa::Lens::orthographic},
+                                     {"opencv:-0.1,0.02,0.01,-0.01", ewa::Lens::brown}}) {
+        SCOPED_TRACE(text);
+        const ewa::Dataset dataset = rendered(text, {"--lens", text});
+        const ewa::Camera& camera = dataset.frames[0].camera;
+        EXPECT_EQ(camera.distortion.lens, lens);
+        EXPECT_FALSE(camera.distortion.none());
+        EXPECT_EQ(camera.position(), pinholes.frames[0].camera.position());
+        int seen = 0, there = 0;
+        for (size_t view = 0; view < pinholes.frames.size(); view += 8) {
+            const ewa::Camera& from = pinholes.frames[view].camera;
+            const nlohmann::json top = read_json(folder / "pinhole/transforms.json");
+            const ewa::Image depth = ewa::load_image(
+                folder / ("pinhole/" + top["frames"][view]["depth_file_path"].get<std::string>()));
+            for (const glm::dvec3& point : dataset.points.positions) {
+                const glm::dvec3 p = from.rotation * point + from.translation;
+                const double x = from.fx * p.x / p.z + from.cx, y = from.fy * p.y / p.z + from.cy;
+                if (!(p.z > 0 && x >= 0 && x < 96 && y >= 0 && y < 48)) continue;
+                const double z = double(*depth.at(int(x), int(y)));
+                // Behind another surface a point says nothing; in front of all, it would be in the air.
+                if (p.z > 1.03 * z) continue;
+                ++seen;
+                there += std::abs(p.z - z) < 0.03 * z;
+            }
+        }
+        EXPECT_GT(seen, 100);
+        EXPECT_GT(there, 0.94 * seen);
+    }
+    const Outcome info = run_ewa({"info", folder / "equirect"});
+    EXPECT_NE(info.out.find("rendered through 360 degrees"), std::string::npos) << info.out;
+    for (const char* wrong : {"fishey", "fisheye:x", "opencv", "opencv:1,2,3", "equirect:2", "fisheye:400"})
+        EXPECT_EQ(
+            run_ewa({"dataset", kScenes + "tea_table.gltf", "-o", folder / "no", "--lens", wrong}).status, 2)
+            << wrong;
+}
+
 TEST(Dataset, GoesOnWhereItWasEnded) {
     const Folder folder;
     ASSERT_EQ(run_ewa(small("railing.gltf", folder / "d")).status, 0);

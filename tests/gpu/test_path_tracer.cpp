@@ -8,7 +8,9 @@
 #include "pathtracer/path_tracer.h"
 #include "pathtracer/virtual_camera.h"
 #include "reference/tracing.h"
+#include "scene/native_lens.h"
 #include "support/mesh_scenes.h"
+#include "support/random_lens.h"
 
 namespace {
 
@@ -392,6 +394,48 @@ TEST(PathTracer, RaysAgreeWithTheCpuReference) {
         }
     EXPECT_GE(same, 64 * 48 - 3);  // float32 may see another triangle along an edge
     EXPECT_GT(hits, 500);
+}
+
+/// Through a lens, the centre of a pixel sees what its ray meets, and so do the paths of the pixel.
+TEST(PathTracer, SeesThroughLenses) {
+    scene::MeshScene scene = test::random_triangles(4, 4000);
+    scene.materials[0].two_sided = true;
+    const pathtracer::PackedScene packed = pathtracer::pack(scene, {});
+    const auto triangles = pathtracer::device_triangles(packed);
+    const auto nodes = pathtracer::device_nodes(packed);
+    for (const auto& [name, lens] : test::random_lenses(6700, 60, 40)) {
+        SCOPED_TRACE(name);
+        Camera camera = test::camera_down_z({0.5, 0.25, 12}, 60, 40, 60);
+        for (double Camera::*value : {&Camera::fx, &Camera::fy, &Camera::cx, &Camera::cy})
+            camera.*value = lens.*value;
+        camera.distortion = lens.distortion;
+        PathTracer tracer(test::device(), packed, {});
+        const auto seen = tracer.seen(camera);
+        const Image radiance = tracer.radiance(camera, 4, 1, 10);
+        int same = 0, hits = 0, covered = 0;
+        for (int y = 0; y < 40; ++y)
+            for (int x = 0; x < 60; ++x) {
+                const auto ray = scene::ray_of(camera, x + 0.5, y + 0.5);
+                const glm::dmat3 to_world = glm::transpose(camera.rotation);
+                std::optional<reference::Hit> hit;
+                if (ray)
+                    hit = reference::trace(
+                        {(camera.position() + to_world * ray->origin - packed.origin) / packed.unit,
+                         to_world * ray->direction},
+                        nodes, triangles);
+                const reference::Hit met = hit.value_or(reference::Hit{});
+                const uint32_t found = seen.triangles[size_t(y) * 60 + size_t(x)];
+                same += found == (hit ? met.triangle : 0xffffffffu);
+                covered += (radiance.at(x, y)[3] >= 0.5f) == bool(hit);
+                if (!hit || found != met.triangle) continue;
+                ++hits;
+                EXPECT_NEAR(double(seen.depth.at(x, y)[0]), met.distance * packed.unit, 0.2);
+            }
+        // Rays between the corners of a pixel are interpolated: along an edge they may meet another triangle.
+        EXPECT_GE(same, 0.97 * 60 * 40);
+        EXPECT_GE(covered, 0.9 * 60 * 40);
+        EXPECT_GT(hits, 100);
+    }
 }
 
 TEST(PathTracer, RaysThatTakeTooManyStepsAreCounted) {
