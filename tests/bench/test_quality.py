@@ -181,7 +181,7 @@ class Runs(WithPrograms):
 
     def test_what_cannot_be_used_is_refused_with_one_line(self):
         for words, expected in [
-                (["nosuch"], "there is no dataset 'nosuch': expected a scene (plaster, railing, tea_table), the name of a folder in"),
+                (["nosuch"], "there is no dataset 'nosuch': expected a scene (orchard, plaster, railing, tea_table), the name of a folder in"),
                 ([self.folder], "not a dataset"), (["one", "--steps", "100,0"], "'100,0': expected numbers such as 250,7k"),
                 (["one", "--seeds", "x"], "whole numbers"), (["one", "--strategies", "none,best"], "default, adc, mcmc, none"),
                 (["one", "--nonsense"], "unrecognized arguments: --nonsense"), (["one", self.folder / "deep/one"], "two datasets"),
