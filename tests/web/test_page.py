@@ -154,7 +154,9 @@ class PageTest(unittest.TestCase):
     def test_the_film_plays_and_stops(self):
         self.open("page.html")
         ActionChains(self.driver).send_keys(Keys.SPACE).perform()
-        time.sleep(0.5)
+        end = time.monotonic() + PATIENCE
+        while self.driver.find_element(By.ID, "play").text != "⏸" and time.monotonic() < end:
+            time.sleep(0.1)
         self.assertEqual(self.driver.find_element(By.ID, "play").text, "⏸")
         ActionChains(self.driver).send_keys(Keys.SPACE).perform()
         self.settled()
