@@ -33,7 +33,8 @@ Gaussians sky_splats(const SkyMap& sky, const Gaussians& scene) {
     out.resize(size_t(sky.size) * size_t(sky.size));
     for (size_t i = 0; i < out.size(); ++i) {
         const auto place = [&](double along) { return 2 * (along + 0.5) / sky.size - 1; };
-        const double column = double(i % size_t(sky.size)), row = double(i / size_t(sky.size));
+        const size_t row_number = i / size_t(sky.size);
+        const double column = double(i % size_t(sky.size)), row = double(row_number);
         const glm::dvec3 direction = map_direction(place(column), place(row));
         // Half a texel to each side does not leave the map.
         const double across = glm::distance(map_direction(place(column - 0.5), place(row)),
