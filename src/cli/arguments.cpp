@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <functional>
 #include <memory>
 
 #include "cli/interrupt.h"
@@ -278,31 +279,31 @@ void add_view_positionals(CLI::App& app, ViewArguments& arguments) {
         ->type_name("");
 }
 
+namespace {
+
+/// An option of a training run, with its words and help. take: from a run that has the value.
+void add_word_of_run(CLI::App& app, const std::string& name,
+                     const std::function<void(const RunOptions&)>& take) {
+    const train::RunOption& option = train::run_option(name);
+    app.add_option_function<std::string>(
+           "--" + name,
+           [&option, take](const std::string& text) {
+               RunOptions run;
+               option.set(run, text);
+               take(run);
+           },
+           option.help)
+        ->transform(one_of(option.choices))
+        ->default_str("auto");
+}
+
+}  // namespace
+
 void add_view_options(CLI::App& app, ViewArguments& arguments) {
     add_draw_options(app, arguments.draw);
     add_size_options(app, arguments.downscale, arguments.max_width);
-    const train::RunOption& masks = train::run_option("masks");
-    app.add_option_function<std::string>(
-           "--masks",
-           [&masks, &arguments](const std::string& text) {
-               RunOptions run;
-               masks.set(run, text);
-               arguments.masks = run.masks;
-           },
-           masks.help)
-        ->transform(one_of(masks.choices))
-        ->default_str("auto");
-    const train::RunOption& lens = train::run_option("lens");
-    app.add_option_function<std::string>(
-           "--lens",
-           [&lens, &arguments](const std::string& text) {
-               RunOptions run;
-               lens.set(run, text);
-               arguments.lens = run.lens;
-           },
-           lens.help)
-        ->transform(one_of(lens.choices))
-        ->default_str("auto");
+    add_word_of_run(app, "masks", [&arguments](const RunOptions& run) { arguments.masks = run.masks; });
+    add_word_of_run(app, "lens", [&arguments](const RunOptions& run) { arguments.lens = run.lens; });
     add_device_options(app, arguments.device);
 }
 
