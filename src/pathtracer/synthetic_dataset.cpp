@@ -60,7 +60,7 @@ Camera through_lens(Camera camera, const SyntheticOptions& o, const glm::dvec3& 
     camera.distortion = o.lens;
     if (o.lens.lens == Lens::fisheye)
         camera.fx = camera.fy = std::min(camera.width, camera.height) / glm::radians(o.fisheye_degrees);
-    if (o.lens.lens == Lens::equirectangular) io::set_equirectangular(camera);
+    if (o.lens.lens == Lens::equirectangular) scene::set_equirectangular(camera);
     if (o.lens.lens == Lens::orthographic) {
         const double distance = std::max(1e-9, glm::length(camera.position() - middle));
         camera.fx /= distance;

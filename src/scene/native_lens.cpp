@@ -139,6 +139,13 @@ std::optional<PixelRay> ray_of(const Camera& camera, double x, double y) {
     }
 }
 
+void set_equirectangular(Camera& camera) {
+    camera.fx = camera.width / (2 * std::numbers::pi);
+    camera.fy = camera.height / std::numbers::pi;
+    camera.cx = 0.5 * camera.width;
+    camera.cy = 0.5 * camera.height;
+}
+
 bool ordered_by_distance(Lens lens) {
     return lens == Lens::fisheye || lens == Lens::equirectangular;
 }

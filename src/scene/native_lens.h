@@ -24,6 +24,9 @@ struct PixelRay {
 };
 std::optional<PixelRay> ray_of(const Camera& camera, double x, double y);
 
+/// Gives the camera the focal lengths and principal point of an equirectangular image of all directions.
+void set_equirectangular(Camera& camera);
+
 /// Whether the splats of a view are ordered by their distance from the camera. Else they are by z.
 bool ordered_by_distance(Lens lens);
 

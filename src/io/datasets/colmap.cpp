@@ -18,6 +18,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/datasets/image_records.h"
+#include "scene/native_lens.h"
 
 namespace ewa::io {
 
@@ -124,7 +125,7 @@ void ColmapBuilder::add_camera(uint32_t id, const ColmapLens& lens, uint64_t wid
     camera.width = static_cast<int>(width);
     camera.height = static_cast<int>(height);
     if (lens.focal_lengths == 0) {
-        set_equirectangular(camera);
+        scene::set_equirectangular(camera);
     } else {
         camera.fx = parameters[0];
         camera.fy = parameters[lens.focal_lengths - 1];

@@ -4,7 +4,6 @@
 #pragma once
 #include <filesystem>
 #include <functional>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
@@ -42,14 +41,6 @@ struct ImageRecords {
     DroppedPoints dropped;
     bool color_depends_on_view = true;  // Dataset::color_depends_on_view
 };
-
-/// Gives the camera the focal lengths and principal point of an equirectangular image of all directions.
-inline void set_equirectangular(Camera& camera) {
-    camera.fx = camera.width / (2 * std::numbers::pi);
-    camera.fy = camera.height / std::numbers::pi;
-    camera.cx = 0.5 * camera.width;
-    camera.cy = 0.5 * camera.height;
-}
 
 /// Adds a point, or counts it as dropped. `where` is called for the first dropped point.
 void add_point(PointCloud& points, DroppedPoints& dropped, const glm::dvec3& position,

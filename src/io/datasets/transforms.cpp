@@ -24,6 +24,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/datasets/image_records.h"
+#include "scene/native_lens.h"
 
 namespace ewa::io {
 
@@ -168,7 +169,7 @@ void read_intrinsics(const Entry& entry, ImageRecord& image) {
         return;
     }
     if (image.distortion.lens == Lens::equirectangular) {
-        io::set_equirectangular(camera);
+        scene::set_equirectangular(camera);
         return;
     }
     if (const auto fl_x = entry.number("fl_x"))
