@@ -233,7 +233,7 @@ struct BlendBackward : BlendBackwardBuffers {
     static constexpr char shader[] = "blend_backward";
 };
 
-/// Raises each splat's largest weight at a pixel: the bits of a float a splat. Variant: SPEC_KERNEL.
+/// Raises each splat's largest weight at a pixel: the bits of a float a splat. Variant: SPEC_KERNEL, SPEC_WRAP.
 struct Contribute {
     static constexpr char shader[] = "contribute";
     using Work = PerTile;

@@ -183,7 +183,7 @@ void FramePasses::contributions(const Sorted& sorted, const gpu::Buffer& largest
                               .splats = *sorted.splats,
                               .tile_starts = frame.tile_starts,
                               .largest = largest},
-           blend_push(cache.config(), frame, inputs.background), {kernel()});
+           blend_push(cache.config(), frame, inputs.background), {kernel(), wrap()});
 }
 
 Sorted FramePasses::forward(const Model& model) const {

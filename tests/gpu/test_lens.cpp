@@ -8,7 +8,12 @@
 
 #include "ewa/error.h"
 #include "ewa/renderer.h"
+#include "gpu/guarded.h"
+#include "gpu/reference_inputs.h"
 #include "gpu/test_device.h"
+#include "pipeline/forward.h"
+#include "pipeline/frame_buffers.h"
+#include "pipeline/frame_inputs.h"
 #include "reference/render.h"
 #include "support/gradient_check.h"
 #include "support/random_lens.h"
@@ -113,6 +118,33 @@ TEST(Lens, APanoramaHasNoSeam) {
                 worst = std::max(worst, std::abs(double(before.at(x, y)[c]) -
                                                  double(after.at((x + kColumns) % kWidth, y)[c])));
     EXPECT_LT(worst, 2e-4);
+}
+
+/// Weights count on both sides of the seam.
+TEST(Lens, LargestWeightsOfAPanoramaAreTheReferences) {
+    Rig& r = rig();
+    const Camera camera = random_lenses(6800, 100, 50)[4].camera;
+    // Large splats, whose tiles lie on both sides.
+    Gaussians gaussians = gaussians_around(6801, 200, camera, 0);
+    for (float& scale : gaussians.log_scales) scale += 1.5f;
+    const pipeline::Model model = pipeline::upload_model(*device(), gaussians, 1, false);
+    const gpu::Buffer block = camera_buffer(camera, r.config());
+    GuardedFrame guarded(r.config(), {model.splats, 100, 50, 20000, false, false});
+    const pipeline::Plan plan = pipeline::plan_for({});
+    const pipeline::FrameInputs inputs = pipeline::inputs_of(block, camera, {});
+    Guarded largest("largest", std::vector<float>(gaussians.size()));
+    r.run([&](gpu::Recording& recording) {
+        const pipeline::FramePasses on{{recording, r.cache}, plan, guarded.frame, inputs};
+        on.contributions(on.forward(model), largest);
+    });
+    EXPECT_TRUE(largest.intact());
+    ASSERT_LE(guarded.frame.read_counts().instances, 20000u);
+    const reference::Rendered expected = reference::render(gaussians, camera, {});
+    const std::vector<double> weights = reference::largest_weights(expected.projected, expected.instances);
+    const auto actual = largest.read<float>();
+    size_t off = 0;
+    for (size_t i = 0; i < weights.size(); ++i) off += std::abs(actual[i] - weights[i]) > 1e-5;
+    EXPECT_LE(off, 2u) << "of 200; a weight may stand on the other side of ALPHA_MIN";
 }
 
 TEST(Lens, OthersAreRefused) {
