@@ -85,9 +85,10 @@ PathTracer::View PathTracer::see(const Camera& camera, double brightest) {
     view.variant.push_back({shared::SPEC_LENSES, lens ? 1u : 0u});
     std::vector<float> rays(lens ? 0 : shared::PIXEL_RAY_FLOATS);
     const glm::dmat3 to_world = glm::transpose(camera.rotation);
+    const double limit = scene::lens_limit(camera);
     for (int y = 0; lens && y <= camera.height; ++y)
         for (int x = 0; x <= camera.width; ++x) {
-            const auto ray = scene::ray_of(camera, x, y);
+            const auto ray = scene::ray_of(camera, limit, x, y);
             const glm::dvec3 origin =
                 (camera.position() + (ray ? to_world * ray->origin : glm::dvec3(0)) - origin_) / unit_;
             const glm::dvec3 direction = ray ? to_world * ray->direction : glm::dvec3(0);

@@ -69,10 +69,10 @@ Camera through_lens(Camera camera, const SyntheticOptions& o, const glm::dvec3& 
     return camera;
 }
 
-/// What a position in the image sees at this depth.
-glm::dvec3 point_at(const Camera& camera, double x, double y, double depth) {
+/// What a position in the image sees at this depth. limit: scene::lens_limit(camera).
+glm::dvec3 point_at(const Camera& camera, double limit, double x, double y, double depth) {
     if (camera.distortion.none()) return world_point(camera, x, y, depth);
-    const auto ray = scene::ray_of(camera, x, y);
+    const auto ray = scene::ray_of(camera, limit, x, y);
     if (!ray) return camera.position();
     return glm::transpose(camera.rotation) * (ray->origin + depth * ray->direction - camera.translation);
 }
@@ -330,6 +330,7 @@ class DatasetJob {
         const auto each = uint32_t((size_t(options_.points) + cameras_.size() - 1) / cameras_.size());
         for (size_t view = 0; view < cameras_.size(); ++view) {
             const Camera& camera = cameras_[view];
+            const double limit = scene::lens_limit(camera);
             const Image image = load_image(folder_ / job_.image_name(view)),
                         depth = load_image(folder_ / job_.depth_name(view));
             for (uint32_t i = 0; i < each && cloud.positions.size() < size_t(options_.points); ++i) {
@@ -337,7 +338,7 @@ class DatasetJob {
                 const int x = int(u[0] * camera.width), y = int(u[1] * camera.height);
                 const double z = double(depth.at(x, y)[0]);
                 if (!(z > 0) || (image.channels == 4 && image.at(x, y)[3] < 0.5f)) continue;
-                cloud.positions.push_back(point_at(camera, x + 0.5, y + 0.5, z));
+                cloud.positions.push_back(point_at(camera, limit, x + 0.5, y + 0.5, z));
                 std::array<uint8_t, 3> color;
                 for (size_t c = 0; c < 3; ++c)
                     color[c] = uint8_t(std::lround(double(image.at(x, y)[c]) * 255));

@@ -72,9 +72,10 @@ float developed(double value) {
 }
 
 void show_sky(Image& radiance, const Camera& camera, const scene::Sky& sky) {
+    const double limit = scene::lens_limit(camera);
     for (int y = 0; y < radiance.height; ++y)
         for (int x = 0; x < radiance.width; ++x) {
-            const auto ray = scene::ray_of(camera, x + 0.5, y + 0.5);
+            const auto ray = scene::ray_of(camera, limit, x + 0.5, y + 0.5);
             if (!ray) continue;
             const float up = float((glm::transpose(camera.rotation) * ray->direction).y);
             const glm::vec3 color = glm::mix(sky.horizon, up >= 0 ? sky.zenith : sky.ground, std::abs(up));

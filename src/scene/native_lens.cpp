@@ -77,14 +77,14 @@ bool is_native(const Distortion& d) {
     return d.lens == Lens::brown || d.lens == Lens::equirectangular || d.lens == Lens::orthographic;
 }
 
-std::optional<glm::dvec2> pixel_of(const Camera& camera, const glm::dvec3& p) {
+std::optional<glm::dvec2> pixel_of(const Camera& camera, double limit, const glm::dvec3& p) {
     const Distortion& d = camera.distortion;
     const double depth = ordered_by_distance(d.lens) ? glm::length(p) : p.z;
     if (!(depth > shared::NEAR_PLANE)) return std::nullopt;
     glm::dvec2 plane;
     if (d.lens == Lens::fisheye) {
         const double r = std::hypot(p.x, p.y), angle = std::atan2(r, p.z);
-        if (!(angle <= lens_limit(camera))) return std::nullopt;
+        if (!(angle <= limit)) return std::nullopt;
         plane = r > 0 ? fisheye_distance(d, angle) / r * glm::dvec2(p) : glm::dvec2(0);
     } else if (d.lens == Lens::equirectangular) {
         plane = {std::atan2(p.x, p.z), std::atan2(p.y, std::hypot(p.x, p.z))};
@@ -92,7 +92,7 @@ std::optional<glm::dvec2> pixel_of(const Camera& camera, const glm::dvec3& p) {
         plane = p;
     } else {
         const glm::dvec2 tangent = glm::dvec2(p) / p.z;
-        if (!(glm::dot(tangent, tangent) <= lens_limit(camera))) return std::nullopt;
+        if (!(glm::dot(tangent, tangent) <= limit)) return std::nullopt;
         plane = d.none() ? tangent : distort(d, tangent);
     }
     return glm::dvec2(camera.fx * plane.x + camera.cx, camera.fy * plane.y + camera.cy);
@@ -102,19 +102,19 @@ namespace {
 
 /// The angle from the axis whose image is at that distance from the principal point. The distance grows with the angle up to the
 /// limit.
-std::optional<double> angle_at(const Camera& camera, double distance) {
-    double low = 0, high = lens_limit(camera);
-    if (fisheye_distance(camera.distortion, high) < distance) return std::nullopt;
+std::optional<double> angle_at(const Distortion& lens, double limit, double distance) {
+    double low = 0, high = limit;
+    if (fisheye_distance(lens, high) < distance) return std::nullopt;
     for (int i = 0; i < 60; ++i) {
         const double middle = 0.5 * (low + high);
-        (fisheye_distance(camera.distortion, middle) < distance ? low : high) = middle;
+        (fisheye_distance(lens, middle) < distance ? low : high) = middle;
     }
     return 0.5 * (low + high);
 }
 
 }  // namespace
 
-std::optional<PixelRay> ray_of(const Camera& camera, double x, double y) {
+std::optional<PixelRay> ray_of(const Camera& camera, double limit, double x, double y) {
     const glm::dvec2 plane((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy);
     switch (camera.distortion.lens) {
         case Lens::orthographic:
@@ -125,7 +125,7 @@ std::optional<PixelRay> ray_of(const Camera& camera, double x, double y) {
                              std::cos(plane.x) * std::cos(plane.y)}};
         case Lens::fisheye: {
             const double r = glm::length(plane);
-            const auto angle = angle_at(camera, r);
+            const auto angle = angle_at(camera.distortion, limit, r);
             if (!angle) return std::nullopt;
             const glm::dvec2 way = r > 0 ? plane / r : glm::dvec2(0);
             return PixelRay{{}, {std::sin(*angle) * way, std::cos(*angle)}};

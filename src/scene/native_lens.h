@@ -14,15 +14,15 @@ namespace ewa::scene {
 bool is_native(const Distortion& lens);
 
 /// The pixel of a point in camera coordinates, through the camera's lens. Empty behind the camera and where the lens does not show
-/// it. The lens must be native.
-std::optional<glm::dvec2> pixel_of(const Camera& camera, const glm::dvec3& point);
+/// it. The lens must be native. limit: lens_limit(camera), which takes longer than this.
+std::optional<glm::dvec2> pixel_of(const Camera& camera, double limit, const glm::dvec3& point);
 
 /// What a position in the image sees: from `origin` along `direction`, of unit length, in camera coordinates. Empty where the lens
-/// shows nothing. x, y: px from the top left corner.
+/// shows nothing. limit: lens_limit(camera). x, y: px from the top left corner.
 struct PixelRay {
     glm::dvec3 origin{0}, direction{0};
 };
-std::optional<PixelRay> ray_of(const Camera& camera, double x, double y);
+std::optional<PixelRay> ray_of(const Camera& camera, double limit, double x, double y);
 
 /// Gives the camera the focal lengths and principal point of an equirectangular image of all directions.
 void set_equirectangular(Camera& camera);

@@ -54,11 +54,12 @@ std::vector<SeenPoint> seen_points(const Camera& camera, const PointCloud& point
     const auto nearest_at = [&](int x, int y) -> float& {
         return nearest[size_t(y / cell) * size_t(columns) + size_t(x / cell)];
     };
+    const double limit = scene::lens_limit(camera);
     const size_t stride = (points.positions.size() + kMostPoints - 1) / kMostPoints;
     std::vector<SeenPoint> seen;
     for (size_t i = 0; i < points.positions.size(); i += stride) {
         const glm::dvec3 p = camera.rotation * points.positions[i] + camera.translation;
-        const auto pixel = scene::pixel_of(camera, p);
+        const auto pixel = scene::pixel_of(camera, limit, p);
         if (!pixel ||
             !(pixel->x >= 0 && pixel->y >= 0 && pixel->x < camera.width && pixel->y < camera.height))
             continue;

@@ -409,13 +409,14 @@ TEST(PathTracer, SeesThroughLenses) {
         for (double Camera::*value : {&Camera::fx, &Camera::fy, &Camera::cx, &Camera::cy})
             camera.*value = lens.*value;
         camera.distortion = lens.distortion;
+        const double limit = scene::lens_limit(camera);
         PathTracer tracer(test::device(), packed, {});
         const auto seen = tracer.seen(camera);
         const Image radiance = tracer.radiance(camera, 4, 1, 10);
         int same = 0, hits = 0, covered = 0;
         for (int y = 0; y < 40; ++y)
             for (int x = 0; x < 60; ++x) {
-                const auto ray = scene::ray_of(camera, x + 0.5, y + 0.5);
+                const auto ray = scene::ray_of(camera, limit, x + 0.5, y + 0.5);
                 const glm::dmat3 to_world = glm::transpose(camera.rotation);
                 std::optional<reference::Hit> hit;
                 if (ray)

@@ -22,12 +22,12 @@ TEST(NativeLens, APixelSeesThePointsThatItShows) {
         int blind = 0;
         for (int i = 0; i < 200; ++i) {
             const double x = random.uniform(0, 97), y = random.uniform(0, 61);
-            const auto ray = scene::ray_of(camera, x, y);
+            const auto ray = scene::ray_of(camera, scene::lens_limit(camera), x, y);
             blind += !ray;
             if (!ray) continue;
             EXPECT_NEAR(glm::length(ray->direction), 1, 1e-12);
             const glm::dvec3 point = ray->origin + random.uniform(1, 9) * ray->direction;
-            const auto pixel = scene::pixel_of(camera, point);
+            const auto pixel = scene::pixel_of(camera, scene::lens_limit(camera), point);
             ASSERT_TRUE(pixel);
             EXPECT_NEAR(pixel->x, x, 1e-6);
             EXPECT_NEAR(pixel->y, y, 1e-6);
@@ -47,7 +47,8 @@ TEST(NativeLens, TheReferencesDerivativesAreSlopes) {
         SCOPED_TRACE(name);
         Random random(7201);
         for (int i = 0; i < 50; ++i) {
-            const auto ray = scene::ray_of(camera, random.uniform(0, 97), random.uniform(0, 61));
+            const auto ray = scene::ray_of(camera, scene::lens_limit(camera), random.uniform(0, 97),
+                                           random.uniform(0, 61));
             if (!ray) continue;
             const glm::dvec3 point = ray->origin + random.uniform(1, 9) * ray->direction;
             const reference::LensImage at = reference::lens_image(camera, point);
@@ -76,13 +77,13 @@ TEST(NativeLens, LimitsAreWhereAModelFolds) {
     // r (1 - r^2 / 3) folds at r = 1.
     camera.distortion.k1 = -1.0 / 3;
     EXPECT_NEAR(scene::lens_limit(camera), 1, 0.05);
-    EXPECT_FALSE(scene::pixel_of(camera, {1.5, 0, 1}));
-    EXPECT_TRUE(scene::pixel_of(camera, {0.5, 0, 1}));
-    EXPECT_FALSE(scene::pixel_of(camera, {0.5, 0, -1}));
+    EXPECT_FALSE(scene::pixel_of(camera, scene::lens_limit(camera), {1.5, 0, 1}));
+    EXPECT_TRUE(scene::pixel_of(camera, scene::lens_limit(camera), {0.5, 0, 1}));
+    EXPECT_FALSE(scene::pixel_of(camera, scene::lens_limit(camera), {0.5, 0, -1}));
     camera.distortion = {.k1 = -0.1, .lens = Lens::fisheye};
     camera.fx = camera.fy = 10;  // the image is wider than the lens sees
     EXPECT_NEAR(scene::lens_limit(camera), std::sqrt(1 / 0.3), 0.01);
-    EXPECT_FALSE(scene::ray_of(camera, 0, 0));
+    EXPECT_FALSE(scene::ray_of(camera, scene::lens_limit(camera), 0, 0));
 }
 
 }  // namespace
