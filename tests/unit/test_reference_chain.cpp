@@ -21,10 +21,15 @@ struct Chain {
     double loss() const {
         const Rendered rendered = render(values, camera, options, reference);
         if (reference.loss.alpha <= 0) return image_loss(rendered.blended.color, to_double(target)).loss;
-        Raster alpha(target.width, target.height, 1);
-        for (size_t i = 0; i < alpha.values.size(); ++i) alpha.values[i] = target.pixels[4 * i + 3];
-        return image_loss(rendered.blended.color, to_double(over_background(target, options.background)))
-                   .loss +
+        Raster alpha(target.width, target.height, 1), seen(target.width, target.height, 3);
+        for (size_t i = 0; i < alpha.values.size(); ++i) {
+            alpha.values[i] = target.pixels[4 * i + 3];
+            for (size_t k = 0; k < 3; ++k) {
+                const double behind = options.background[k];
+                seen.values[3 * i + k] = behind + alpha.values[i] * (target.pixels[4 * i + k] - behind);
+            }
+        }
+        return image_loss(rendered.blended.color, seen).loss +
                reference.loss.alpha * alpha_loss(rendered.blended.transmittance, alpha).difference;
     }
 };
