@@ -43,10 +43,14 @@ Image oriented(const Image& image, int orientation);
 /// 65,535 px per side. Throws InputError, also for a truncated file.
 Image load_image(const std::filesystem::path& path);
 
-/// Writes .png (8 bit, rounded, clamped to [0, 1], NaN as 0) or .exr (float32, not clamped). Colour is not
-/// multiplied by alpha. A temporary file is written and renamed. Throws RunError (disk), InputError
-/// (extension, no pixels).
+/// Writes .png (8 bit, rounded, clamped to [0, 1], NaN as 0), .jpg or .jpeg (of RGB, quality 95) or .exr (float32, not
+/// clamped). Colour is not multiplied by alpha. A temporary file is written and renamed. Throws RunError (disk),
+/// InputError (extension, no pixels).
 void save_image(const std::filesystem::path& path, const Image& image);
+
+/// As save_image, of an equirectangular image of all directions: a PNG or JPEG says so to viewers of panoramas, by XMP's
+/// schema GPano ("Photo Sphere XMP Metadata").
+void save_panorama(const std::filesystem::path& path, const Image& image);
 
 /// Divides the size by factor >= 1, rounded down, to at least 1 px. Each new pixel is the mean over the area
 /// that it covers. These areas have the exact ratio of sizes; pixels on their borders are weighted by their

@@ -235,17 +235,21 @@ std::vector<int> select_frames(const Dataset& dataset, const std::string& which,
     return frames;
 }
 
-Dataset load_cameras_as_trained(const fs::path& path, int downscale, int max_width, bool points) {
+Dataset load_cameras_as_trained(const fs::path& path, const CamerasInput& input) {
     if (names_mesh_scene(path)) {
         Dataset dataset = scene_cameras(path, {});
         for (Frame& frame : dataset.frames) {
-            if (max_width > 0) frame.camera = narrowed(frame.camera, int64_t(max_width) * downscale);
-            frame.camera = ewa::downscale(frame.camera, downscale);
+            if (input.max_width > 0)
+                frame.camera = narrowed(frame.camera, int64_t(input.max_width) * input.downscale);
+            frame.camera = ewa::downscale(frame.camera, input.downscale);
         }
         return dataset;
     }
-    Dataset dataset = load_dataset(
-        path, {.downscale = downscale, .need_images = false, .need_points = points, .max_width = max_width});
+    Dataset dataset = load_dataset(path, {.downscale = input.downscale,
+                                          .lens = input.lens,
+                                          .need_images = false,
+                                          .need_points = input.points,
+                                          .max_width = input.max_width});
     auto missing = [](const Frame& frame) { return !frame.image_exists; };
     const auto count = std::count_if(dataset.frames.begin(), dataset.frames.end(), missing);
     dataset.missing_images = static_cast<int>(count);
@@ -299,11 +303,15 @@ void add_word_of_run(CLI::App& app, const std::string& name,
 
 }  // namespace
 
+void add_lens_option(CLI::App& app, LensUse& lens) {
+    add_word_of_run(app, "lens", [&lens](const RunOptions& run) { lens = run.lens; });
+}
+
 void add_view_options(CLI::App& app, ViewArguments& arguments) {
     add_draw_options(app, arguments.draw);
     add_size_options(app, arguments.downscale, arguments.max_width);
     add_word_of_run(app, "masks", [&arguments](const RunOptions& run) { arguments.masks = run.masks; });
-    add_word_of_run(app, "lens", [&arguments](const RunOptions& run) { arguments.lens = run.lens; });
+    add_lens_option(app, arguments.lens);
     add_device_options(app, arguments.device);
 }
 

@@ -75,6 +75,8 @@ void add_size_options(CLI::App& app, int& downscale, int& max_width);
 /// --frames and --test-every.
 void add_frames_options(CLI::App& app, std::string& frames, int& test_every);
 void add_quiet_option(CLI::App& app, bool& quiet);
+/// --lens, of a dataset's images or cameras.
+void add_lens_option(CLI::App& app, LensUse& lens);
 void add_test_every_option(CLI::App& app, int& test_every);
 
 /// The indices of the frames that --frames names: "all", "train", "test", or a list that scene::frames_named
@@ -85,9 +87,13 @@ std::vector<int> select_frames(const Dataset& dataset, const std::string& which,
 
 /// The cameras of a dataset, whose images may be missing. If only some are, their frames are skipped as in
 /// training, so that the same frames are held out; Dataset::missing_images counts them. A mesh scene has the
-/// views that `ewa train` renders. points: also reads the points.
-Dataset load_cameras_as_trained(const std::filesystem::path& path, int downscale, int max_width,
-                                bool points = false);
+/// views that `ewa train` renders.
+struct CamerasInput {
+    int downscale = 1, max_width = 0;
+    LensUse lens = LensUse::automatic;
+    bool points = false;  // also reads the points
+};
+Dataset load_cameras_as_trained(const std::filesystem::path& path, const CamerasInput& input);
 
 /// Renders a mesh scene into a dataset, with progress, and prints its notes. Throws InputError, RunError, and
 /// Interrupted if Ctrl-C ended it.

@@ -303,6 +303,7 @@ Action add_compare(CLI::App& app) {
     add_frames_options(app, arguments->inputs.frames, arguments->inputs.test_every);
     add_draw_options(app, arguments->inputs.draw);
     add_size_options(app, arguments->inputs.downscale, arguments->inputs.max_width);
+    add_lens_option(app, arguments->inputs.lens);
     add_device_options(app, arguments->inputs.device);
     for (CLI::Option* option : app.get_options())
         if (std::find(before.begin(), before.end(), option) == before.end()) option->needs(cameras);

@@ -41,6 +41,7 @@ struct CompareInputs {
     std::filesystem::path refined_a, refined_b;  // cameras.json of the run of each side; empty: none
     std::string frames = "all";
     int test_every = 8, downscale = 1, max_width = 0;
+    LensUse lens = LensUse::automatic;
     DrawArguments draw;
     DeviceOptions device;
 };

@@ -21,7 +21,7 @@ constexpr int kStartWidth = 1280, kStartHeight = 720;
 /// The cameras of the run's dataset, in the order of their names. Empty, with a remark, where they cannot be read.
 Dataset cameras_of(const live::Run& run, std::vector<std::string>& remarks) {
     try {
-        Dataset dataset = load_cameras_as_trained(dataset_of(run), 1, 0);
+        Dataset dataset = load_cameras_as_trained(dataset_of(run), {});
         const fs::path refined = refined_cameras_of(run);
         if (!refined.empty()) io::use_refined_cameras(dataset, refined);
         return dataset;
@@ -47,7 +47,8 @@ std::vector<std::string> write_page(const fs::path& path, const Gaussians& gauss
     scene::FramingHints hints;
     if (run) {
         const Dataset dataset = cameras_of(*run, remarks);
-        for (const Frame& frame : dataset.frames) page.views.push_back({frame.name, frame.camera});
+        for (const Frame& frame : dataset.frames)
+            page.views.push_back({frame.name, scene::pinhole_at(frame.camera)});
         if (!dataset.frames.empty()) {
             hints.up = scene::mean_up(dataset);
             hints.forward = glm::transpose(dataset.frames[0].camera.rotation)[2];

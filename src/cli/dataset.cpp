@@ -4,12 +4,12 @@
 #include <CLI/CLI.hpp>
 
 #include <memory>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "cli/arguments.h"
 #include "cli/command.h"
+#include "cli/lens_argument.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/datasets/dataset_folders.h"
@@ -28,38 +28,6 @@ struct DatasetArguments {
     bool varied = false, quiet = false;
 };
 
-constexpr const char* kLensForms = "fisheye[:DEGREES], equirect, ortho or opencv:K1[,K2[,P1,P2]]";
-
-/// From text such as fisheye:190.
-void set_lens(const std::string& text, SyntheticOptions& options) {
-    const size_t colon = text.find(':');
-    const std::string name = text.substr(0, colon);
-    std::vector<double> numbers;
-    std::stringstream list(colon == std::string::npos ? "" : text.substr(colon + 1));
-    for (std::string word; std::getline(list, word, ',');) {
-        const auto number = core::parse_number(word);
-        if (!number) throw InputError("--lens: '" + word + "' is not a number; expected " + kLensForms);
-        numbers.push_back(*number);
-    }
-    const size_t most = name == "fisheye" ? 1 : name == "opencv" ? 4 : 0;
-    const bool good = name == "fisheye" || name == "equirect" || name == "ortho" ||
-                      (name == "opencv" && !numbers.empty() && numbers.size() != 3);
-    if (!good || numbers.size() > most)
-        throw InputError("--lens: '" + text + "' is no lens; expected " + kLensForms);
-    Distortion& lens = options.lens;
-    if (name == "fisheye") {
-        lens.lens = Lens::fisheye;
-        if (!numbers.empty()) options.fisheye_degrees = numbers[0];
-    } else if (name == "equirect") {
-        lens.lens = Lens::equirectangular;
-    } else if (name == "ortho") {
-        lens.lens = Lens::orthographic;
-    } else {
-        numbers.resize(4);
-        lens = {.k1 = numbers[0], .k2 = numbers[1], .p1 = numbers[2], .p2 = numbers[3]};
-    }
-}
-
 int run(const DatasetArguments& arguments) {
     io::check_not_inside_dataset("-o", arguments.output);
     SyntheticOptions options = arguments.options;
@@ -67,7 +35,11 @@ int run(const DatasetArguments& arguments) {
     options.width = size.width;
     options.height = size.height;
     if (arguments.views >= 0) options.views = arguments.views;
-    if (!arguments.lens.empty()) set_lens(arguments.lens, options);
+    if (!arguments.lens.empty()) {
+        const LensArgument lens = lens_of(arguments.lens);
+        options.lens = lens.lens;
+        options.fisheye_degrees = lens.fisheye_degrees;
+    }
     if (arguments.varied) options.appearance = AppearanceModel::ppisp;
     if (arguments.exposure != "auto") {
         options.exposure = core::parse_number(arguments.exposure);

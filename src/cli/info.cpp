@@ -257,7 +257,7 @@ void print_cameras(const Dataset& dataset) {
 
 /// named: what the user calls it.
 void info_dataset(const fs::path& path, const fs::path& named, int test_every, bool json) {
-    const Dataset dataset = load_cameras_as_trained(path, 1, 0, true);
+    const Dataset dataset = load_cameras_as_trained(path, {.points = true});
     const char* kind = dataset_kind(path);
     const Split split = split_frames(dataset, test_every);
     std::vector<int> every(dataset.frames.size());

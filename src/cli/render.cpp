@@ -24,6 +24,9 @@
 #include "io/datasets/refined_cameras.h"
 #include "report/pictures.h"
 #include "scene/dataset_files.h"
+#include "scene/framing.h"
+#include "scene/looks.h"
+#include "scene/native_lens.h"
 
 namespace ewa::cli {
 namespace {
@@ -32,7 +35,8 @@ namespace fs = std::filesystem;
 
 struct RenderArguments {
     fs::path splats, cameras, output = "out/render";
-    std::string frames = "all", format = "png", mode = "color";
+    std::string frames = "all", format = "png", mode = "color", lens = "auto";
+    LensUse lens_use = LensUse::automatic;  // of a dataset's cameras
     AppearanceArguments appearance;
     int test_every = 8, downscale = 1, max_width = 0;
     ViewsArguments views;
@@ -61,6 +65,14 @@ Image chosen_image(Rendering&& rendering, const RenderArguments& arguments, std:
         return exr ? with_alpha(rendering.color, rendering.alpha) : std::move(rendering.color);
     if (!exr) remark = fmt::format("white is depth {:.6g}", normalize(rendering.depth));
     return std::move(rendering.depth);
+}
+
+/// Saves what the camera shows.
+void save_view(const fs::path& file, const Camera& camera, const Image& image) {
+    if (scene::shows_all_around(camera))
+        save_panorama(file, image);
+    else
+        save_image(file, image);
 }
 
 void note_skipped(Progress& progress, uint32_t skipped) {
@@ -112,10 +124,23 @@ void check_renders(const RenderArguments& arguments, const std::vector<fs::path>
     check_command_outputs(written, read);
 }
 
+/// The view of a frame through another lens. A 360° image is twice as wide as high, and as high as the frame's longer side.
+Camera of_frame(const LensArgument& lens, const Camera& frame, const Dataset& dataset,
+                const Gaussians& gaussians) {
+    Camera camera = frame;
+    if (lens.lens.lens == Lens::equirectangular) {
+        camera.height = std::max(frame.width, frame.height);
+        camera.width = 2 * camera.height;
+    }
+    return through(lens, camera, scene::mean_up(dataset), scene::framed_box(gaussians).center());
+}
+
 int render_dataset_views(RenderArguments arguments) {
     RenderOptions options = arguments.draw.options();
     const Gaussians gaussians = arguments.draw.load(arguments.splats, options);
-    Dataset dataset = load_cameras_as_trained(arguments.cameras, arguments.downscale, arguments.max_width);
+    Dataset dataset = load_cameras_as_trained(
+        arguments.cameras,
+        {.downscale = arguments.downscale, .max_width = arguments.max_width, .lens = arguments.lens_use});
     const fs::path refined = arguments.cameras_of_run ? refined_cameras_of(*arguments.run) : fs::path();
     if (!refined.empty()) io::use_refined_cameras(dataset, refined);
     const std::vector<int> frames = select_frames(dataset, arguments.frames, arguments.test_every);
@@ -124,6 +149,10 @@ int render_dataset_views(RenderArguments arguments) {
     check_renders(arguments, files, &dataset);
     const std::vector<Appearance> appearances = appearances_of(
         arguments.appearance, arguments.cameras_of_run ? arguments.run : std::nullopt, dataset, frames);
+
+    if (arguments.views.lens)
+        for (Frame& frame : dataset.frames)
+            frame.camera = of_frame(*arguments.views.lens, frame.camera, dataset, gaussians);
 
     Renderer renderer(open_device(arguments.device), gaussians, options);
     const InterruptWatch watch;
@@ -139,7 +168,7 @@ int render_dataset_views(RenderArguments arguments) {
 
         std::string remark;
         make_folder(files[i].parent_path());
-        save_image(files[i], chosen_image(std::move(rendering), arguments, remark));
+        save_view(files[i], frame.camera, chosen_image(std::move(rendering), arguments, remark));
         if (!remark.empty()) progress.note(files[i].string() + ": " + remark);
         progress.update(static_cast<int>(i) + 1);
     }
@@ -152,7 +181,7 @@ int render_dataset_views(RenderArguments arguments) {
 /// The dataset of the run, if it can be read. Else the scene is framed as one of which nothing is known.
 std::optional<Dataset> dataset_of_run(const RenderArguments& arguments) try {
     if (!arguments.run || arguments.run->dataset.empty()) return std::nullopt;
-    return load_cameras_as_trained(arguments.run->dataset, 1, 0);
+    return load_cameras_as_trained(arguments.run->dataset, {});
 } catch (const InputError&) {
     return std::nullopt;
 }
@@ -190,7 +219,7 @@ int write_views(const RenderArguments& arguments, Renderer& renderer, const std:
         Rendering rendering = renderer.render(cameras[i], arguments.mode == "depth");
         skipped = std::max(skipped, renderer.skipped_nonfinite());
         std::string remark;
-        save_image(files[i], chosen_image(std::move(rendering), arguments, remark));
+        save_view(files[i], cameras[i], chosen_image(std::move(rendering), arguments, remark));
         if (!remark.empty()) progress.note(files[i].string() + ": " + remark);
         if (cameras.size() > 1) progress.update(int(i) + 1);
     }
@@ -219,6 +248,11 @@ int render_free_views(RenderArguments arguments) {
     std::vector<fs::path> files{arguments.output};
     if (output != ViewsOutput::folder) check_renders(arguments, files, known);
     const Gaussians gaussians = arguments.draw.load(arguments.splats, options);
+    if (dataset && !dataset->frames.empty()) {
+        glm::dvec3 sum(0);
+        for (const Frame& frame : dataset->frames) sum += frame.camera.position();
+        arguments.views.inside = sum / double(dataset->frames.size());
+    }
     const std::vector<Camera> cameras = views_of(arguments.views, gaussians, hints_of(dataset), output);
     if (output == ViewsOutput::folder) {
         files.clear();
@@ -246,13 +280,17 @@ int run(CLI::App& app, RenderArguments& arguments) {
     SplatInput input = splat_input(arguments.splats);
     arguments.splats = input.file;
     if (input.run) use_options_of(*input.run, app);
+    if (const auto use = core::find_value(scene::kLensWords, arguments.lens))
+        arguments.lens_use = *use;
+    else
+        arguments.views.lens = lens_of(arguments.lens);
     if (!arguments.cameras.empty()) {
         arguments.cameras = dataset_input(arguments.cameras);
         return render_dataset_views(arguments);
     }
     const ViewsOutput output = views_output(arguments.output);
-    const bool free = any_given(arguments.views) || output == ViewsOutput::film ||
-                      (output == ViewsOutput::image && of_frames.empty());
+    const bool free = any_given(arguments.views) || (arguments.views.lens && of_frames.empty()) ||
+                      output == ViewsOutput::film || (output == ViewsOutput::image && of_frames.empty());
     if (input.run && !free) {
         arguments.cameras = dataset_of(*input.run);
         arguments.run = std::move(input.run);
@@ -277,21 +315,28 @@ Action add_render(CLI::App& app) {
             ->type_name("DATASET");
     app.add_option("-o,--output", arguments->output,
                    "Folder for the renders, named like the images of the dataset or by number. Or one image "
-                   "(.png, .exr). "
+                   "(.png, .jpg, .exr). "
                    "Without --cameras also a film (.mp4, .mov, .mkv, .webm) that the program ffmpeg writes")
         ->type_name("OUT")
         ->capture_default_str();
     add_views_options(app, arguments->views, cameras);
     add_frames_options(app, arguments->frames, arguments->test_every);
     app.add_option("--format", arguments->format,
-                   "Format in a folder: png (8 bit, clamped) or exr (float32, not clamped)")
-        ->transform(one_of({"png", "exr"}))
+                   "Format in a folder: png, jpg (8 bit, clamped) or exr (float32, not clamped)")
+        ->transform(one_of({"png", "jpg", "exr"}))
         ->capture_default_str();
     app.add_option("--mode", arguments->mode,
                    "color, depth (view z; divided by its maximum in a png) or alpha")
         ->transform(one_of({"color", "depth", "alpha"}))
         ->capture_default_str();
     add_draw_options(app, arguments->draw);
+    app.add_option(
+           "--lens", arguments->lens,
+           std::string("Lens to render through, in place of a pinhole: ") + kLensForms +
+               ". Or what becomes of the lenses of a dataset's cameras, as in ewa train: auto, native or "
+               "undistort")
+        ->type_name("LENS")
+        ->capture_default_str();
     add_size_options(app, arguments->downscale, arguments->max_width);
     add_appearance_options(app, arguments->appearance);
     add_device_options(app, arguments->device);

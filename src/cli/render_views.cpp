@@ -16,13 +16,14 @@
 #include "ewa/error.h"
 #include "io/datasets/view_list.h"
 #include "scene/camera.h"
+#include "scene/native_lens.h"
 
 namespace ewa::cli {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr core::PixelSize kUsualSize{1280, 720};
+constexpr core::PixelSize kUsualSize{1280, 720}, kPanoramaSize{2048, 1024};
 constexpr int kOrbitFrames = 8 * kFilmRate;
 constexpr double kSecondsBetweenViews = 2;  // of a film, from one saved view to the next
 constexpr int kMostFrames = 100000;
@@ -128,17 +129,18 @@ ViewsOutput views_output(const fs::path& path) {
     std::error_code error;
     if (fs::is_directory(path, error)) return ViewsOutput::folder;
     const std::string extension = core::lower(path.extension().string());
-    if (extension == ".png" || extension == ".exr") return ViewsOutput::image;
-    for (const char* other : {".jpg", ".jpeg", ".gif", ".webp", ".bmp", ".tif", ".tiff", ".avi"})
+    for (const char* image : {".png", ".jpg", ".jpeg", ".exr"})
+        if (extension == image) return ViewsOutput::image;
+    for (const char* other : {".gif", ".webp", ".bmp", ".tif", ".tiff", ".avi"})
         if (extension == other)
-            throw InputError(
-                "--output " + core::one_line(path.string()) +
-                ": an image is .png or .exr, a film .mp4, .mov, .mkv or .webm, and a folder has another "
-                "name");
+            throw InputError("--output " + core::one_line(path.string()) +
+                             ": an image is .png, .jpg or .exr, a film .mp4, .mov, .mkv or .webm, and a "
+                             "folder has another "
+                             "name");
     if (is_film_name(path)) return ViewsOutput::film;
     if (fs::exists(path, error))
         throw InputError("--output " + core::one_line(path.string()) +
-                         ": is no folder; an image is .png or .exr, a film .mp4, .mov, .mkv or .webm");
+                         ": is no folder; an image is .png, .jpg or .exr, a film .mp4, .mov, .mkv or .webm");
     return ViewsOutput::folder;
 }
 
@@ -148,28 +150,69 @@ void check_views(const ViewsArguments& arguments) {
     parse_up(arguments.up);
 }
 
+Camera through(const LensArgument& lens, const Camera& camera, const glm::dvec3& up,
+               const glm::dvec3& middle) {
+    if (lens.lens.lens != Lens::equirectangular)
+        return scene::through_lens(camera, lens.lens, lens.fisheye_degrees, middle);
+    // A look straight down or up has its heading at the top or bottom of the image.
+    const glm::dmat3 axes = glm::transpose(camera.rotation);
+    glm::dvec3 ahead = axes[2] - glm::dot(axes[2], up) * up;
+    if (glm::length(ahead) < 1e-3) ahead = -axes[1];
+    const glm::dvec3 eye = camera.position();
+    const Camera level = scene::look_at(eye, eye + ahead, up, camera.width, camera.height);
+    return scene::through_lens(level, lens.lens, lens.fisheye_degrees, middle);
+}
+
+namespace {
+
+/// The views round the scene or from a given eye.
+std::vector<Camera> framed_views(const ViewsArguments& arguments, const Gaussians& gaussians,
+                                 const scene::FramingHints& hints, int count) {
+    const bool all_around = arguments.lens && arguments.lens->lens.lens == Lens::equirectangular;
+    const core::PixelSize size = !arguments.size.empty() ? size_of(arguments.size)
+                                 : all_around            ? kPanoramaSize
+                                                         : kUsualSize;
+    scene::FramingHints known = hints;
+    if (const auto up = parse_up(arguments.up)) known.up = up;
+    known.all_round = count > 1;
+    scene::Framing framing;
+    if (arguments.look_at.empty()) {
+        framing = scene::frame_scene(gaussians, size.width, size.height, known);
+        if (all_around && count == 1) {
+            const glm::dvec3 ahead = glm::transpose(framing.camera.rotation)[2];
+            const glm::dvec3 eye = arguments.inside.value_or(framing.target);
+            framing.camera = scene::look_at(eye, eye + ahead, framing.up, size.width, size.height);
+        }
+    } else {
+        framing.up = known.up ? glm::normalize(*known.up) : scene::guessed_up(gaussians);
+        const auto [eye, target] = parse_look_at(arguments.look_at);
+        framing.target = target;
+        framing.camera = scene::look_at(eye, target, framing.up, size.width, size.height);
+    }
+    std::vector<Camera> cameras = around(framing, count);
+    if (arguments.lens)
+        for (Camera& camera : cameras) camera = through(*arguments.lens, camera, framing.up, framing.target);
+    return cameras;
+}
+
+}  // namespace
+
 std::vector<Camera> views_of(const ViewsArguments& arguments, const Gaussians& gaussians,
                              const scene::FramingHints& hints, ViewsOutput output) {
     const bool film = output == ViewsOutput::film;
     std::vector<Camera> cameras;
     if (!arguments.views.empty()) {
         cameras = saved_views(arguments, output);
+        if (arguments.lens) {
+            const auto given = parse_up(arguments.up);
+            const glm::dvec3 up = given ? *given : hints.up ? *hints.up : scene::guessed_up(gaussians);
+            const glm::dvec3 middle = scene::framed_box(gaussians).center();
+            for (Camera& camera : cameras)
+                camera = through(*arguments.lens, camera, glm::normalize(up), middle);
+        }
     } else {
         const int count = arguments.orbit > 0 ? arguments.orbit : film ? kOrbitFrames : 1;
-        const core::PixelSize size = arguments.size.empty() ? kUsualSize : size_of(arguments.size);
-        scene::FramingHints known = hints;
-        if (const auto up = parse_up(arguments.up)) known.up = up;
-        known.all_round = count > 1;
-        scene::Framing framing;
-        if (arguments.look_at.empty()) {
-            framing = scene::frame_scene(gaussians, size.width, size.height, known);
-        } else {
-            framing.up = known.up ? glm::normalize(*known.up) : scene::guessed_up(gaussians);
-            const auto [eye, target] = parse_look_at(arguments.look_at);
-            framing.target = target;
-            framing.camera = scene::look_at(eye, target, framing.up, size.width, size.height);
-        }
-        cameras = around(framing, count);
+        cameras = framed_views(arguments, gaussians, hints, count);
     }
     if (output == ViewsOutput::image && cameras.size() > 1)
         throw InputError(

@@ -4,10 +4,12 @@
 #include <CLI/CLI.hpp>
 
 #include <filesystem>
+#include <glm/vec3.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "cli/lens_argument.h"
 #include "ewa/camera.h"
 #include "ewa/gaussians.h"
 #include "scene/framing.h"
@@ -17,8 +19,11 @@ namespace ewa::cli {
 struct ViewsArguments {
     std::string size, look_at, up;
     std::filesystem::path views;
-    int orbit = 0;            // 0: not given
-    double film_seconds = 0;  // 0: not given
+    int orbit = 0;                          // 0: not given
+    double film_seconds = 0;                // 0: not given
+    std::optional<LensArgument> lens = {};  // empty: a pinhole
+    // World: where a 360° image is taken unless an option names the eye. Empty: in the middle of the scene.
+    std::optional<glm::dvec3> inside = {};
 };
 
 /// --size, --look-at, --up, --orbit, --views and --film-seconds, which exclude `cameras`.
@@ -35,6 +40,10 @@ ViewsOutput views_output(const std::filesystem::path& path);
 
 /// Throws InputError for texts that cannot be read, and options that exclude each other. The scene is not needed.
 void check_views(const ViewsArguments& arguments);
+
+/// The camera through the lens, where middle (world) is what it looks at. A 360° image has its horizon level.
+Camera through(const LensArgument& lens, const Camera& camera, const glm::dvec3& up,
+               const glm::dvec3& middle);
 
 /// At least one camera, all of one size for a film. hints: what is known of the scene; --up has precedence. Throws
 /// InputError, also if an image should hold several views.

@@ -120,22 +120,41 @@ Image load_image(const fs::path& path) {
     return with_name(path.string(), [&] { return with_colour(read_file(path, true)); });
 }
 
-void save_image(const fs::path& path, const Image& image) {
+namespace {
+
+constexpr int kJpegQuality = 95;
+
+/// xmp: empty for none.
+void save(const fs::path& path, const Image& image, const std::string& xmp) {
     const std::string extension = core::lower(path.extension().string());
-    if (extension != ".png" && extension != ".exr")
-        throw InputError(core::one_line(path.string() + ": pictures are written as .png or .exr"));
+    const bool jpeg = extension == ".jpg" || extension == ".jpeg";
+    if (extension != ".png" && extension != ".exr" && !jpeg)
+        throw InputError(core::one_line(path.string() + ": pictures are written as .png, .jpg or .exr"));
     if (image.width < 1 || image.height < 1 || image.channels < 1)
         throw InputError(core::one_line(path.string() + ": a picture without pixels cannot be written"));
     // AtomicFile notices a full disk. The codecs' own writers may not.
     std::vector<unsigned char> bytes;
     try {
-        bytes = extension == ".exr" ? image::openimageio().encode_exr(image) : image::encode_png(image);
+        bytes = extension == ".exr" ? image::openimageio().encode_exr(image)
+                : jpeg              ? image::encode_jpeg(image, kJpegQuality)
+                                    : image::encode_png(image);
+        if (!xmp.empty() && extension != ".exr") bytes = image::with_xmp(std::move(bytes), xmp);
     } catch (const std::runtime_error& error) {
         throw RunError(core::one_line(path.string() + ": " + error.what()));
     }
     core::AtomicFile file(path);
     file.write(bytes.data(), bytes.size());
     file.commit();
+}
+
+}  // namespace
+
+void save_image(const fs::path& path, const Image& image) {
+    save(path, image, {});
+}
+
+void save_panorama(const fs::path& path, const Image& image) {
+    save(path, image, image::panorama_xmp(image.width, image.height));
 }
 
 namespace image {

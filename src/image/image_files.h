@@ -29,6 +29,13 @@ std::vector<unsigned char> encode_png(const Image& image);
 /// 100. Throws RunError.
 std::vector<unsigned char> encode_jpeg(const Image& image, int quality);
 
+/// The bytes of a PNG or JPEG with XMP in a chunk or marker of its own ("XMP Specification Part 3: Storage in Files"): after
+/// IHDR, or after JFIF's marker. packet: the XML. Throws RunError where it is too long for a marker.
+std::vector<unsigned char> with_xmp(std::vector<unsigned char> bytes, const std::string& packet);
+
+/// GPano's description of an equirectangular image of all directions. width, height: px.
+std::string panorama_xmp(int width, int height);
+
 /// The values as bytes: clamped to [0, 1], rounded, NaN as 0.
 std::vector<uint8_t> eight_bit_values(const Image& image);
 

@@ -55,20 +55,6 @@ void check(const SyntheticOptions& o) {
     if (o.exposure && !(std::abs(*o.exposure) <= 60)) throw InputError("exposure: is not in -60 .. 60 stops");
 }
 
-/// The view of the pinhole through the lens. middle: of the scene.
-Camera through_lens(Camera camera, const SyntheticOptions& o, const glm::dvec3& middle) {
-    camera.distortion = o.lens;
-    if (o.lens.lens == Lens::fisheye)
-        camera.fx = camera.fy = std::min(camera.width, camera.height) / glm::radians(o.fisheye_degrees);
-    if (o.lens.lens == Lens::equirectangular) scene::set_equirectangular(camera);
-    if (o.lens.lens == Lens::orthographic) {
-        const double distance = std::max(1e-9, glm::length(camera.position() - middle));
-        camera.fx /= distance;
-        camera.fy /= distance;
-    }
-    return camera;
-}
-
 /// What a position in the image sees at this depth. limit: scene::lens_limit(camera).
 glm::dvec3 point_at(const Camera& camera, double limit, double x, double y, double depth) {
     if (camera.distortion.none()) return world_point(camera, x, y, depth);
@@ -97,7 +83,7 @@ std::vector<Camera> cameras_for(const scene::MeshScene& scene, const SyntheticOp
     std::vector<Camera> cameras = pinholes_for(scene, o, name);
     if (o.lens.none()) return cameras;
     const glm::dvec3 middle = scene::bounds_of(scene).center();
-    for (Camera& camera : cameras) camera = through_lens(camera, o, middle);
+    for (Camera& camera : cameras) camera = scene::through_lens(camera, o.lens, o.fisheye_degrees, middle);
     return cameras;
 }
 

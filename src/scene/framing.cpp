@@ -276,6 +276,14 @@ Camera look_at(const glm::dvec3& eye, const glm::dvec3& target, const glm::dvec3
     return camera;
 }
 
+Camera pinhole_at(const Camera& camera) {
+    if (camera.distortion.none()) return camera;
+    Camera pinhole = camera_of_size(camera.width, camera.height);
+    pinhole.rotation = camera.rotation;
+    pinhole.translation = camera.translation;
+    return pinhole;
+}
+
 Camera orbited(const Camera& camera, const glm::dvec3& target, const glm::dvec3& up, double angle) {
     const glm::dmat3 turn(glm::rotate(glm::dmat4(1), angle, up));
     const glm::dvec3 position = target + turn * (camera.position() - target);

@@ -50,6 +50,9 @@ Framing frame_scene(const Gaussians& gaussians, int width, int height, const Fra
 /// another axis replaces it. The field of view is that of frame_scene. eye and target must differ.
 Camera look_at(const glm::dvec3& eye, const glm::dvec3& target, const glm::dvec3& up, int width, int height);
 
+/// The camera itself if it is a pinhole. Else one at its place that looks the same way, with the field of view of frame_scene.
+Camera pinhole_at(const Camera& camera);
+
 /// The camera turned about the axis `up` (unit length) through `target` by `angle` radians, counterclockwise as
 /// seen from above. The target keeps its pixel.
 Camera orbited(const Camera& camera, const glm::dvec3& target, const glm::dvec3& up, double angle);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 #include <limits>
 #include <numbers>
 #include <optional>
@@ -144,6 +145,19 @@ void set_equirectangular(Camera& camera) {
     camera.fy = camera.height / std::numbers::pi;
     camera.cx = 0.5 * camera.width;
     camera.cy = 0.5 * camera.height;
+}
+
+Camera through_lens(Camera camera, const Distortion& lens, double fisheye_degrees, const glm::dvec3& middle) {
+    camera.distortion = lens;
+    if (lens.lens == Lens::fisheye)
+        camera.fx = camera.fy = std::min(camera.width, camera.height) / glm::radians(fisheye_degrees);
+    if (lens.lens == Lens::equirectangular) set_equirectangular(camera);
+    if (lens.lens == Lens::orthographic) {
+        const double distance = std::max(1e-9, glm::length(camera.position() - middle));
+        camera.fx /= distance;
+        camera.fy /= distance;
+    }
+    return camera;
 }
 
 bool ordered_by_distance(Lens lens) {

@@ -27,6 +27,10 @@ std::optional<PixelRay> ray_of(const Camera& camera, double limit, double x, dou
 /// Gives the camera the focal lengths and principal point of an equirectangular image of all directions.
 void set_equirectangular(Camera& camera);
 
+/// The view of a pinhole through another lens. A fisheye shows fisheye_degrees along the smaller side of the image, and 360° all
+/// directions. Parallel rays give a world unit at `middle` (world) the size that the pinhole gives it.
+Camera through_lens(Camera pinhole, const Distortion& lens, double fisheye_degrees, const glm::dvec3& middle);
+
 /// Whether the splats of a view are ordered by their distance from the camera. Else they are by z.
 bool ordered_by_distance(Lens lens);
 

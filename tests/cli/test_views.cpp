@@ -4,8 +4,12 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
 #include "cli/expect.h"
@@ -60,8 +64,8 @@ bool column_is_dark(const Image& image, int x) {
 }
 
 TEST_F(Views, NamesOfOtherImagesAndFilmsAreRefused) {
-    for (const char* name : {"x.jpg", "x.GIF", "x.webp", "x.avi"}) {
-        expect_failure(render({"-o", folder / name}), 2, "an image is .png or .exr, a film .mp4");
+    for (const char* name : {"x.GIF", "x.webp", "x.tif", "x.avi"}) {
+        expect_failure(render({"-o", folder / name}), 2, "an image is .png, .jpg or .exr, a film .mp4");
         EXPECT_FALSE(std::filesystem::exists(folder / name));
     }
 }
@@ -82,6 +86,65 @@ TEST_F(Views, AFileAloneIsAnImageOfTheWholeScene) {
     EXPECT_GT(*std::max_element(depth.pixels.begin(), depth.pixels.end()), 1.0f) << "view z in world units";
     expect_success(render({"-o", folder / "usual.png", "--quiet"}));
     EXPECT_EQ(load_image(folder / "usual.png").width, 1280);
+}
+
+/// The centre of the colours that lie above half of the brightest, px.
+glm::dvec2 bright_place(const Image& image) {
+    const float most = *std::ranges::max_element(image.pixels);
+    glm::dvec2 sum(0);
+    double count = 0;
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x)
+            if (*image.at(x, y) > most / 2) sum += glm::dvec2(x + 0.5, y + 0.5), ++count;
+    return sum / count;
+}
+
+TEST_F(Views, ThroughALens) {
+    // A small splat to the left of a camera at the origin that looks along +x and down, with +z up.
+    Gaussians one;
+    one.resize(1);
+    const glm::vec3 place(1, 5, 2);
+    for (int i = 0; i < 3; ++i) one.means[size_t(i)] = place[i], one.log_scales[size_t(i)] = -2.5f;
+    one.quaternions[0] = 1;
+    one.opacity_logits[0] = 5;
+    one.sh = {2, 2, 2};
+    save_splats(splats, one);
+    const Names view{"--look-at", "0,0,0,8,0,-2", "--up", "z"};
+    const auto image = [&](const std::string& name, Names more) {
+        more.insert(more.end(), view.begin(), view.end());
+        more.insert(more.end(), {"-o", folder / name, "--quiet"});
+        expect_success(render(more));
+        return load_image(folder / name);
+    };
+    const Image all = image("all.png", {"--lens", "equirect", "--size", "400x200"});
+    // The horizon is level: longitude and latitude in the world.
+    const double left = std::atan2(5.0, 1.0), above = std::atan2(2.0, std::hypot(1.0, 5.0));
+    const glm::dvec2 expected(200 - 200 * left / M_PI, 100 - 200 * above / M_PI);
+    EXPECT_LT(glm::distance(bright_place(all), expected), 0.6);
+    EXPECT_NE(read_file(folder / "all.png").find("GPano:ProjectionType=\"equirectangular\""),
+              std::string::npos);
+    EXPECT_EQ(image("usual.jpg", {"--lens", "equirect"}).width, 2048);
+    EXPECT_NE(read_file(folder / "usual.jpg").find("GPano:FullPanoWidthPixels=\"2048\""), std::string::npos);
+
+    const Image fisheye = image("fisheye.png", {"--lens", "fisheye:200", "--size", "300x200"});
+    const glm::dvec3 axis = glm::normalize(glm::dvec3(4, 0, -1));
+    const double angle = std::acos(glm::dot(axis, glm::normalize(glm::dvec3(place))));
+    EXPECT_NEAR(glm::distance(bright_place(fisheye), glm::dvec2(150, 100)), glm::degrees(angle), 0.6)
+        << "px for a degree: 200 px show 200 degrees";
+    EXPECT_EQ(read_file(folder / "fisheye.png").find("GPano"), std::string::npos);
+
+    const Image parallel = image("parallel.png", {"--lens", "ortho", "--size", "300x200"});
+    const glm::dvec3 beside = glm::normalize(glm::cross(axis, glm::dvec3(0, 0, 1)));
+    const glm::dvec2 at = bright_place(parallel) - glm::dvec2(150, 100);
+    const double right = glm::dot(beside, glm::dvec3(place)),
+                 up = glm::dot(glm::cross(beside, axis), glm::dvec3(place));
+    EXPECT_NEAR(at.y / at.x, -up / right, 0.02);
+}
+
+TEST_F(Views, WordsThatAreNoLens) {
+    for (const char* lens :
+         {"fisheye:0", "fisheye:361", "fisheye:x", "equirect:2", "tele", "opencv:1,2,3", ""})
+        expect_failure(render({"-o", folder / "x.png", "--lens", lens}), 2, "--lens:");
 }
 
 TEST_F(Views, TheMarkOfAntialiasingIsUsed) {

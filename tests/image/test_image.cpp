@@ -5,10 +5,13 @@
 
 #include <cmath>
 #include <csignal>
+#include <fstream>
 #include <random>
 
 #include "ewa/camera.h"
+#include "ewa/error.h"
 #include "ewa/image.h"
+#include "image/image_files.h"
 #include "support/temp_folder.h"
 
 namespace {
@@ -49,6 +52,39 @@ TEST(ImageFiles, PngRoundsAndClamps) {
     ASSERT_EQ(loaded.channels, 3);
     for (size_t i = 0; i < 12; ++i) EXPECT_EQ(loaded.pixels[i], float(expected[i]) / 255.0f) << i;
     EXPECT_EQ(test::files_in(folder.path()), 1u);
+}
+
+TEST(ImageFiles, PanoramasSayWhatTheyAre) {
+    const TempFolder folder;
+    const Image image = noise(40, 20, 3, 8);
+    for (const char* name : {"p.png", "p.jpg", "p.exr"}) {
+        save_panorama(folder / name, image);
+        save_image(folder / (std::string("plain") + name), image);
+        EXPECT_EQ(load_image(folder / name).pixels, load_image(folder / (std::string("plain") + name)).pixels)
+            << name;
+    }
+    // Readers of XMP look for these beginnings ("XMP Specification Part 3").
+    const auto bytes = [&](const char* name) {
+        std::ifstream file(folder / name, std::ios::binary);
+        return std::string(std::istreambuf_iterator<char>(file), {});
+    };
+    const std::string png = bytes("p.png"), jpeg = bytes("p.jpg");
+    const std::string packet = image::panorama_xmp(40, 20);
+    EXPECT_NE(packet.find("GPano:FullPanoWidthPixels=\"40\""), std::string::npos);
+    EXPECT_NE(packet.find("GPano:CroppedAreaImageHeightPixels=\"20\""), std::string::npos);
+    const size_t chunk = png.find(std::string("iTXtXML:com.adobe.xmp\0\0\0\0\0", 26) + packet);
+    ASSERT_EQ(chunk, 37u) << "behind IHDR and the chunk's length";
+    EXPECT_NE(jpeg.find(std::string("http://ns.adobe.com/xap/1.0/\0", 29) + packet), std::string::npos);
+    EXPECT_EQ(jpeg[20], '\xff');
+    EXPECT_EQ(jpeg[21], '\xe1') << "behind JFIF's marker";
+    // The chunk's checksum holds: libpng refuses another text.
+    std::string other = png;
+    other[chunk + 100] ^= 1;
+    std::ofstream(folder / "other.png", std::ios::binary) << other;
+    expect_error<InputError>([&] { load_image(folder / "other.png"); }, {"CRC"});
+    EXPECT_THROW(
+        image::with_xmp(std::vector<unsigned char>(jpeg.begin(), jpeg.end()), std::string(65536, 'x')),
+        RunError);
 }
 
 TEST(ImageFiles, ExrKeepsEveryBit) {
@@ -114,7 +150,7 @@ TEST(ImageFiles, RefusesWhatItCannotRead) {
     const auto text = folder.write("text.jpg", "this is\nno picture\n");
     expect_error<InputError>([&] { load_image(text); }, {"text.jpg"});
     expect_error<InputError>([&] { read_image_size(text); }, {"text.jpg"});
-    expect_error<InputError>([&] { save_image(folder / "a.jpg", Image(1, 1, 3)); }, {".png or .exr"});
+    expect_error<InputError>([&] { save_image(folder / "a.gif", Image(1, 1, 3)); }, {".png, .jpg or .exr"});
     expect_error<InputError>([&] { save_image(folder / "a.png", Image()); }, {"without pixels"});
     expect_error<RunError>([&] { save_image(folder / "none" / "a.png", Image(1, 1, 3)); }, {"none/a.png"});
 }

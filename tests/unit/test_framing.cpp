@@ -216,6 +216,18 @@ TEST(LookAt, TheTargetIsInTheMiddleAndUpIsUp) {
     EXPECT_NEAR(framing_pixel(down, {0, 0, 0}).x, 32, 1e-9);
 }
 
+TEST(PinholeAt, LooksTheSameWay) {
+    Camera camera = look_at({1, 2, 3}, {4, 0, 1}, {0, 0, 1}, 200, 100);
+    camera.fx = 77;
+    EXPECT_EQ(pinhole_at(camera).fx, 77) << "a pinhole stays what it is";
+    camera.distortion.lens = Lens::equirectangular;
+    const Camera pinhole = pinhole_at(camera);
+    EXPECT_TRUE(pinhole.distortion.none());
+    EXPECT_EQ(pinhole.rotation, camera.rotation);
+    EXPECT_EQ(pinhole.translation, camera.translation);
+    EXPECT_NEAR(pinhole.fx, 50 / std::tan(glm::radians(25.0)), 1e-9);
+}
+
 TEST(Orbited, KeepsTheTargetsPixelAndTheDistance) {
     const glm::dvec3 target(1, 0, 2), up(0, -1, 0);
     const Camera start = look_at({1, -1, -3}, target, up, 640, 480);

@@ -95,7 +95,7 @@ const std::vector<std::pair<std::string, Modules>> kLibraries = {
     {"nanoflann", {"src/scene"}},
     {"tiny_gltf", {"src/io/gltf"}},
     {"zstd", {"src/io/splats"}},
-    {"zlib", {"src/io/splats", "src/portions", "src/train"}},
+    {"zlib", {"src/image", "src/io/splats", "src/portions", "src/train"}},
     {"nlohmann/",
      {"src/core", "src/image", "src/capture", "src/io/splats", "src/io/datasets", "src/io/gltf",
       "src/pathtracer", "src/run", "src/report", "src/live", "src/bench", "src/cli", "src/viewer",

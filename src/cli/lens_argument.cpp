@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/lens_argument.h"
+
+#include <sstream>
+#include <vector>
+
+#include "core/text.h"
+#include "ewa/error.h"
+
+namespace ewa::cli {
+
+LensArgument lens_of(const std::string& text) {
+    const size_t colon = text.find(':');
+    const std::string name = text.substr(0, colon);
+    std::vector<double> numbers;
+    std::stringstream list(colon == std::string::npos ? "" : text.substr(colon + 1));
+    for (std::string word; std::getline(list, word, ',');) {
+        const auto number = core::parse_number(word);
+        if (!number) throw InputError("--lens: '" + word + "' is not a number; expected " + kLensForms);
+        numbers.push_back(*number);
+    }
+    const size_t most = name == "fisheye" ? 1 : name == "opencv" ? 4 : 0;
+    const bool good = name == "fisheye" || name == "equirect" || name == "ortho" ||
+                      (name == "opencv" && !numbers.empty() && numbers.size() != 3);
+    if (!good || numbers.size() > most)
+        throw InputError("--lens: '" + text + "' is no lens; expected " + kLensForms);
+    LensArgument out;
+    if (name == "fisheye") {
+        out.lens.lens = Lens::fisheye;
+        if (!numbers.empty()) out.fisheye_degrees = numbers[0];
+        if (!(out.fisheye_degrees > 0 && out.fisheye_degrees <= 360))
+            throw InputError("--lens: a fisheye shows more than 0 and at most 360 degrees");
+    } else if (name == "equirect") {
+        out.lens.lens = Lens::equirectangular;
+    } else if (name == "ortho") {
+        out.lens.lens = Lens::orthographic;
+    } else {
+        numbers.resize(4);
+        out.lens = {.k1 = numbers[0], .k2 = numbers[1], .p1 = numbers[2], .p2 = numbers[3]};
+    }
+    return out;
+}
+
+}  // namespace ewa::cli

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// The lens that a word of the command line names, to render through.
+#pragma once
+#include <string>
+
+#include "ewa/camera.h"
+
+namespace ewa::cli {
+
+inline constexpr const char* kLensForms = "fisheye[:DEGREES], equirect, ortho or opencv:K1[,K2[,P1,P2]]";
+
+struct LensArgument {
+    Distortion lens;
+    double fisheye_degrees = 180;  // along the smaller side of a fisheye's image; above 0, at most 360
+};
+
+/// From text such as fisheye:190. Throws InputError that begins with --lens.
+LensArgument lens_of(const std::string& text);
+
+}  // namespace ewa::cli
