@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "ewa/dataset.h"
+#include "scene/native_lens.h"
 #include "shared/constants.h"
 #include "support/random_scene.h"
 
@@ -222,6 +223,27 @@ GoldenScene poisoned() {
     return s;
 }
 
+/// Splats all round the camera, seen through a lens. Some are close to the axis, the poles and the seam of 360°, and behind.
+GoldenScene through_lens(const std::string& name, const Distortion& lens, double degrees) {
+    GoldenScene s{name, {}, plain_camera(24), {}, Shown::color, 1, kEdges};
+    const glm::dquat turn = about({0.3, 1, 0.2}, 50);
+    s.camera.rotation = glm::transpose(glm::mat3_cast(turn));
+    s.camera = scene::through_lens(s.camera, lens, degrees, {0, 0, 0});
+    if (lens.lens == Lens::orthographic) s.camera.fx = s.camera.fy = 8;
+    s.options.background = {0.1f, 0.2f, 0.3f};
+    Random random(91);
+    for (int i = 0; i < 160; ++i) {
+        const double z = random.uniform(-1, 1), longitude = random.uniform(0, 2 * std::numbers::pi);
+        const double distance = random.uniform(2, 5), r = std::sqrt(1 - z * z);
+        const glm::dvec3 view(r * std::cos(longitude), r * std::sin(longitude), z);
+        add(s.gaussians, turn * (distance * view),
+            {distance * random.uniform(0.03, 0.2), distance * random.uniform(0.03, 0.1), 0.05 * distance},
+            0.9, {random.uniform(), random.uniform(), random.uniform()},
+            about({view.y, 0.3, view.x}, 41.0 * i));
+    }
+    return s;
+}
+
 /// The points of the scene that comes with ewa, as training starts from them.
 GoldenScene still_life() {
     const Dataset dataset = load_dataset(source_folder() / "scenes/still_life", {.downscale = 4});
@@ -273,6 +295,10 @@ std::vector<GoldenScene> golden_scenes() {
         poisoned(),
         still_life(),
         spheres(),
+        through_lens("native_brown", {.k1 = -0.1, .k2 = 0.02, .p1 = 0.02, .p2 = -0.01, .s1 = 0.02}, 0),
+        through_lens("native_fisheye_220", {.k1 = 0.02, .k2 = -0.01, .lens = Lens::fisheye}, 220),
+        through_lens("native_360", {.lens = Lens::equirectangular}, 0),
+        through_lens("native_orthographic", {.lens = Lens::orthographic}, 0),
     };
     for (GoldenScene& scene : scenes)
         if (scene.options.kernel == Footprint::density) scene.name = "density";

@@ -9,96 +9,12 @@
 #include <limits>
 
 #include "bench/result.h"
+#include "bench/stability/case_table.h"
 #include "bench/stability/stability.h"
 #include "core/random.h"
 
 namespace ewa::bench {
 namespace {
-
-constexpr uint32_t kSeed = 0x73746966u;
-
-std::array<double, 4> uniform(uint32_t i, uint32_t stream) {
-    return core::uniform4({i, stream, kSeed, 0});
-}
-
-double between(double u, double low, double high) {
-    return low + (high - low) * u;
-}
-
-glm::dmat3 turned(double angle_x, double angle_y) {
-    const double cx = std::cos(angle_x), sx = std::sin(angle_x), cy = std::cos(angle_y),
-                 sy = std::sin(angle_y);
-    return glm::dmat3(1, 0, 0, 0, cx, sx, 0, -sx, cx) * glm::dmat3(cy, 0, -sy, 0, 1, 0, sy, 0, cy);
-}
-
-/// The default camera: a small image from a generic position.
-Camera usual_camera() {
-    const glm::dmat3 rotation = turned(0.4, -0.7);
-    return {64, 48, 70, 66, 31.3, 24.8, rotation, -(rotation * glm::dvec3(0.7, -0.4, 0.2))};
-}
-
-struct Sketch {
-    glm::dvec3 view{0, 0, 4};  // camera coordinates
-    glm::dvec3 scale{0.2};     // world units
-    std::array<double, 4> quaternion{1, 0, 0, 0};
-    double logit = 0;
-};
-
-/// A splat at a random position in the image, 2 to 12 % of the image's size wide.
-Sketch usual_sketch(uint32_t i, const Camera& camera, double z) {
-    const auto a = uniform(i, 1), b = uniform(i, 2), c = uniform(i, 3);
-    Sketch s;
-    s.view = {(between(a[0], -0.05, 1.05) * camera.width - camera.cx) / camera.fx * z,
-              (between(a[1], -0.05, 1.05) * camera.height - camera.cy) / camera.fy * z, z};
-    const double pixels = between(a[2], 0.02, 0.12) * std::max(camera.width, camera.height);
-    for (int k = 0; k < 3; ++k)
-        s.scale[k] = pixels * z / camera.fx * std::exp(between(b[size_t(k)], -0.6, 0.6));
-    const auto n = core::normal3({i, 4, kSeed, 0});
-    s.quaternion = {between(c[0], -1, 1), n[0], n[1], n[2]};
-    s.logit = between(c[1], -2, 3);
-    return s;
-}
-
-double usual_depth(uint32_t i) {
-    return between(uniform(i, 5)[0], 2, 8);
-}
-
-using Change = std::function<void(Sketch&, uint32_t index)>;
-
-class Builder {
-  public:
-    explicit Builder(const Camera& camera, int sh_degree = 1) : camera_(camera) {
-        out_.sh_degree = sh_degree;
-    }
-
-    void add(const Sketch& sketch) {
-        const uint32_t i = uint32_t(out_.size());
-        const glm::dvec3 mean = glm::transpose(camera_.rotation) * sketch.view + camera_.position();
-        for (int k = 0; k < 3; ++k) {
-            out_.means.push_back(float(mean[k]));
-            out_.log_scales.push_back(float(std::log(sketch.scale[k])));
-        }
-        for (const double q : sketch.quaternion) out_.quaternions.push_back(float(q));
-        out_.opacity_logits.push_back(float(sketch.logit));
-        for (size_t k = 0; k < out_.sh_stride(); ++k) {
-            const double u = uniform(i, 16 + uint32_t(k))[0];
-            out_.sh.push_back(float(k < 3 ? between(u, -1.5, 1.7) : between(u, -0.3, 0.3)));
-        }
-    }
-    /// Adds splats at the usual depths times `depth`.
-    void add_usual(uint32_t count, const Change& change = {}, double depth = 1) {
-        for (uint32_t i = 0; i < count; ++i) {
-            Sketch sketch = usual_sketch(i, camera_, depth * usual_depth(i));
-            if (change) change(sketch, i);
-            add(sketch);
-        }
-    }
-    Gaussians take() { return std::move(out_); }
-
-  private:
-    Camera camera_;
-    Gaussians out_;
-};
 
 Gaussians usual_scene(const Camera& camera, uint32_t count, int sh_degree = 1, const Change& change = {},
                       double depth = 1) {
@@ -106,19 +22,6 @@ Gaussians usual_scene(const Camera& camera, uint32_t count, int sh_degree = 1, c
     builder.add_usual(count, change, depth);
     return builder.take();
 }
-
-struct Table {
-    std::vector<StabilityCase> cases;
-
-    void add(std::string name, std::string what, Gaussians gaussians, const Camera& camera = usual_camera(),
-             Footprint kernel = Footprint::peak) {
-        cases.push_back({std::move(name),
-                         std::move(what),
-                         std::move(gaussians),
-                         camera,
-                         {.background = {0.2f, 0.5f, 0.8f}, .kernel = kernel}});
-    }
-};
 
 const std::pair<Footprint, const char*> kKernels[] = {
     {Footprint::peak, ""}, {Footprint::antialias, "_antialias"}, {Footprint::density, "_density"}};
@@ -155,7 +58,7 @@ void add_scales(Table& table) {
             Builder builder(usual_camera());
             builder.add_usual(40, [&](Sketch& s, uint32_t i) {
                 s.scale *= factor;
-                if (factor > 1) s.logit = between(uniform(i, 6)[0], -3, -1);  // transparent
+                if (factor > 1) s.logit = between(numbers_of(i, 6)[0], -3, -1);  // transparent
             });
             // If none of them is visible, others are, which must not be affected.
             const bool unseen = kernel != Footprint::peak && factor < 1;
@@ -175,7 +78,7 @@ void add_depths(Table& table) {
             const double z = around[i % std::size(around)];
             Sketch s = usual_sketch(i, camera, z == 0 ? 0.01 : std::abs(z));
             s.view.z = z;
-            if (large) s.scale = glm::dvec3(between(uniform(i, 7)[0], 0.1, 1));
+            if (large) s.scale = glm::dvec3(between(numbers_of(i, 7)[0], 0.1, 1));
             if (large) s.logit = -2;
             builder.add(s);
         }
@@ -395,7 +298,7 @@ std::vector<StabilityCase> stability_cases() {
     Table table;
     for (const auto add : {add_ordinary, add_axis_ratios, add_scales, add_depths, add_far_from_origin,
                            add_opacities, add_stacks, add_images, add_focal_lengths, add_quaternions,
-                           add_colors, add_replaced, add_points, add_rays})
+                           add_colors, add_replaced, add_points, add_rays, add_lenses})
         add(table);
     return std::move(table.cases);
 }
@@ -426,7 +329,7 @@ Image stability_target(int width, int height) {
     Image target(width, height, 3);
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x) {
-            const auto noise = uniform(uint32_t(x), 1000 + uint32_t(y));
+            const auto noise = numbers_of(uint32_t(x), 1000 + uint32_t(y));
             for (int c = 0; c < 3; ++c)
                 target.at(x, y)[c] =
                     float(0.5 + 0.3 * std::sin(0.21 * x + 0.13 * y + 2 * c) + 0.2 * (noise[size_t(c)] - 0.5));
