@@ -70,4 +70,10 @@ vec3 lens_point_gradient(FootprintGradient f, Projection p, float by_log) {
     }
     return exact + lens_bend_gradient(point_of(p.view), v0, v1);
 }
+
+// As focal_gradient, of a lens whose bounds stay.
+float lens_focal_gradient(FootprintGradient f, Projection p) {
+    const vec2 focal = vec2(camera.focal_hi[0], camera.focal_hi[1]);
+    return dot(f.mean, focal * vec2(p.image.x.x, p.image.y.x)) + f.log_scale.x + f.log_scale.y + f.log_scale.z;
+}
 #endif

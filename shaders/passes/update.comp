@@ -47,12 +47,16 @@ struct MotionGradient {
     vec3 shift;
 };
 
-// The rotation turns the splat's position and axes, as the camera sees them. The shift moves the mean the other way.
-MotionGradient motion_gradient(FootprintGradient f, StoredProjection stored, vec3 view_gradient, vec3 torque, vec3 mean_gradient) {
+// The rotation turns the splat's position and axes, as the camera sees them, and the direction of parallel rays. The shift moves
+// the mean the other way.
+MotionGradient motion_gradient(FootprintGradient f, StoredProjection stored, vec3 view_gradient, vec3 torque, vec3 mean_gradient,
+                               vec3 direction_gradient) {
     const Projection p = stored.footprint;
     const vec3 position = vec3(p.view.x.x, p.view.y.x, p.view.z.x);
     const vec3 axes_torque = camera_rotation() * (rotation_of(stored.unit_quaternion) * torque);
-    return MotionGradient(vec4(cross(position, view_gradient) + axes_torque, focal_gradient(f, p)),
+    vec3 turn = cross(position, view_gradient) + axes_torque;
+    if (LENSES != 0u && camera.lens == LENS_ORTHOGRAPHIC) turn += cross(camera_rotation() * direction_gradient, vec3(0.0, 0.0, 1.0));
+    return MotionGradient(vec4(turn, LENSES != 0u ? lens_focal_gradient(f, p) : focal_gradient(f, p)),
                           -(camera_rotation() * mean_gradient));
 }
 
@@ -98,7 +102,7 @@ MotionGradient update_splat(uint i) {
     if (STATISTICS && visible) statistics[i] += statistics_of(f, vec2(push.half_size[0], push.half_size[1]));
     const MotionGradient none = MotionGradient(vec4(0.0), vec3(0.0));
     if (!MOTION || !visible) return none;
-    const MotionGradient motion = motion_gradient(f, stored, g.view, g.torque, g.mean);
+    const MotionGradient motion = motion_gradient(f, stored, g.view, g.torque, g.mean, direction_gradient);
     // One splat's gradient that is not finite leaves those of the others.
     if (is_finite(motion.first) && is_finite(motion.shift)) return motion;
     return none;

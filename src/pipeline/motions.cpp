@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <optional>
 
 #include "passes/passes.h"
 #include "pipeline/adam.h"
 #include "pipeline/model.h"
+#include "scene/native_lens.h"
 
 namespace ewa::pipeline {
 namespace {
@@ -35,25 +38,61 @@ std::array<double, kRows> image_derivative(const glm::dvec3& p, int row) {
     return {-1 - v * v, u * v, u, v, 0, -1 / p.z, v / p.z};
 }
 
+using Derivative = std::array<std::array<double, kRows>, 2>;
+
+/// The same through a lens, by central differences. Empty where the lens does not show the point.
+std::optional<Derivative> lens_derivative(const Camera& camera, double limit, const glm::dvec3& p) {
+    const glm::dvec2 focal(camera.fx, camera.fy), center(camera.cx, camera.cy),
+        size(camera.width, camera.height);
+    const auto pixel = scene::pixel_of(camera, limit, p);
+    if (!pixel || pixel->x < 0 || pixel->y < 0 || pixel->x >= size.x || pixel->y >= size.y)
+        return std::nullopt;
+    const glm::dvec2 here = (*pixel - center) / focal;
+    glm::dvec3 rows[2];
+    for (int k = 0; k < 3; ++k) {
+        glm::dvec3 step(0);
+        step[k] = 1e-5 * glm::length(p);
+        const auto after = scene::pixel_of(camera, limit, p + step);
+        const auto before = scene::pixel_of(camera, limit, p - step);
+        if (!after || !before) return std::nullopt;
+        const glm::dvec2 slope = (*after - *before) / focal / (2 * step[k]);
+        // Across the seam of 360 degrees the image jumps.
+        if (std::abs(after->x - before->x) > 0.5 * size.x) return std::nullopt;
+        for (int r = 0; r < 2; ++r) rows[r][k] = slope[r];
+    }
+    Derivative out;
+    for (size_t r = 0; r < 2; ++r) {
+        const glm::dvec3 by_turn = glm::cross(p, rows[r]);
+        out[r] = {by_turn.x, by_turn.y, by_turn.z, here[int(r)], -rows[r].x, -rows[r].y, -rows[r].z};
+    }
+    return out;
+}
+
+/// By the camera's lens. Empty where the camera does not see the point.
+std::optional<Derivative> seen_derivative(const Camera& camera, double limit, const glm::dvec3& p) {
+    if (!camera.distortion.none()) return lens_derivative(camera, limit, p);
+    if (!(p.z > shared::NEAR_PLANE)) return std::nullopt;
+    const double x = camera.fx * p.x / p.z + camera.cx, y = camera.fy * p.y / p.z + camera.cy;
+    if (!(x >= 0 && x < camera.width && y >= 0 && y < camera.height)) return std::nullopt;
+    return Derivative{image_derivative(p, 0), image_derivative(p, 1)};
+}
+
 using Matrix = std::array<std::array<double, kRows>, kRows>;
 
 /// Adds J^T J of the points that the camera sees. Returns their number.
 size_t add_points(Matrix& a, const Camera& camera, const Gaussians& gaussians) {
-    std::vector<glm::dvec3> seen;
-    for (size_t i = 0; i < gaussians.size(); ++i) {
-        const glm::dvec3 p = camera.rotation * gaussians.world_mean(i) + camera.translation;
-        if (!(p.z > shared::NEAR_PLANE)) continue;
-        const double x = camera.fx * p.x / p.z + camera.cx, y = camera.fy * p.y / p.z + camera.cy;
-        if (x >= 0 && x < camera.width && y >= 0 && y < camera.height) seen.push_back(p);
-    }
+    const double limit = scene::lens_limit(camera);
+    std::vector<Derivative> seen;
+    for (size_t i = 0; i < gaussians.size(); ++i)
+        if (const auto d = seen_derivative(camera, limit,
+                                           camera.rotation * gaussians.world_mean(i) + camera.translation))
+            seen.push_back(*d);
     const size_t stride = seen.size() / kBasisPoints + 1;
     size_t points = 0;
     for (size_t i = 0; i < seen.size(); i += stride, ++points)
-        for (const int row : {0, 1}) {
-            const auto j = image_derivative(seen[i], row);
+        for (const auto& j : seen[i])
             for (size_t r = 0; r < kRows; ++r)
                 for (size_t c = 0; c < kRows; ++c) a[r][c] += j[r] * j[c];
-        }
     return points;
 }
 
@@ -134,7 +173,10 @@ CameraUse record_move_camera(const passes::Recorder& on, const Motions& motions,
                                  .motions = motions.values,
                                  .moved = motions.camera},
               {.photo = photo});
-    return {&motions.camera, 0, base.width, base.height};
+    CameraUse use = base;
+    use.buffer = &motions.camera;
+    use.offset = 0;
+    return use;
 }
 
 void record_motion_sums(const passes::Recorder& on, const FrameBuffers& frame) {

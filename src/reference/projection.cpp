@@ -280,7 +280,7 @@ void shadow_backward(const ProjectionSteps& s, double by_log, glm::dvec3& log_sc
     log_scale += by_log * (1.0 - squares / (squares.x + squares.y + squares.z));
 }
 
-/// Sets the coefficients' gradient and returns dL/d(mean - camera position) through the direction.
+/// Sets the coefficients' gradient and returns dL/d(direction), as if it were free.
 glm::dvec3 color_backward(const Splat& splat, const ProjectionSteps& s, const glm::dvec3& gradient,
                           Splat& out) {
     glm::dvec3 by_color(0);
@@ -292,27 +292,37 @@ glm::dvec3 color_backward(const Splat& splat, const ProjectionSteps& s, const gl
         out.sh[j] = basis[j] * by_color;
         by_direction += glm::dot(by_color, splat.sh[j]) * basis_gradient[j];
     }
+    return by_direction;
+}
+
+/// dL/d(mean - camera position) through the direction.
+glm::dvec3 direction_backward(const ProjectionSteps& s, const glm::dvec3& by_direction) {
     if (s.parallel) return glm::dvec3(0);
     return (by_direction - s.direction * glm::dot(s.direction, by_direction)) / glm::length(s.offset);
 }
 
-/// by_log: dL/d ln(optical depth) of a density, whose |J| has both focal lengths; else 0.
+/// by_log: dL/d ln(optical depth) of a density, whose |J| has both focal lengths; else 0. Through another lens than a pinhole, the
+/// bounds of tangents do not move with the focal lengths.
 void add_motion_gradient(const ProjectionSteps& s, const Camera& camera, const ScreenGradient& g,
                          const Rows& by_m, double by_log, const glm::dvec3& by_view,
-                         const glm::dvec3& by_mean, CameraMotion& out) {
-    const double z = s.view.z, fx = camera.fx / z, fy = camera.fy / z;
+                         const glm::dvec3& by_mean, const glm::dvec3& by_direction, CameraMotion& out) {
     // dL/dJ by rows, and with that dL/dW_j = J^T dL/d(J W)_j.
     const glm::dmat3 axes =
         camera.rotation *
         glm::dmat3(s.rotation[0] * s.scale[0], s.rotation[1] * s.scale[1], s.rotation[2] * s.scale[2]);
     const glm::dvec3 by_jx = axes * by_m.x, by_jy = axes * by_m.y;
-    const glm::dvec3 jx{fx, 0, -fx * s.slope.x}, jy{0, fy, -fy * s.slope.y};
+    const glm::dvec3 &jx = s.image.jacobian.x, &jy = s.image.jacobian.y;
     out.rotation += glm::cross(s.view, by_view) + glm::cross(by_jx, jx) + glm::cross(by_jy, jy);
+    // Parallel rays turn with the camera, and with them the direction of the colours.
+    if (s.parallel) out.rotation += glm::cross(camera.rotation * by_direction, glm::dvec3(0, 0, 1));
     out.shift -= camera.rotation * by_mean;
+    const glm::dvec2 from_center = s.image.pixel - glm::dvec2(camera.cx, camera.cy);
     out.log_focal +=
-        g.mean2d.x * fx * s.view.x + g.mean2d.y * fy * s.view.y + glm::dot(by_jx, jx) + glm::dot(by_jy, jy);
+        g.mean2d.x * from_center.x + g.mean2d.y * from_center.y + glm::dot(by_jx, jx) + glm::dot(by_jy, jy);
     const double by_secant = by_log / (1 + glm::dot(s.slope, s.slope));
     out.log_focal += 2 * by_log;
+    if (!camera.distortion.none()) return;
+    const double fx = camera.fx / s.view.z, fy = camera.fy / s.view.z;
     if (!s.slope_free.x) out.log_focal += fx * s.slope.x * by_jx.z - by_secant * s.slope.x * s.slope.x;
     if (!s.slope_free.y) out.log_focal += fy * s.slope.y * by_jy.z - by_secant * s.slope.y * s.slope.y;
 }
@@ -334,12 +344,13 @@ Splat project_backward(const Splat& splat, const Camera& camera, const RenderOpt
     shape_backward(s, by_m, out);
     const double by_logit = projected.density ? s.sigmoid : s.sigmoid * (1 - s.sigmoid);
     out.opacity_logit = gradient.opacity * s.kernel_factor * by_logit;
-    const glm::dvec3 by_offset = color_backward(splat, s, gradient.color, out);
+    const glm::dvec3 by_direction = color_backward(splat, s, gradient.color, out);
     const double by_log = projected.density ? gradient.opacity * projected.opacity : 0;
     const glm::dvec3 by_view = view_backward(s, camera, gradient, by_m, by_log);
     if (projected.density) shadow_backward(s, by_log, out.log_scale);
-    out.mean = glm::transpose(camera.rotation) * by_view + by_offset;
-    if (by_motion) add_motion_gradient(s, camera, gradient, by_m, by_log, by_view, out.mean, *by_motion);
+    out.mean = glm::transpose(camera.rotation) * by_view + direction_backward(s, by_direction);
+    if (by_motion)
+        add_motion_gradient(s, camera, gradient, by_m, by_log, by_view, out.mean, by_direction, *by_motion);
     return out;
 }
 

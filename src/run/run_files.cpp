@@ -138,7 +138,8 @@ io::ImageRecord refined_record(const Frame& frame, const Camera& given) {
     record.camera.translation = frame.camera.translation;
     record.camera.fx *= longer;
     record.camera.fy *= longer;
-    record.distortion = scene::for_longer_focal(frame.distortion, longer);
+    record.distortion = frame.camera.distortion.none() ? scene::for_longer_focal(frame.distortion, longer)
+                                                       : frame.camera.distortion;
     return record;
 }
 
@@ -166,6 +167,9 @@ void RunFolder::save_cameras(const Dataset& dataset, const Split& split, const s
         images.push_back(refined_record(frame, given[i]));
     }
     io::write_refined_cameras(path_ / report::kCamerasFile, cameras, extent);
+    // COLMAP has no parallel rays.
+    const auto parallel = [](const Frame& f) { return f.camera.distortion.lens == Lens::orthographic; };
+    if (std::ranges::any_of(dataset.frames, parallel)) return;
     PointCloud points = dataset.points;
     for (glm::dvec3& point : points.positions) point = world(point);
     io::write_colmap(path_ / "cameras/sparse/0", images, points);

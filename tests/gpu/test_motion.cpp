@@ -13,6 +13,8 @@
 #include "pipeline/backward.h"
 #include "pipeline/frame_inputs.h"
 #include "reference/projection.h"
+#include "scene/native_lens.h"
+#include "support/random_lens.h"
 
 namespace ewa::test {
 namespace {
@@ -263,6 +265,38 @@ TEST(MotionBasis, MovesTheImageEquallyAlongEachCoordinate) {
     }
     for (const float value : pipeline::motion_basis(camera, Gaussians(), true, 2))
         EXPECT_TRUE(std::isfinite(value));
+}
+
+TEST(MotionBasis, MovesTheImageOfALensEquallyToo) {
+    for (const auto& [name, camera] : random_lenses(5300, 61, 47)) {
+        SCOPED_TRACE(name);
+        const Gaussians gaussians = gaussians_around(5301, 500, camera, 0);
+        const MotionBasis basis = pipeline::motion_basis(camera, gaussians, false, 2);
+        const double limit = scene::lens_limit(camera);
+        for (size_t j = 0; j < kMotionFloats; ++j) {
+            const double h = 1e-5;
+            const auto value = [&](size_t i) { return h * double(basis[kMotionFloats * i + j]); };
+            const Camera there =
+                moved(camera, {{value(0), value(1), value(2)}, value(3), {value(4), value(5), value(6)}});
+            double square = 0;
+            size_t points = 0;
+            for (size_t i = 0; i < gaussians.size(); ++i) {
+                const auto pixel = [&](const Camera& c) {
+                    return scene::pixel_of(c, limit, c.rotation * gaussians.world_mean(i) + c.translation);
+                };
+                const auto at = pixel(camera), after = pixel(there);
+                if (!at || !after || at->x < 0 || at->x >= 61 || at->y < 0 || at->y >= 47) continue;
+                const glm::dvec2 by = (*after - *at) / h / glm::dvec2(camera.fx, camera.fy);
+                if (std::abs(after->x - at->x) > 30) continue;  // across the seam
+                square += glm::dot(by, by);
+                ++points;
+            }
+            ASSERT_GT(points, 50u);
+            // Parallel rays show nothing of a shift along them.
+            const bool unseen = camera.distortion.lens == Lens::orthographic && j == 6;
+            EXPECT_NEAR(std::sqrt(square / double(points)), j == 3 || unseen ? 0 : 0.9, 0.2) << j;
+        }
+    }
 }
 
 TEST(MotionUpdate, AStepThatIsNotFiniteIsDroppedAndCounted) {

@@ -166,6 +166,27 @@ TEST(GradientThroughALens, IsTheSlopeOfTheReferencesLoss) {
             check("log scales", values.log_scales, g.log_scales, cpu.gradient.log_scales);
             check("opacities", values.opacity_logits, g.opacity_logits, cpu.gradient.opacity_logits);
             check("sh", values.sh, g.sh, cpu.gradient.sh);
+
+            CameraMotion motion;
+            const auto moved_loss = [&] {
+                return reference::loss_gradient(gaussians, moved(camera, motion), target, options).loss;
+            };
+            for (int part = 0; part < 2; ++part) {
+                glm::dvec3& value = part == 0 ? motion.rotation : motion.shift;
+                const glm::dvec3 of_cpu = part == 0 ? cpu.camera.rotation : cpu.camera.shift;
+                const glm::dvec3 of_device = part == 0 ? actual.camera.rotation : actual.camera.shift;
+                std::vector<double> slope;
+                for (int k = 0; k < 3; ++k)
+                    slope.push_back(best_central_difference(moved_loss, value[k], of_cpu[k], 1e-4, 1e-7));
+                GradientTolerance tolerance;
+                tolerance.cosine = 1e-7;
+                tolerance.norm = 3e-4;
+                const auto list = [](const glm::dvec3& v) { return std::vector<double>{v.x, v.y, v.z}; };
+                EXPECT_TRUE(gradients_agree(list(of_cpu), slope, tolerance))
+                    << "camera of the reference, " << part;
+                EXPECT_TRUE(gradients_agree(list(of_device), slope, tolerance))
+                    << "camera of the device, " << part;
+            }
         }
 }
 

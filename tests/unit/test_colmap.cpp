@@ -5,6 +5,7 @@
 
 #include "ewa/dataset.h"
 #include "io/datasets/image_records.h"
+#include "scene/native_lens.h"
 #include "support/temp_folder.h"
 
 namespace {
@@ -320,6 +321,8 @@ TEST(ColmapWriter, WhatIsWrittenIsReadBack) {
     add("i.jpg", {.k1 = 0.9, .lens = Lens::fov});
     add("j.jpg", {.k1 = -0.1, .lens = Lens::division});
     add("k.jpg", {.k1 = 0.5, .k2 = 1.1, .lens = Lens::unified});
+    add("l.jpg", {.lens = Lens::equirectangular});
+    scene::set_equirectangular(images.back().camera);
     const PointCloud points{{{1, 2, 3}, {-4.5, 1e-3, 7}}, {{1, 2, 3}, {255, 0, 128}}};
     io::write_colmap(folder / "sparse/0", images, points);
     const io::ImageRecords read = io::read_colmap(folder / "sparse/0", folder / "images");

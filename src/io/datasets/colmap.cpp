@@ -377,11 +377,11 @@ ImageRecords read_colmap(const std::filesystem::path& model, const std::filesyst
 
 namespace {
 
-/// The position in kLenses of the first lens model with two focal lengths that has all of the distortion's terms.
+/// The position in kLenses of the first lens model that has all of the distortion's terms, and not one focal length.
 int32_t lens_with(const Distortion& distortion) {
     for (size_t i = 0; i < std::size(kLenses); ++i) {
         const ColmapLens& lens = kLenses[i];
-        if (lens.focal_lengths != 2 || lens.lens != distortion.lens) continue;
+        if (lens.focal_lengths == 1 || lens.lens != distortion.lens) continue;
         Distortion kept;
         kept.lens = lens.lens;
         for (const auto term : lens.terms)
@@ -415,7 +415,9 @@ bool same_lens(const ImageRecord& a, const ImageRecord& b) {
 void write_camera(BinaryFile& file, uint32_t id, const ImageRecord& image) {
     const Camera& c = image.camera;
     const int32_t lens = lens_with(image.distortion);
-    file.add(id, lens, uint64_t(c.width), uint64_t(c.height), c.fx, c.fy, c.cx, c.cy);
+    file.add(id, lens, uint64_t(c.width), uint64_t(c.height));
+    if (kLenses[lens].focal_lengths == 0) return file.add(double(c.width), double(c.height));
+    file.add(c.fx, c.fy, c.cx, c.cy);
     for (const auto term : kLenses[lens].terms)
         if (term) file.add(image.distortion.*term);
 }
