@@ -343,8 +343,10 @@ INSTANTIATE_TEST_SUITE_P(SignedAndAbsolute, UpdateStatistics, testing::Bool());
 
 /// d(opacity) / d(logit) and d(scale) / d(log scale), on top of the loss's gradient, for what is not drawn
 /// too.
-TEST(UpdateRegularisers, PullAtEveryOpacityAndScale) {
-    const Scene scene = random_scene(1905, 150, SplatKind::mixed, 61, 47, 1);
+class UpdateRegularisers : public testing::TestWithParam<Footprint> {};
+
+TEST_P(UpdateRegularisers, PullAtEveryOpacityAndScale) {
+    const Scene scene = random_scene(1905, 150, SplatKind::mixed, 61, 47, 1, GetParam());
     const Slots slots(scene);
     GuardedModel plain(scene.gaussians), pulled(scene.gaussians);
     Bench bench(slots);
@@ -369,6 +371,9 @@ TEST(UpdateRegularisers, PullAtEveryOpacityAndScale) {
     EXPECT_EQ(a.quaternions, b.quaternions);
     EXPECT_EQ(a.sh, b.sh);
 }
+
+INSTANTIATE_TEST_SUITE_P(PeakAndDensity, UpdateRegularisers,
+                         testing::Values(Footprint::peak, Footprint::density));
 
 TEST(UpdateEdges, AnUpdateThatIsNotFiniteIsDroppedAndCounted) {
     const Scene scene = random_scene(1902, 40, SplatKind::ordinary, 61, 47, 1);
