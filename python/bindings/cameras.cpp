@@ -4,6 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/matrix.hpp>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "scene/native_lens.h"
 
 namespace ewa::python {
 namespace {
@@ -50,25 +55,86 @@ void set_intrinsics(Camera& camera, const double* k, const std::string& name) {
     camera.cy = k[5];
 }
 
+using Term = double Distortion::*;
+// OpenCV's orders (calib3d, "Detailed Description" and fisheye).
+constexpr Term kBrownTerms[] = {&Distortion::k1, &Distortion::k2, &Distortion::p1, &Distortion::p2,
+                                &Distortion::k3, &Distortion::k4, &Distortion::k5, &Distortion::k6,
+                                &Distortion::s1, &Distortion::s2, &Distortion::s3, &Distortion::s4};
+constexpr Term kFisheyeTerms[] = {&Distortion::k1, &Distortion::k2, &Distortion::k3, &Distortion::k4};
+
+std::span<const Term> terms_of_lens(Lens lens) {
+    if (lens == Lens::brown) return kBrownTerms;
+    if (lens == Lens::fisheye) return kFisheyeTerms;
+    return {};
+}
+
+const std::pair<const char*, Lens> kModels[] = {{"pinhole", Lens::brown},
+                                                {"opencv", Lens::brown},
+                                                {"fisheye", Lens::fisheye},
+                                                {"equirectangular", Lens::equirectangular},
+                                                {"orthographic", Lens::orthographic}};
+
+Distortion distortion_of(const LensArguments& arguments) {
+    const auto* model = std::ranges::find_if(kModels, [&](auto& m) { return m.first == arguments.model; });
+    if (model == std::end(kModels))
+        refuse("camera_model: '" + arguments.model +
+               "' is none of pinhole, opencv, fisheye, equirectangular, orthographic");
+    Distortion lens{.lens = model->second};
+    if (arguments.distortion.is_none()) return lens;
+    const Array<double> given(arguments.distortion, "distortion", Shape{any('n')});
+    const auto terms = arguments.model == "pinhole" ? std::span<const Term>() : terms_of_lens(lens.lens);
+    if (given.size() > terms.size())
+        refuse("distortion has " + std::to_string(given.size()) + " terms; camera_model '" + arguments.model +
+               "' has at most " + std::to_string(terms.size()));
+    for (size_t i = 0; i < given.size(); ++i) {
+        if (!std::isfinite(given.data()[i])) refuse("distortion is not finite");
+        lens.*terms[i] = given.data()[i];
+    }
+    return lens;
+}
+
 }  // namespace
 
-Cameras cameras_of(nb::handle viewmats, nb::handle intrinsics, int width, int height) {
+std::string model_of(const Distortion& lens) {
+    if (lens.none()) return "pinhole";
+    for (const auto& [name, model] : kModels)
+        if (model == lens.lens && std::string(name) != "pinhole") return name;
+    return "undistorted";
+}
+
+nb::object terms_of(const Distortion& lens) {
+    std::vector<double> values;
+    for (const Term term : terms_of_lens(lens.lens)) values.push_back(lens.*term);
+    if (lens.none() || values.empty()) return nb::none();
+    const size_t count = values.size();
+    return nb::cast(to_numpy(std::move(values), {count}));
+}
+
+Cameras cameras_of(nb::handle viewmats, nb::handle intrinsics, int width, int height,
+                   const LensArguments& lens) {
+    const Distortion distortion = distortion_of(lens);
+    const bool whole = distortion.lens == Lens::equirectangular && intrinsics.is_none();
     const Array<double> poses(viewmats, "viewmats", {Shape{any('C'), 4, 4}, Shape{4, 4}});
     Cameras cameras;
     cameras.batch = poses.dimensions() == 3;
     const size_t count = cameras.batch ? poses.length(0) : 1;
-    const Array<double> ks(intrinsics, "Ks",
-                           cameras.batch
-                               ? std::initializer_list<Shape>{Shape{ptrdiff_t(count), 3, 3}, Shape{3, 3}}
-                               : std::initializer_list<Shape>{Shape{3, 3}});
+    std::optional<Array<double>> ks;
+    if (!whole)
+        ks.emplace(intrinsics, "Ks",
+                   cameras.batch ? std::initializer_list<Shape>{Shape{ptrdiff_t(count), 3, 3}, Shape{3, 3}}
+                                 : std::initializer_list<Shape>{Shape{3, 3}});
     if (width < 1 || height < 1) refuse("width and height are not positive");
-    const bool each = ks.dimensions() == 3;
+    const bool each = ks && ks->dimensions() == 3;
     for (size_t i = 0; i < count; ++i) {
         Camera camera;
         camera.width = width;
         camera.height = height;
         set_pose(camera, poses.data() + 16 * i, element("viewmats", i, cameras.batch));
-        set_intrinsics(camera, ks.data() + (each ? 9 * i : 0), element("Ks", i, each));
+        camera.distortion = distortion;
+        if (ks)
+            set_intrinsics(camera, ks->data() + (each ? 9 * i : 0), element("Ks", i, each));
+        else
+            scene::set_equirectangular(camera);
         cameras.all.push_back(camera);
     }
     return cameras;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cameras as arrays: world-to-camera matrices and intrinsics, in the OpenCV convention.
 #pragma once
+#include <string>
 #include <vector>
 
 #include "arrays.h"
@@ -13,8 +14,25 @@ struct Cameras {
     bool batch = true;  // false: viewmats is one matrix
 };
 
-/// viewmats: [C, 4, 4] or [4, 4]. Ks: [C, 3, 3] or [3, 3] for all. Throws ValueError that names the argument.
-Cameras cameras_of(nb::handle viewmats, nb::handle intrinsics, int width, int height);
+/// The lens of all cameras. model: pinhole, opencv, fisheye, equirectangular or orthographic. distortion: terms in OpenCV's order.
+struct LensArguments {
+    std::string model = "pinhole";
+    nb::object distortion = nb::none();
+};
+
+#define EWA_LENS_TYPES                                                                                   \
+    "camera_model: typing.Literal['pinhole', 'opencv', 'fisheye', 'equirectangular', 'orthographic'] = " \
+    "'pinhole', "                                                                                        \
+    "distortion: numpy.typing.ArrayLike | None = None"
+
+/// viewmats: [C, 4, 4] or [4, 4]. Ks: [C, 3, 3] or [3, 3] for all; None for an equirectangular image of all directions. Throws
+/// ValueError that names the argument.
+Cameras cameras_of(nb::handle viewmats, nb::handle intrinsics, int width, int height,
+                   const LensArguments& lens);
+
+/// What cameras_of takes for this camera's lens; distortion is None without one.
+std::string model_of(const Distortion& lens);
+nb::object terms_of(const Distortion& lens);
 
 /// [n, 4, 4] and [n, 3, 3].
 nb::ndarray<nb::numpy, double> viewmats_of(const std::vector<Camera>& cameras);

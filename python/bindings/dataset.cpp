@@ -86,7 +86,7 @@ LoadedDataset opened(const DatasetState& state) {
 
 using CameraState = std::tuple<int, int, std::array<double, 16>, int, std::array<double, 12>>;
 
-std::array<double, 12> terms_of(const Distortion& d) {
+std::array<double, 12> stored_terms(const Distortion& d) {
     return {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4};
 }
 
@@ -100,7 +100,7 @@ CameraState pickled(const Camera& c) {
         for (int k = 0; k < 3; ++k) values[size_t(4 + 3 * i + k)] = c.rotation[i][k];
         values[size_t(13 + i)] = c.translation[i];
     }
-    return {c.width, c.height, values, int(c.distortion.lens), terms_of(c.distortion)};
+    return {c.width, c.height, values, int(c.distortion.lens), stored_terms(c.distortion)};
 }
 
 Camera camera_of(const CameraState& state) {
@@ -126,7 +126,7 @@ FrameState pickled(const Frame& f) {
     return {f.name,          f.image_path,
             mask_path_of(f), f.image_exists,
             f.eight_bit,     {f.orientation, int(f.masks), f.downscale, f.split, int(d.lens), int(f.reduced)},
-            terms_of(d),     {pickled(f.camera), pickled(f.source), pickled(f.pinhole)}};
+            stored_terms(d), {pickled(f.camera), pickled(f.source), pickled(f.pinhole)}};
 }
 
 Frame frame_of(const FrameState& state) {
@@ -192,7 +192,7 @@ std::string dataset_text(const LoadedDataset& data) {
 }
 
 void bind_frame(nb::module_& module) {
-    nb::class_<Frame>(module, "Frame", "An image of a dataset, and its camera without a lens.")
+    nb::class_<Frame>(module, "Frame", "An image of a dataset, and its camera.")
         .def_ro("name", &Frame::name, "In the dataset, such as \"0001.jpg\".")
         .def_ro("image_path", &Frame::image_path)
         .def_ro("image_exists", &Frame::image_exists)
@@ -202,6 +202,13 @@ void bind_frame(nb::module_& module) {
             "width", [](const Frame& frame) { return frame.camera.width; }, "px")
         .def_prop_ro(
             "height", [](const Frame& frame) { return frame.camera.height; }, "px")
+        .def_prop_ro(
+            "camera_model", [](const Frame& frame) { return model_of(frame.camera.distortion); },
+            "As render() takes it: \"pinhole\" where the image is undistorted, or the lens of its own.")
+        .def_prop_ro(
+            "distortion", [](const Frame& frame) { return terms_of(frame.camera.distortion); },
+            nb::for_getter(nb::sig("def distortion(self) -> numpy.typing.NDArray[numpy.float64] | None")),
+            "The terms of the lens, as render() takes them.")
         .def("__repr__",
              [](const Frame& frame) {
                  return "Frame('" + frame.name + "', " + std::to_string(frame.camera.width) + "x" +

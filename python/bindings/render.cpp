@@ -123,8 +123,9 @@ class SceneRenderer {
     }
 
     Renders render(nb::handle viewmats, nb::handle intrinsics, int width, int height, nb::handle background,
-                   const std::string& mode) {
-        const Cameras cameras = cameras_of(viewmats, intrinsics, width, height);
+                   const std::string& mode, const std::string& camera_model, nb::object distortion) {
+        const Cameras cameras =
+            cameras_of(viewmats, intrinsics, width, height, {camera_model, std::move(distortion)});
         DrawOptions options{.render = options_, .drawing = drawing_of(mode)};
         use_background(options.render, background);
         const size_t count = cameras.all.size();
@@ -163,18 +164,19 @@ class SceneRenderer {
 };
 
 Renders render(const Splats& splats, nb::handle viewmats, nb::handle intrinsics, int width, int height,
-               nb::handle background, const std::string& mode, std::optional<bool> antialias,
-               std::optional<std::string> kernel, const std::string& integrator, std::optional<int> samples,
-               bool points, std::optional<int> nearest, int sh_degree) {
+               nb::handle background, const std::string& mode, const std::string& camera_model,
+               nb::object distortion, std::optional<bool> antialias, std::optional<std::string> kernel,
+               const std::string& integrator, std::optional<int> samples, bool points,
+               std::optional<int> nearest, int sh_degree) {
     return SceneRenderer(splats,
                          {antialias, std::move(kernel), integrator, samples, points, nearest, sh_degree})
-        .render(viewmats, intrinsics, width, height, background, mode);
+        .render(viewmats, intrinsics, width, height, background, mode, camera_model, std::move(distortion));
 }
 
-#define EWA_CAMERA_TYPES                                                                         \
-    "viewmats: numpy.typing.ArrayLike, Ks: numpy.typing.ArrayLike, width: int, height: int, *, " \
-    "background: numpy.typing.ArrayLike | str = (0, 0, 0), "                                     \
-    "mode: typing.Literal['color', 'depth', 'count', 'ellipsoids'] = 'color'"
+#define EWA_CAMERA_TYPES                                                                                \
+    "viewmats: numpy.typing.ArrayLike, Ks: numpy.typing.ArrayLike | None, width: int, height: int, *, " \
+    "background: numpy.typing.ArrayLike | str = (0, 0, 0), "                                            \
+    "mode: typing.Literal['color', 'depth', 'count', 'ellipsoids'] = 'color', " EWA_LENS_TYPES
 #define EWA_SCENE_TYPES EWA_LOOK_TYPES ", sh_degree: int = 3"
 
 constexpr const char* kRenderHelp =
@@ -182,7 +184,12 @@ constexpr const char* kRenderHelp =
     "[C, 3, 3] are in "
     "pixels, with pixel centres at +0.5. One matrix [4, 4] gives arrays without the first dimension. mode "
     "\"depth\" and \"count\" "
-    "add these arrays. Without antialias and kernel, the kernel is that of the splats. Ctrl-C ends it after "
+    "add these arrays. camera_model is the lens of all cameras. distortion has OpenCV's terms: k1 k2 p1 p2 "
+    "k3 k4 k5 k6 s1 s2 s3 "
+    "s4 for \"opencv\", k1 k2 k3 k4 for \"fisheye\", or the first of these. An equirectangular image shows "
+    "all directions "
+    "with Ks None. Ks of an orthographic camera are px per world unit. "
+    "Without antialias and kernel, the kernel is that of the splats. Ctrl-C ends it after "
     "a "
     "camera.";
 
@@ -235,11 +242,13 @@ void bind_render(nb::module_& module) {
             "Uploads a copy of the splats.")
         .def("replace", &SceneRenderer::replace, "splats"_a,
              "Uploads other splats, with the kernels that there are.")
-        .def("render", &SceneRenderer::render, "viewmats"_a, "Ks"_a, "width"_a, "height"_a, nb::kw_only(),
-             "background"_a = nb::make_tuple(0, 0, 0), "mode"_a = "color",
+        .def("render", &SceneRenderer::render, "viewmats"_a, "Ks"_a.none(), "width"_a, "height"_a,
+             nb::kw_only(), "background"_a = nb::make_tuple(0, 0, 0), "mode"_a = "color",
+             "camera_model"_a = "pinhole", "distortion"_a = nb::none(),
              nb::sig("def render(self, " EWA_CAMERA_TYPES ") -> Renders"), kRenderHelp);
-    module.def("render", render, "splats"_a, "viewmats"_a, "Ks"_a, "width"_a, "height"_a, nb::kw_only(),
-               "background"_a = nb::make_tuple(0, 0, 0), "mode"_a = "color", "antialias"_a = nb::none(),
+    module.def("render", render, "splats"_a, "viewmats"_a, "Ks"_a.none(), "width"_a, "height"_a,
+               nb::kw_only(), "background"_a = nb::make_tuple(0, 0, 0), "mode"_a = "color",
+               "camera_model"_a = "pinhole", "distortion"_a = nb::none(), "antialias"_a = nb::none(),
                "kernel"_a = nb::none(), "integrator"_a = "splat", "samples"_a = nb::none(),
                "points"_a = false, "nearest"_a = nb::none(), "sh_degree"_a = kMaxShDegree,
                nb::sig("def render(splats: Splats, " EWA_CAMERA_TYPES ", " EWA_SCENE_TYPES ") -> Renders"),

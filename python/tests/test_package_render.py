@@ -56,6 +56,58 @@ def test_a_batch_holds_the_single_renders():
     assert none.color.shape == (0, 48, 64, 3)
 
 
+def brightest(image):
+    """The middle of the pixels above half of the largest value: x, y in px."""
+    y, x = np.nonzero(image[..., 0] > image.max() / 2)
+    return np.array([x.mean() + 0.5, y.mean() + 0.5])
+
+
+@pytest.mark.parametrize("model", ["opencv", "fisheye", "equirectangular", "orthographic"])
+def test_a_lens_shows_a_splat_where_its_formula_says(model):
+    x, y, z = (0.8, -0.5, 1.5) if model in ("opencv", "orthographic") else (1.2, -0.7, -0.9)
+    splats = ewa.Splats(means=[[x, y, z]], quats=[[1, 0, 0, 0]], log_scales=np.full((1, 3), -3.5), opacity_logits=[3.0], sh=[[[1, 1, 1]]])
+    k = np.array([[60, 0, 101.0], [0, 58, 99.0], [0, 0, 1.0]])
+    terms = {"opencv": [0.1, -0.05, 0.02, -0.03, 0.01, 0.02, 0.0, 0.0, 0.03], "fisheye": [0.05, -0.01]}.get(model)
+    if model == "opencv":
+        a, b = x / z, y / z
+        r = a * a + b * b
+        radial = (1 + 0.1 * r - 0.05 * r**2 + 0.01 * r**3) / (1 + 0.02 * r)
+        u = a * radial + 2 * 0.02 * a * b - 0.03 * (r + 2 * a * a) + 0.03 * r
+        v = b * radial + 0.02 * (r + 2 * b * b) - 2 * 0.03 * a * b
+    elif model == "fisheye":
+        r = np.hypot(x, y)
+        angle = np.arctan2(r, z)
+        bent = angle * (1 + 0.05 * angle**2 - 0.01 * angle**4)
+        u, v = bent * x / r, bent * y / r
+    elif model == "equirectangular":
+        u, v = np.arctan2(x, z), np.arctan2(y, np.hypot(x, z))
+    else:
+        u, v = x, y
+    at = [60 * u + 101, 58 * v + 99]
+    renders = ewa.render(splats, np.eye(4), k, 380, 200, camera_model=model, distortion=terms)
+    assert np.abs(brightest(renders.color) - at).max() < 0.7
+    if model == "equirectangular":
+        whole = ewa.render(splats, np.eye(4), None, 400, 200, camera_model=model)
+        assert np.abs(brightest(whole.color) - [200 + 200 / np.pi * u, 100 + 200 / np.pi * v]).max() < 0.7
+
+
+def test_what_is_no_lens_is_refused():
+    viewmat, k, width, height = camera()
+    for kwargs, text in (
+        ({"camera_model": "tele"}, "camera_model: 'tele' is none of pinhole, opencv, fisheye"),
+        ({"camera_model": "fisheye", "distortion": [0.1] * 5}, "distortion has 5 terms; camera_model 'fisheye' has at most 4"),
+        ({"distortion": [0.1]}, "camera_model 'pinhole' has at most 0"),
+        ({"camera_model": "opencv", "distortion": [np.nan]}, "distortion is not finite"),
+        ({"camera_model": "opencv", "distortion": [[0.1]]}, "distortion"),
+    ):
+        with pytest.raises(ValueError, match=re.escape(text)):
+            ewa.render(make_splats(), viewmat, k, width, height, **kwargs)
+    with pytest.raises((TypeError, ValueError), match="Ks"):
+        ewa.render(make_splats(), viewmat, None, width, height)
+    with pytest.raises(ValueError, match="pinholes only"):
+        ewa.render(make_splats(), viewmat, k, width, height, camera_model="fisheye", integrator="ray")
+
+
 def test_renders_are_those_of_the_command_line(tmp_path, program, still_life):
     splats = ewa.Splats.from_points(still_life.points, still_life.point_colors, sh_degree=0)
     ewa.save(tmp_path / "splats.ply", splats)
