@@ -25,6 +25,7 @@
 #include "pathtracer/path_tracer.h"
 #include "pathtracer/virtual_camera.h"
 #include "scene/camera.h"
+#include "scene/frustum.h"
 #include "scene/native_lens.h"
 #include "shared/constants.h"
 

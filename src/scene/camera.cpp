@@ -13,7 +13,6 @@
 #include <stdexcept>
 
 #include "ewa/camera_motion.h"
-#include "shared/constants.h"
 
 namespace ewa {
 
@@ -73,14 +72,6 @@ glm::dmat3 between(const glm::dmat3& a, const glm::dmat3& b, double t) {
     return glm::dmat3(glm::normalize(glm::slerp(p, q, t)));
 }
 
-glm::dvec3 view_of(const glm::dvec3& point, const Camera& camera) {
-    return camera.rotation * point + camera.translation;
-}
-
-glm::dvec2 pixel_of(const glm::dvec3& view, const Camera& camera) {
-    return {camera.fx * view.x / view.z + camera.cx, camera.fy * view.y / view.z + camera.cy};
-}
-
 }  // namespace
 
 Camera along_path(std::span<const Camera> keys, double time) {
@@ -107,42 +98,6 @@ Camera along_path(std::span<const Camera> keys, double time) {
     camera.rotation = between(from.rotation, to.rotation, t);
     camera.translation = -(camera.rotation * catmull_rom(a, b, c, d, t));
     return camera;
-}
-
-glm::dvec3 world_point(const Camera& camera, double x, double y, double depth) {
-    const glm::dvec3 view((x - camera.cx) / camera.fx * depth, (y - camera.cy) / camera.fy * depth, depth);
-    return glm::transpose(camera.rotation) * (view - camera.translation);
-}
-
-std::array<Segment, 10> frustum_segments(const Camera& camera, double depth) {
-    const glm::dvec3 eye = camera.position();
-    const auto world = [&](double x, double y) { return world_point(camera, x, y, depth); };
-    const double w = camera.width, h = camera.height;
-    const std::array corners{world(0, 0), world(w, 0), world(w, h), world(0, h)};
-    const glm::dvec3 roof = world(w / 2, -h / 5);
-    std::array<Segment, 10> segments;
-    for (size_t i = 0; i < 4; ++i) {
-        segments[i] = {eye, corners[i]};
-        segments[4 + i] = {corners[i], corners[(i + 1) % 4]};
-    }
-    segments[8] = {world(w / 4, 0), roof};
-    segments[9] = {world(3 * w / 4, 0), roof};
-    return segments;
-}
-
-std::optional<std::array<glm::dvec2, 2>> projected(const Segment& segment, const Camera& camera) {
-    glm::dvec3 from = view_of(segment.from, camera), to = view_of(segment.to, camera);
-    constexpr double kNear = shared::NEAR_PLANE;
-    if (!(from.z > kNear) && !(to.z > kNear)) return std::nullopt;
-    if (from.z < kNear) from += (to - from) * ((kNear - from.z) / (to.z - from.z));
-    if (to.z < kNear) to += (from - to) * ((kNear - to.z) / (from.z - to.z));
-    return std::array{pixel_of(from, camera), pixel_of(to, camera)};
-}
-
-std::optional<glm::dvec2> projected(const glm::dvec3& point, const Camera& camera) {
-    const glm::dvec3 view = view_of(point, camera);
-    if (!(view.z > shared::NEAR_PLANE)) return std::nullopt;
-    return pixel_of(view, camera);
 }
 
 bool same_aspect(int old_width, int old_height, int width, int height) {

@@ -80,6 +80,7 @@ void Navigation::handle_key(const KeyPress& press) {
     if (key == GLFW_KEY_R) reset();
     if (key == GLFW_KEY_F) show_whole_scene();
     if (key == GLFW_KEY_T) turntable = !turntable;
+    if (key == GLFW_KEY_P) state_.settings.parallel = !state_.settings.parallel;
     if (key == GLFW_KEY_U) view.set_up(next_up(view.up()));
     if (key == GLFW_KEY_G) go_to_nearest_camera();
     if (key == GLFW_KEY_LEFT) step_camera(-1);

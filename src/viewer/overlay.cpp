@@ -9,7 +9,7 @@
 #include <cmath>
 #include <vector>
 
-#include "scene/camera.h"
+#include "scene/frustum.h"
 
 namespace ewa::viewer {
 namespace {
@@ -109,7 +109,7 @@ float centered_text(ImDrawList& list, ImFont* font, float size, ImU32 color, con
 }  // namespace
 
 void draw_help(bool& open) {
-    static const std::array<std::array<const char*, 2>, 27> rows{
+    static const std::array<std::array<const char*, 2>, 28> rows{
         {{"left drag", "orbit the scene"},
          {"Ctrl + left drag", "look around"},
          {"right or middle drag", "move sideways"},
@@ -118,6 +118,7 @@ void draw_help(bool& open) {
          {"W S  A D  Q E", "fly: forward, back; left, right; down, up"},
          {"Shift", "fly four times as fast"},
          {"T", "turntable"},
+         {"P", "parallel rays"},
          {"U", "change the up axis"},
          {"R", "return to the first view"},
          {"F", "show the whole scene from the front"},

@@ -199,6 +199,8 @@ void draw_rows(const PanelFacts& facts, PanelSettings& settings, PanelActions& a
     edit_look(facts, settings.look);
     choose_up(facts, actions);
     ImGui::Checkbox("turntable", &settings.turntable);
+    ImGui::SameLine();
+    ImGui::Checkbox("parallel rays", &settings.parallel);
     const bool trainable = facts.scene.dataset && !facts.scene.path.empty() && facts.scene.points;
     if ((facts.run || trainable) && ImGui::CollapsingHeader("Training", ImGuiTreeNodeFlags_DefaultOpen))
         draw_training(facts, settings, actions);

@@ -41,6 +41,7 @@ struct PanelSettings {
     float wipe = 0.5f;  // share of the width that shows the image
     float gain = 4;     // factor of the difference image
     bool cameras = false, turntable = false;
+    bool parallel = false;   // the picture has parallel rays
     float film_seconds = 2;  // from one view to the next
     float text_scale = 1;    // times the size that the monitor asks for
     int train_steps = 0;     // of a training that the window starts

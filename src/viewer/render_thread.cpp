@@ -8,7 +8,7 @@
 
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
-#include "scene/camera.h"
+#include "scene/frustum.h"
 
 namespace ewa::viewer {
 namespace {

@@ -3,6 +3,9 @@
 
 #include <exception>
 
+#include "scene/framing.h"
+#include "scene/native_lens.h"
+
 namespace ewa::viewer {
 namespace {
 
@@ -68,12 +71,12 @@ std::optional<Camera> Shown::requested_camera() const {
 }
 
 void Shown::ask() {
-    if (const auto asked = requested_camera()) renders.ask(*asked, state_.settings.look, state_.scripted());
+    if (const auto asked = requested_camera()) renders.ask(*asked, look_for(*asked), state_.scripted());
 }
 
 void Shown::write_exr() {
     if (const auto asked = requested_camera())
-        renders.write(*asked, state_.settings.look, free_name("ewa-view", ".exr"));
+        renders.write(*asked, look_for(*asked), free_name("ewa-view", ".exr"));
 }
 
 Arrangement Shown::arrangement() const {
@@ -87,7 +90,20 @@ Arrangement Shown::arrangement() const {
 
 Camera Shown::camera() const {
     const Rectangle place = arrangement().rendering;
-    return navigation_.view.camera(place.width, place.height);
+    const Camera camera = navigation_.view.camera(place.width, place.height);
+    const PanelSettings& settings = state_.settings;
+    // Spheres are drawn through pinholes only.
+    if (!settings.parallel || comparing() || settings.look.points) return camera;
+    return scene::through_lens(scene::pinhole_at(camera), {.lens = Lens::orthographic}, 0,
+                               navigation_.view.pivot());
+}
+
+Look Shown::look_for(const Camera& camera) const {
+    Look look = state_.settings.look;
+    if (camera.distortion.none()) return look;
+    look.sky.reset();
+    look.points = false;
+    return look;
 }
 
 bool Shown::comparing() const {

@@ -48,7 +48,9 @@ class Shown {
     bool wiping() const { return comparing() && state_.settings.comparison == Comparison::wipe; }
     void change_comparison();
     Arrangement arrangement() const;
-    Camera camera() const;                // of the size of the render's place
+    Camera camera() const;  // of the size of the render's place
+    /// The look of the settings, without what is drawn through pinholes only if the camera is none.
+    Look look_for(const Camera& camera) const;
     std::string image_failure() const;    // why the camera has no image; else empty
     const std::optional<double>& psnr();  // for the panel, dB
 

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "scene/camera.h"
+#include "scene/frustum.h"
+#include "support/random_lens.h"
 
 namespace ewa {
 namespace {
@@ -94,4 +96,28 @@ TEST(CameraPath, TurnsTheShortWayAndZoomsInProportion) {
 }
 
 }  // namespace
+/// A point that a render shows is where the lens puts it, and frusta are lines in the picture.
+TEST(CameraOfALens, PointsComeBack) {
+    for (const auto& [name, camera] : test::random_lenses(40, 61, 47)) {
+        SCOPED_TRACE(name);
+        for (const double depth : {0.5, 3.0})
+            for (const glm::dvec2 at : {glm::dvec2(30.5, 20.25), glm::dvec2(40, 31), glm::dvec2(22, 12.5)}) {
+                const glm::dvec3 point = world_point(camera, at.x, at.y, depth);
+                const auto pixel = projected(point, camera);
+                ASSERT_TRUE(pixel);
+                EXPECT_LT(glm::distance(*pixel, at), 1e-6);
+                const glm::dvec3 view = camera.rotation * point + camera.translation;
+                const bool far = camera.distortion.lens == Lens::fisheye ||
+                                 camera.distortion.lens == Lens::equirectangular;
+                EXPECT_NEAR(far ? glm::length(view) : view.z, depth, 1e-9);
+            }
+        int shown = 0;
+        const auto segments = frustum_segments(camera, 2);
+        for (size_t i = 4; i < 8; ++i) shown += projected(segments[i], camera) ? 1 : 0;
+        EXPECT_EQ(shown, 4) << "the sides of what it sees";
+        const bool parallel = camera.distortion.lens == Lens::orthographic;
+        EXPECT_EQ(segments[0].from == segments[1].from, !parallel);
+    }
+}
+
 }  // namespace ewa

@@ -202,6 +202,26 @@ TEST_F(Input, TheMouseTurnsMovesAndZooms) {
     expect_silent(session.quit());
 }
 
+/// Parallel rays show near and far splats at one scale, and the key goes back.
+TEST_F(Input, ParallelRaysByKey) {
+    Session session(shots_, {splats_, "--cameras", cameras_, "--size", "96x64"});
+    ASSERT_TRUE(session.found());
+    const Image first = screenshot(session);
+    session.send("key p");
+    const Image parallel = screenshot(session);
+    EXPECT_GT(largest_difference(parallel, first), 0.1f);
+    // A step closer to the pivot enlarges the picture, and a turn changes it.
+    act(session, {"mousemove 20 20", "click 4"});
+    const Image closer = screenshot(session);
+    EXPECT_GT(largest_difference(closer, parallel), 0.02f);
+    act(session, {"mousedown 1", "mousemove 30 20", "mousemove 40 20", "mouseup 1"});
+    EXPECT_GT(largest_difference(screenshot(session), closer), 0.02f);
+    session.send("key r");
+    session.send("key p");
+    EXPECT_EQ(largest_difference(screenshot(session), first), 0);
+    expect_silent(session.quit());
+}
+
 /// Of the moment of the key, in full resolution; the turntable then goes on.
 TEST_F(Input, AScreenshotIsTakenWhileTheViewTurns) {
     Session session(shots_, {splats_, "--cameras", cameras_, "--size", "1000x750"});

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Points of the world in the picture of a camera of any lens, and frusta as lines.
+#pragma once
+#include <array>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
+
+#include "ewa/camera.h"
+
+namespace ewa {
+
+/// The world position at pixel coordinates x, y (pixel centres at +0.5) and the depth that a render has there, in world units: camera
+/// z, or the distance with scene::ordered_by_distance. Where the lens shows nothing: the camera's centre.
+glm::dvec3 world_point(const Camera& camera, double x, double y, double depth);
+
+/// A line in world units.
+struct Segment {
+    glm::dvec3 from{0}, to{0};
+};
+
+/// The frustum as lines: four edges from the camera's centre to the image's corners at that depth, the
+/// image's four sides (top, right, bottom, left), and two sides of a roof over the top one that mark the up
+/// direction. Of a fisheye and 360° the middle of the image is shown, half as wide and high. Parallel rays begin in the plane of
+/// the camera. depth > 0.
+std::array<Segment, 10> frustum_segments(const Camera& camera, double depth);
+
+/// The part of a segment in front of the camera's near plane, in px. Empty if there is none. Through a fisheye or 360° it is straight
+/// between the pixels of its ends, and empty where one of these is not shown or the seam lies between them.
+std::optional<std::array<glm::dvec2, 2>> projected(const Segment& segment, const Camera& camera);
+/// The pixel of a point through the camera's lens. Empty behind the near plane and where the lens does not show it.
+std::optional<glm::dvec2> projected(const glm::dvec3& point, const Camera& camera);
+
+}  // namespace ewa
