@@ -16,7 +16,8 @@ enum class Lens {
     unified,     // enhanced unified camera model, Khomutenko et al. 2016; k1 is alpha, k2 is beta
     // The next two are no distortions of a pinhole.
     equirectangular,  // all directions: u = fx atan2(x, z) + cx, v = fy atan2(y, |(x, z)|) + cy (COLMAP's EQUIRECTANGULAR)
-    orthographic  // parallel rays along z: u = fx x + cx, v = fy y + cy; fx and fy are px per world unit
+    orthographic,  // parallel rays along z: u = fx x + cx, v = fy y + cy; fx and fy are px per world unit
+    radial4        // four radial terms and tangential: Metashape, RealityScan
 };
 
 /// The distortion of a lens relative to a pinhole. Names and signs are OpenCV's (calib3d, "Detailed
@@ -26,6 +27,7 @@ struct Distortion {
     /// Thin prism: s1 and s3 of the squared radius, s2 and s4 of its square.
     double s1 = 0, s2 = 0, s3 = 0, s4 = 0;
     Lens lens = Lens::brown;
+    double skew = 0;  // shears the image: x grows by skew times y, in focal lengths
     bool operator==(const Distortion&) const = default;
     /// Whether the lens is a pinhole.
     bool none() const { return *this == Distortion{}; }

@@ -84,14 +84,14 @@ LoadedDataset opened(const DatasetState& state) {
                          .max_width = max_width});
 }
 
-using CameraState = std::tuple<int, int, std::array<double, 16>, int, std::array<double, 12>>;
+using CameraState = std::tuple<int, int, std::array<double, 16>, int, std::array<double, 13>>;
 
-std::array<double, 12> stored_terms(const Distortion& d) {
-    return {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4};
+std::array<double, 13> stored_terms(const Distortion& d) {
+    return {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4, d.skew};
 }
 
-Distortion distortion_of(int lens, const std::array<double, 12>& k) {
-    return {k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7], k[8], k[9], k[10], k[11], Lens(lens)};
+Distortion distortion_of(int lens, const std::array<double, 13>& k) {
+    return {k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7], k[8], k[9], k[10], k[11], Lens(lens), k[12]};
 }
 
 CameraState pickled(const Camera& c) {
@@ -115,7 +115,7 @@ Camera camera_of(const CameraState& state) {
 }
 
 using FrameState = std::tuple<std::string, std::filesystem::path, std::optional<std::filesystem::path>, bool,
-                              bool, std::array<int, 6>, std::array<double, 12>, std::array<CameraState, 3>>;
+                              bool, std::array<int, 6>, std::array<double, 13>, std::array<CameraState, 3>>;
 
 std::optional<std::filesystem::path> mask_path_of(const Frame& frame) {
     return frame.mask_path.empty() ? std::nullopt : std::optional(frame.mask_path);

@@ -72,6 +72,7 @@ void add_distortion(Hash& hash, const Distortion& d) {
     hash.add(int(d.lens));
     for (const double k : {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4})
         hash.add(k);
+    if (d.skew != 0) hash.add(d.skew);
 }
 
 }  // namespace

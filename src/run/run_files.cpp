@@ -167,9 +167,7 @@ void RunFolder::save_cameras(const Dataset& dataset, const Split& split, const s
         images.push_back(refined_record(frame, given[i]));
     }
     io::write_refined_cameras(path_ / report::kCamerasFile, cameras, extent);
-    // COLMAP has no parallel rays.
-    const auto parallel = [](const Frame& f) { return f.camera.distortion.lens == Lens::orthographic; };
-    if (std::ranges::any_of(dataset.frames, parallel)) return;
+    if (!std::ranges::all_of(images, io::fits_colmap)) return;
     PointCloud points = dataset.points;
     for (glm::dvec3& point : points.positions) point = world(point);
     io::write_colmap(path_ / "cameras/sparse/0", images, points);

@@ -43,15 +43,17 @@ double fov_factor(double omega, double r) {
     return r < 1e-9 ? edge / omega : std::atan(r * edge) / (r * omega);
 }
 
-glm::dvec2 bend(const Distortion& d, glm::dvec2 q) {
+glm::dvec2 bend_unsheared(const Distortion& d, glm::dvec2 q) {
     const double r2 = glm::dot(q, q);
     switch (d.lens) {
         case Lens::brown:
             return q * ((1 + polynomial(r2, d.k1, d.k2, d.k3)) / (1 + polynomial(r2, d.k4, d.k5, d.k6))) +
                    tangential(d, q) + glm::dvec2(polynomial(r2, d.s1, d.s2), polynomial(r2, d.s3, d.s4));
         case Lens::fisheye:
-            return q * (1 + polynomial(r2, d.k1, d.k2, d.k3, d.k4)) + tangential(d, q) +
-                   r2 * glm::dvec2(d.s1, d.s3);
+            return q * (1 + polynomial(r2, d.k1, d.k2, d.k3, d.k4, d.k5, d.k6)) + tangential(d, q) +
+                   glm::dvec2(polynomial(r2, d.s1, d.s2), polynomial(r2, d.s3, d.s4));
+        case Lens::radial4:
+            return q * (1 + polynomial(r2, d.k1, d.k2, d.k3, d.k4)) + tangential(d, q);
         case Lens::fisheye624: {
             const glm::dvec2 p = q * (1 + polynomial(r2, d.k1, d.k2, d.k3, d.k4, d.k5, d.k6));
             const double p2 = glm::dot(p, p);
@@ -68,6 +70,12 @@ glm::dvec2 bend(const Distortion& d, glm::dvec2 q) {
             break;  // no distortion of a plane
     }
     return q;
+}
+
+glm::dvec2 bend(const Distortion& d, glm::dvec2 q) {
+    glm::dvec2 point = bend_unsheared(d, q);
+    point.x += d.skew * point.y;
+    return point;
 }
 
 glm::dvec2 plane_of_ray(const Distortion& d, glm::dvec2 ray) {

@@ -5,12 +5,14 @@
 // y) / |(x, y)|. With r2 = |q|^2 and T(q) = (2 p1 x y + p2 (r2 + 2 x^2), p1 (r2 + 2 y^2) + 2 p2 x y):
 //   brown       q (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3) + T(q)
 //               + r2 (s1 + r2 s2, s3 + r2 s4)
-//   fisheye     q (1 + k1 r2 + k2 r2^2 + k3 r2^3 + k4 r2^4) + T(q) + r2 (s1, s3)
+//   radial4     q (1 + k1 r2 + ... + k4 r2^4) + T(q)
+//   fisheye     q (1 + k1 r2 + ... + k6 r2^6) + T(q) + r2 (s1 + r2 s2, s3 + r2 s4)
 //   fisheye624  p + T(p) + |p|^2 (s1 + |p|^2 s2, s3 + |p|^2 s4) with p = q (1 + k1 r2 + ... + k6 r2^6)
 //   fov         q atan(2 r tan(k1 / 2)) / (r k1)
 //   division    q 2 / (1 + sqrt(1 - 4 k1 r2)), the inverse of p / (1 + k1 |p|^2)
 //   unified     q / (k1 sqrt(k2 r2 + 1) + 1 - k1)
-// These are the models of OpenCV (calib3d, fisheye) and COLMAP (src/colmap/sensor/models.h).
+// At the end skew times y is added to x.
+// These are the models of OpenCV (calib3d, fisheye), COLMAP (src/colmap/sensor/models.h), OpenSfM and Metashape.
 #pragma once
 #include <glm/vec2.hpp>
 #include <optional>

@@ -73,8 +73,9 @@ double farthest(const Distortion& lens, int axis, double sign, double fallback, 
 }  // namespace
 
 bool is_native(const Distortion& d) {
+    if (d.skew != 0) return false;
     if (d.lens == Lens::fisheye)
-        return d.p1 == 0 && d.p2 == 0 && d.s1 == 0 && d.s3 == 0 && d.k5 == 0 && d.k6 == 0;
+        return d == Distortion{.k1 = d.k1, .k2 = d.k2, .k3 = d.k3, .k4 = d.k4, .lens = Lens::fisheye};
     return d.lens == Lens::brown || d.lens == Lens::equirectangular || d.lens == Lens::orthographic;
 }
 

@@ -6,7 +6,9 @@
 #include <sstream>
 
 #include "ewa/dataset.h"
+#include "io/datasets/image_records.h"
 #include "scene/lens.h"
+#include "scene/native_lens.h"
 #include "support/temp_folder.h"
 
 namespace {
@@ -209,6 +211,68 @@ TEST(Lens, UndistortIsTheInverse) {
                 EXPECT_NEAR(ray->y, y, 1e-10) << c.model;
             }
     }
+}
+
+TEST(Lens, TermsThatColmapLacks) {
+    const glm::dvec2 ray(0.45, -0.3);
+    const double r2 = glm::dot(ray, ray);
+    const auto tangential = [](glm::dvec2 q, double p1, double p2) {
+        const double w = glm::dot(q, q);
+        return glm::dvec2(2 * p1 * q.x * q.y + p2 * (w + 2 * q.x * q.x),
+                          p1 * (w + 2 * q.y * q.y) + 2 * p2 * q.x * q.y);
+    };
+    // Metashape's: four radial terms, and a shear at the end.
+    const Distortion four{.k1 = -0.2,
+                          .k2 = 0.1,
+                          .p1 = 0.003,
+                          .p2 = -0.005,
+                          .k3 = -0.04,
+                          .k4 = 0.02,
+                          .lens = Lens::radial4,
+                          .skew = 0.07};
+    const double factor = 1 + r2 * (-0.2 + r2 * (0.1 + r2 * (-0.04 + r2 * 0.02)));
+    const glm::dvec2 bent = factor * ray + tangential(ray, 0.003, -0.005);
+    EXPECT_NEAR(scene::distort(four, ray).x, bent.x + 0.07 * bent.y, 1e-15);
+    EXPECT_NEAR(scene::distort(four, ray).y, bent.y, 1e-15);
+    // OpenSfM's fisheye624: six radial terms of the angle, to which the others are added.
+    const Distortion six{.k1 = 0.03,
+                         .k2 = -0.02,
+                         .p1 = 0.003,
+                         .p2 = -0.002,
+                         .k3 = 0.01,
+                         .k4 = -0.004,
+                         .k5 = 0.002,
+                         .k6 = -0.001,
+                         .s1 = 0.004,
+                         .s2 = -0.003,
+                         .s3 = 0.002,
+                         .s4 = -0.005,
+                         .lens = Lens::fisheye};
+    const glm::dvec2 q = ray * (std::atan(std::sqrt(r2)) / std::sqrt(r2));
+    const double w = glm::dot(q, q);
+    const double six_terms =
+        1 + w * (0.03 + w * (-0.02 + w * (0.01 + w * (-0.004 + w * (0.002 + w * -0.001)))));
+    const glm::dvec2 expected =
+        six_terms * q + tangential(q, 0.003, -0.002) + w * glm::dvec2(0.004 - 0.003 * w, 0.002 - 0.005 * w);
+    EXPECT_NEAR(glm::length(scene::distort(six, ray) - expected), 0, 1e-15);
+    for (const Distortion& lens : {four, six}) {
+        const auto back = scene::undistort(lens, scene::distort(lens, ray));
+        ASSERT_TRUE(back);
+        EXPECT_NEAR(glm::length(*back - ray), 0, 1e-12);
+        EXPECT_FALSE(scene::is_native(lens));
+        io::ImageRecord record;
+        record.distortion = lens;
+        EXPECT_FALSE(io::fits_colmap(record));
+    }
+    EXPECT_FALSE(scene::is_native({.skew = 0.1}));
+    // COLMAP's sphere is whole.
+    io::ImageRecord sphere;
+    sphere.camera.width = sphere.camera.height = 100;
+    sphere.distortion.lens = Lens::equirectangular;
+    scene::set_equirectangular(sphere.camera);
+    EXPECT_TRUE(io::fits_colmap(sphere));
+    sphere.camera.fy = sphere.camera.fx;
+    EXPECT_FALSE(io::fits_colmap(sphere));
 }
 
 TEST(Lens, StaysOnTheSheetOfTheAxis) {

@@ -377,8 +377,8 @@ ImageRecords read_colmap(const std::filesystem::path& model, const std::filesyst
 
 namespace {
 
-/// The position in kLenses of the first lens model that has all of the distortion's terms, and not one focal length.
-int32_t lens_with(const Distortion& distortion) {
+/// The position in kLenses of the first lens model that has all of the distortion's terms, and not one focal length; empty: none has.
+std::optional<int32_t> lens_with(const Distortion& distortion) {
     for (size_t i = 0; i < std::size(kLenses); ++i) {
         const ColmapLens& lens = kLenses[i];
         if (lens.focal_lengths == 1 || lens.lens != distortion.lens) continue;
@@ -388,7 +388,7 @@ int32_t lens_with(const Distortion& distortion) {
             if (term) kept.*term = distortion.*term;
         if (kept == distortion) return int32_t(i);
     }
-    throw RunError("COLMAP has no lens model with these distortion terms");
+    return std::nullopt;
 }
 
 /// A file of COLMAP, piece by piece.
@@ -414,15 +414,25 @@ bool same_lens(const ImageRecord& a, const ImageRecord& b) {
 
 void write_camera(BinaryFile& file, uint32_t id, const ImageRecord& image) {
     const Camera& c = image.camera;
-    const int32_t lens = lens_with(image.distortion);
-    file.add(id, lens, uint64_t(c.width), uint64_t(c.height));
-    if (kLenses[lens].focal_lengths == 0) return file.add(double(c.width), double(c.height));
+    const std::optional<int32_t> lens = lens_with(image.distortion);
+    if (!lens) throw RunError("COLMAP has no lens model with these distortion terms");
+    file.add(id, *lens, uint64_t(c.width), uint64_t(c.height));
+    if (kLenses[*lens].focal_lengths == 0) return file.add(double(c.width), double(c.height));
     file.add(c.fx, c.fy, c.cx, c.cy);
-    for (const auto term : kLenses[lens].terms)
+    for (const auto term : kLenses[*lens].terms)
         if (term) file.add(image.distortion.*term);
 }
 
 }  // namespace
+
+bool fits_colmap(const ImageRecord& image) {
+    if (image.distortion.lens != Lens::equirectangular) return lens_with(image.distortion).has_value();
+    Camera whole = image.camera;
+    scene::set_equirectangular(whole);
+    constexpr double kSame = 1e-9;  // of the focal length
+    return std::abs(whole.fx - image.camera.fx) < kSame * whole.fx &&
+           std::abs(whole.fy - image.camera.fy) < kSame * whole.fy;
+}
 
 void write_colmap(const std::filesystem::path& model, const std::vector<ImageRecord>& images,
                   const PointCloud& points) {

@@ -68,6 +68,9 @@ std::optional<std::filesystem::path> find_colmap_model(const std::filesystem::pa
 /// Throws InputError that names the file and the byte (.bin) or line (.txt).
 ImageRecords read_colmap(const std::filesystem::path& model, const std::filesystem::path& images);
 
+/// Whether COLMAP has a lens model for the image: one with these terms, or the whole sphere.
+bool fits_colmap(const ImageRecord& image);
+
 /// Writes a binary model with these images, cameras and points into the folder, which is created. The images' paths, masks
 /// and splits are not used. Throws RunError.
 void write_colmap(const std::filesystem::path& model, const std::vector<ImageRecord>& images,
