@@ -66,6 +66,8 @@ struct Dataset {
     std::string first_dropped_point;  // position of the first: file and byte, line or vertex
     /// False if the dataset has "view_dependent": false. Then SH degree 0 suffices.
     bool color_depends_on_view = true;
+    std::string format, program;     // of the cameras; the program may be unknown, and empty
+    std::vector<std::string> notes;  // what of the cameras' file is skipped
 };
 
 struct DatasetOptions {
@@ -79,10 +81,11 @@ struct DatasetOptions {
         0;  // px; wider images are reduced so that they have this width after `downscale`; 0: none are
 };
 
-/// Loads a dataset. There are three kinds of paths:
+/// Loads a dataset. There are four kinds of paths:
 /// - A folder with a COLMAP model (.bin or .txt, in sparse/0, sparse or the folder itself) and images/.
 /// - A folder with transforms.json, or with transforms_train.json and transforms_test.json.
-/// - One of these files. src/io/datasets/transforms.h has the dialects.
+/// - A folder with the cameras of another program: Metashape, RealityScan, OpenSfM, OpenDroneMap, OpenMVG, Polycam or Record3D.
+/// - One of these files. src/io/datasets/transforms.cpp has the dialects, and src/io/datasets/importers/ the other formats.
 ///
 /// Camera axes follow the OpenCV convention; the world frame is the file's own. With need_images, frames
 /// without a file are skipped and counted. Each other file has the model's size, or that size resized by one

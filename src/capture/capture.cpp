@@ -20,7 +20,9 @@
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 #include "image/image_files.h"
+#include "io/datasets/dataset_folders.h"
 #include "io/datasets/image_records.h"
+#include "io/datasets/importers/importer.h"
 #include "io/datasets/zip_files.h"
 
 namespace ewa {
@@ -42,17 +44,9 @@ bool is_video(const fs::path& path) {
     return is_file(path) && std::find(kVideos.begin(), kVideos.end(), extension_of(path)) != kVideos.end();
 }
 
-/// Whether load_dataset finds cameras in the folder.
-bool has_cameras(const fs::path& folder) {
-    if (io::find_colmap_model(folder)) return true;
-    for (const char* file : {"transforms.json", "transforms_train.json", "transforms_test.json"})
-        if (is_file(folder / file)) return true;
-    return false;
-}
-
 /// The folder in which an archive has everything: itself, or a folder that is alone in it.
 fs::path main_folder(fs::path folder) {
-    while (!has_cameras(folder)) {
+    while (!io::is_dataset_folder(folder)) {
         const auto first = fs::directory_iterator(folder);
         if (std::distance(first, {}) != 1 || !fs::directory_iterator(folder)->is_directory()) break;
         folder = fs::directory_iterator(folder)->path();
@@ -234,8 +228,8 @@ void move_up(const fs::path& root, const fs::path& folder) {
     for (const fs::directory_entry& entry : fs::directory_iterator(root))
         names.push_back(entry.path().filename());
     // The cameras last: an interrupted move continues as long as they exist.
-    const auto last = [](const fs::path& name) {
-        return name != "images" && name.string().find("mask") != 0;
+    const auto last = [&](const fs::path& name) {
+        return !is_folder(root / name) || name == "sparse" || name == "opensfm";
     };
     std::stable_partition(names.begin(), names.end(), [&](const fs::path& name) { return !last(name); });
     for (const fs::path& name : names) fs::rename(root / name, folder / name);
@@ -250,7 +244,7 @@ Capture make_of_archive(Making& now) {
     if (is_file(now.folder / "capture.json"))
         check_same_file(now.folder, core::read_json_file<Json>(now.folder / "capture.json"), now.record,
                         "archive");
-    if (!is_folder(unpacked) && !has_cameras(now.folder)) {
+    if (!is_folder(unpacked) && !io::is_dataset_folder(now.folder)) {
         now.begin();
         fs::remove_all(partial);
         const io::ZipFiles zip(now.input);
@@ -267,7 +261,7 @@ Capture make_of_archive(Making& now) {
     }
     if (is_folder(unpacked)) {
         const fs::path root = main_folder(unpacked);
-        if (!has_cameras(root) && !has_cameras(now.folder))
+        if (!io::is_dataset_folder(root) && !io::is_dataset_folder(now.folder))
             throw InputError(core::one_line(now.input.string()) +
                              " has cameras in one of several folders; unzip it, and name the folder");
         move_up(root, now.folder);
@@ -327,10 +321,11 @@ bool is_archive(const fs::path& path) {
 
 bool archive_has_cameras(const fs::path& archive) {
     const io::ZipFiles zip(archive);
-    return std::ranges::any_of(zip.entries(), [](const io::ZipFiles::Entry& entry) {
+    return std::ranges::any_of(zip.entries(), [&](const io::ZipFiles::Entry& entry) {
         const std::string name = entry.name.filename().string();
         return name == "cameras.bin" || name == "cameras.txt" || name == "transforms.json" ||
-               name == "transforms_train.json" || name == "transforms_test.json";
+               name == "transforms_train.json" || name == "transforms_test.json" ||
+               io::is_imported(entry.name, [&] { return zip.head(entry, io::kHeadBytes); });
     });
 }
 
@@ -341,7 +336,8 @@ fs::path unpack_archive(const fs::path& archive, const fs::path& folder) {
 
 bool is_capture(const fs::path& path) {
     if (is_video(path) || is_archive(path)) return true;
-    return is_folder(path) && !has_cameras(path) && !capture::photo_files(folder_of_photos(path)).empty();
+    return is_folder(path) && !io::is_dataset_folder(path) &&
+           !capture::photo_files(folder_of_photos(path)).empty();
 }
 
 ImageSize smallest_image(const fs::path& input) {
@@ -363,7 +359,7 @@ ImageSize smallest_image(const fs::path& input) {
 fs::path dataset_of_images(const fs::path& folder) try {
     if (!is_folder(folder)) return {};
     const fs::path images = fs::canonical(folder), dataset = images.parent_path();
-    if (!has_cameras(dataset)) return {};
+    if (!io::is_dataset_folder(dataset)) return {};
     const Dataset known = load_dataset(dataset, {.need_images = false, .need_points = false});
     const bool same = std::ranges::any_of(known.frames, [&](const Frame& frame) {
         return frame.image_exists && fs::weakly_canonical(frame.image_path).parent_path() == images;
@@ -381,8 +377,10 @@ void check_training_input(const fs::path& path) {
                          name + "; to search them again, ewa cameras " + core::one_line(path.string()) +
                          " -o DIR");
     }
-    if (is_capture(path) || (is_folder(path) && has_cameras(path))) return;
-    if (is_file(path) && extension_of(path) == ".json") return;
+    if (is_capture(path) || (is_folder(path) && io::is_dataset_folder(path))) return;
+    if (is_file(path) && (extension_of(path) == ".json" || io::find_importer(path))) return;
+    if (const std::string advice = io::export_advice(path); !advice.empty())
+        throw InputError(core::one_line(path.string()) + ": not a dataset: " + advice);
     refuse(path,
            is_folder(path)
                ? "neither photos, nor a video, nor a dataset; a dataset has cameras and images (.bin or "
@@ -396,7 +394,7 @@ void check_training_input(const fs::path& path) {
 
 Capture make_dataset(const fs::path& input, const fs::path& folder, const CaptureOptions& options,
                      const std::function<bool(const CaptureProgress&)>& progress) {
-    if (is_folder(input) && has_cameras(input))
+    if (is_folder(input) && io::is_dataset_folder(input))
         throw InputError(core::one_line(input.string()) +
                          " is a dataset: its images have cameras; ewa train " +
                          core::one_line(input.string()) + " trains on them");

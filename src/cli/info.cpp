@@ -28,7 +28,7 @@
 #include "ewa/synthetic_dataset.h"
 #include "ewa/trainer.h"
 #include "image/image_files.h"
-#include "io/datasets/image_records.h"
+#include "io/datasets/importers/importer.h"
 #include "io/datasets/zip_files.h"
 #include "io/gltf/mesh.h"
 #include "io/splats/formats.h"
@@ -176,11 +176,6 @@ bool is_sog_archive(const fs::path& path) {
     return std::ranges::any_of(zip.entries(), [](const auto& entry) { return entry.name == "meta.json"; });
 }
 
-const char* dataset_kind(const fs::path& path) {
-    if (!fs::is_directory(path)) return "transforms";
-    return io::find_colmap_model(path) ? "COLMAP" : "transforms";
-}
-
 /// The frames that share a size and intrinsics.
 struct CameraGroup {
     int frames = 0;
@@ -217,7 +212,7 @@ std::vector<CameraGroup> camera_groups(const Dataset& dataset) {
     return list;
 }
 
-Json dataset_json(const Dataset& dataset, const char* kind, const Split& split, double extent) {
+Json dataset_json(const Dataset& dataset, const Split& split, double extent) {
     Json cameras = Json::array();
     for (const CameraGroup& group : camera_groups(dataset))
         cameras.push_back({{"frames", group.frames},
@@ -228,7 +223,9 @@ Json dataset_json(const Dataset& dataset, const char* kind, const Split& split, 
                            {"cx", group.camera.cx},
                            {"cy", group.camera.cy},
                            {"distorted", group.distorted}});
-    return {{"kind", kind},
+    return {{"kind", dataset.format},
+            {"program", dataset.program},
+            {"notes", dataset.notes},
             {"frames", dataset.frames.size()},
             {"missing_images", dataset.missing_images},
             {"cameras", cameras},
@@ -258,13 +255,14 @@ void print_cameras(const Dataset& dataset) {
 /// named: what the user calls it.
 void info_dataset(const fs::path& path, const fs::path& named, int test_every, bool json) {
     const Dataset dataset = load_cameras_as_trained(path, {.points = true});
-    const char* kind = dataset_kind(path);
     const Split split = split_frames(dataset, test_every);
     std::vector<int> every(dataset.frames.size());
     std::iota(every.begin(), every.end(), 0);
     const double extent = every.empty() ? 0 : scene_extent(dataset, every);
-    if (json) return print_json(dataset_json(dataset, kind, split, extent));
-    fmt::print("{}\nkind            {}\n", core::one_line(named.string()), kind);
+    if (json) return print_json(dataset_json(dataset, split, extent));
+    fmt::print("{}\nkind            {}\n", core::one_line(named.string()), dataset.format);
+    if (!dataset.program.empty()) fmt::print("program         {}\n", core::one_line(dataset.program));
+    for (const std::string& note : dataset.notes) fmt::print("note            {}\n", core::one_line(note));
     fmt::print("frames          {} ({} train, {} test with --test-every {})\n", dataset.frames.size(),
                split.train.size(), split.test.size(), test_every);
     if (dataset.missing_images > 0)
@@ -376,7 +374,8 @@ int run(const InfoArguments& arguments) {
     if (!fs::exists(path, error)) throw InputError(path.string() + ": no such file or folder");
     if (const auto run = find_run(path))
         info_splats(splat_input(path).file, &*run, arguments);
-    else if (fs::is_directory(path) || (path.extension() == ".json" && !is_sog(path)))
+    else if (fs::is_directory(path) || (path.extension() == ".json" && !is_sog(path)) ||
+             io::find_importer(path))
         info_dataset(path, path, arguments.test_every, arguments.json);
     else if (is_archive(path) && !is_sog_archive(path))
         info_archive(path, arguments.test_every, arguments.json);
@@ -396,7 +395,7 @@ Action add_info(CLI::App& app) {
     app.add_option(
            "PATH", arguments->path,
            "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json .glb .gltf), COLMAP folder, "
-           "transforms.json, zip archive of one of these, "
+           "transforms.json, cameras of another program, zip archive of one of these, "
            "glTF file of meshes, image, or folder of a training run")
         ->required();
     add_test_every_option(app, arguments->test_every);

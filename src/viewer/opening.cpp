@@ -12,6 +12,7 @@
 #include "ewa/sky_map.h"
 #include "ewa/splat_files.h"
 #include "ewa/synthetic_dataset.h"
+#include "io/datasets/importers/importer.h"
 #include "io/datasets/refined_cameras.h"
 #include "live/run_folder.h"
 #include "report/run_file_names.h"
@@ -27,7 +28,8 @@ constexpr float kPointShrink = 1.2f;  // subtracted from the logarithm of a poin
 
 bool is_dataset_file(const fs::path& path) {
     const std::string name = path.filename().string();
-    return name.starts_with("transforms") && core::lower(path.extension().string()) == ".json";
+    return (name.starts_with("transforms") && core::lower(path.extension().string()) == ".json") ||
+           (core::is_file(path) && io::find_importer(path));
 }
 
 /// points: also load the points, which are read only together with the images.

@@ -10,6 +10,7 @@
 #include "ewa/error.h"
 #include "input.h"
 #include "io/datasets/image_records.h"
+#include "io/datasets/importers/importer.h"
 
 namespace {
 
@@ -22,6 +23,13 @@ constexpr const char* kFiles[] = {"cameras" EWA_COLMAP, "images" EWA_COLMAP, "po
 io::ImageRecords read_model(const fs::path& folder) {
     return io::read_colmap(folder, folder / "images");
 }
+#elif defined(EWA_IMPORTED)
+constexpr const char* kFiles[] = {EWA_IMPORTED, "points.ply"};
+
+io::ImageRecords read_model(const fs::path& folder) {
+    const auto importer = io::find_importer(folder);
+    return importer ? importer->importer->read(importer->source) : io::ImageRecords();
+}
 #else
 constexpr const char* kFiles[] = {"transforms.json", "points.ply"};
 
@@ -31,6 +39,17 @@ io::ImageRecords read_model(const fs::path& folder) {
 }
 #endif
 constexpr std::string_view kBetween = "@@@\n";
+
+/// With the folders of the files, and with an image for a target that needs its size.
+fs::path make_dataset_folder() {
+    const fs::path folder = fuzz::make_folder();
+    for (const char* name : kFiles) fs::create_directories((folder / name).parent_path());
+#ifdef EWA_IMAGE
+    fs::create_directories((folder / EWA_IMAGE).parent_path());
+    save_image(folder / EWA_IMAGE, Image(24, 18, 3));
+#endif
+    return folder;
+}
 
 void write_files(const fs::path& folder, std::string_view bytes) {
     for (const char* name : kFiles) {
@@ -80,7 +99,7 @@ void read_or_refuse(const Read& read) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-    static const fs::path folder = fuzz::make_folder();
+    static const fs::path folder = make_dataset_folder();
     write_files(folder, {reinterpret_cast<const char*>(data), size});
     // Most of the time is that of the lenses, some ten milliseconds each under the sanitizers.
     fuzz::read_within(size, 10, [&] {

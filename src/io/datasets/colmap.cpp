@@ -361,6 +361,7 @@ ImageRecords read_colmap(const std::filesystem::path& model, const std::filesyst
     (binary ? read_binary_images : read_text_images)(model / (binary ? "images.bin" : "images.txt"), builder);
     if (std::filesystem::exists(points)) (binary ? read_binary_points : read_text_points)(points, builder);
     ImageRecords records = builder.take();
+    records.format = "COLMAP";
     // The dense cloud of COLMAP's stereo fusion replaces points that the model lacks.
     if (const std::filesystem::path dense = images.parent_path() / "fused.ply";
         records.points.positions.empty() && records.dropped.count == 0 && core::is_file(dense)) {

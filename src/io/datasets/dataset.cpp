@@ -12,6 +12,7 @@
 #include "ewa/error.h"
 #include "image/image_files.h"
 #include "io/datasets/image_records.h"
+#include "io/datasets/importers/importer.h"
 #include "scene/camera.h"
 #include "scene/lens.h"
 #include "scene/native_lens.h"
@@ -237,16 +238,57 @@ int split_of(const fs::path& path) {
     return stem == "transforms_train" ? 1 : stem == "transforms_test" ? 2 : 0;
 }
 
+io::ImageRecords read_transforms_at(const fs::path& file, const DatasetOptions& options) {
+    return io::read_transforms(file, split_of(file), options.need_points);
+}
+
+/// The transforms_train.json and transforms_test.json of a folder; empty if it has neither.
+std::optional<io::ImageRecords> read_split_transforms(const fs::path& path, const DatasetOptions& options) {
+    std::optional<io::ImageRecords> all;
+    for (const char* file : {"transforms_train.json", "transforms_test.json"})
+        if (is_file(path / file)) {
+            io::ImageRecords records = read_transforms_at(path / file, options);
+            if (all)
+                append(*all, std::move(records));
+            else
+                all = std::move(records);
+        }
+    if (all) all->folder = path / "images";
+    return all;
+}
+
+/// The cameras that another program has written; empty if no importer reads the path.
+std::optional<io::ImageRecords> import_model(const fs::path& path, const DatasetOptions& options) {
+    std::optional<io::FoundImporter> found = io::find_importer(path);
+    if (!found) return std::nullopt;
+    found->source.with_points = options.need_points;
+    io::ImageRecords records = found->importer->read(found->source);
+    records.format = found->importer->format;
+    return records;
+}
+
+[[noreturn]] void refuse_model(const fs::path& path) {
+    const std::string name = core::one_line(path.string()), advice = io::export_advice(path);
+    if (!advice.empty()) throw InputError(name + ": not a dataset: " + advice);
+    if (is_file(path))
+        throw InputError(name +
+                         ": not a dataset; a dataset is a folder, a transforms.json, or a glTF of meshes "
+                         "(.gltf, .glb)");
+    throw InputError(
+        name +
+        ": not a dataset; expected cameras and images (.bin or .txt) in sparse/0, sparse or the folder "
+        "itself, or transforms.json, transforms_train.json or transforms_test.json, or the cameras of " +
+        std::string(io::kImportedFrom) + "; the folder of a training run has config.json");
+}
+
 io::ImageRecords read_model(const fs::path& path, const DatasetOptions& options) {
-    const std::string name = core::one_line(path.string());
     if (is_file(path)) {
-        if (core::lower(path.extension().string()) != ".json")
-            throw InputError(name +
-                             ": not a dataset; a dataset is a folder, a transforms.json, or a glTF of meshes "
-                             "(.gltf, .glb)");
-        return io::read_transforms(path, split_of(path), options.need_points);
+        if (auto imported = import_model(path, options)) return std::move(*imported);
+        if (core::lower(path.extension().string()) != ".json") refuse_model(path);
+        return read_transforms_at(path, options);
     }
-    if (!is_folder(path)) throw InputError(name + ": there is no such file or folder");
+    if (!is_folder(path))
+        throw InputError(core::one_line(path.string()) + ": there is no such file or folder");
     if (const std::optional<fs::path> model = io::find_colmap_model(path)) {
         const fs::path images = images_folder(path, *model);
         const fs::path copies = images.string() + "_" + std::to_string(options.downscale);
@@ -254,25 +296,10 @@ io::ImageRecords read_model(const fs::path& path, const DatasetOptions& options)
             throw InputError(core::one_line(images.string()) + ": the folder of the images is missing");
         return io::read_colmap(*model, images);
     }
-    if (is_file(path / "transforms.json"))
-        return io::read_transforms(path / "transforms.json", 0, options.need_points);
-    io::ImageRecords all;
-    all.folder = path / "images";
-    all.color_depends_on_view = false;  // true as soon as one file does not state the opposite
-    bool found = false;
-    for (const char* file : {"transforms_train.json", "transforms_test.json"})
-        if (is_file(path / file)) {
-            append(all, io::read_transforms(path / file, split_of(file), options.need_points));
-            found = true;
-        }
-    if (!found)
-        throw InputError(
-            name +
-            ": not a dataset; expected cameras and images (.bin or .txt) in sparse/0, sparse or the folder "
-            "itself, or transforms.json, transforms_train.json or transforms_test.json; the folder of a "
-            "training "
-            "run has config.json");
-    return all;
+    if (is_file(path / "transforms.json")) return read_transforms_at(path / "transforms.json", options);
+    if (auto records = read_split_transforms(path, options)) return std::move(*records);
+    if (auto records = import_model(path, options)) return std::move(*records);
+    refuse_model(path);
 }
 
 }  // namespace
@@ -289,6 +316,9 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
     dataset.color_depends_on_view = model.color_depends_on_view;
     dataset.dropped_points = model.dropped.count;
     dataset.first_dropped_point = std::move(model.dropped.first);
+    dataset.format = std::move(model.format);
+    dataset.program = std::move(model.program);
+    dataset.notes = std::move(model.notes);
     std::stable_sort(model.images.begin(), model.images.end(),
                      [](const io::ImageRecord& a, const io::ImageRecord& b) { return a.name < b.name; });
     CameraCache cameras(options.lens);

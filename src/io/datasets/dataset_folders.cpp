@@ -10,6 +10,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/datasets/image_records.h"
+#include "io/datasets/importers/importer.h"
 
 namespace ewa::io {
 namespace {
@@ -56,7 +57,7 @@ std::set<fs::path> image_folders(const Dataset& dataset) {
 bool is_dataset_folder(const fs::path& folder) {
     for (const char* name : {"transforms.json", "transforms_train.json", "transforms_test.json"})
         if (core::is_file(folder / name)) return true;
-    return find_colmap_model(folder).has_value();
+    return find_colmap_model(folder).has_value() || find_importer(folder).has_value();
 }
 
 void check_not_inside_dataset(const std::string& option, const fs::path& folder) {

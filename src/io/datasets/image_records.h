@@ -40,6 +40,8 @@ struct ImageRecords {
     PointCloud points;
     DroppedPoints dropped;
     bool color_depends_on_view = true;  // Dataset::color_depends_on_view
+    std::string format, program;        // Dataset::format, Dataset::program
+    std::vector<std::string> notes;     // Dataset::notes
 };
 
 /// Adds a point, or counts it as dropped. `where` is called for the first dropped point.

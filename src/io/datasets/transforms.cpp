@@ -24,6 +24,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/datasets/image_records.h"
+#include "io/datasets/rotation.h"
 #include "scene/native_lens.h"
 
 namespace ewa::io {
@@ -35,9 +36,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr size_t kLongestName = 200;      // in an error
 constexpr double kLongestSide = 1 << 20;  // px
-// Deviation of a rotation's columns from unit length and right angles. Files with four decimals stay below
-// it.
-constexpr double kMaxRotationError = 1e-2;
 
 /// A frame and the top of its file. A key is looked up in the frame, then at the top.
 class Entry {
@@ -189,20 +187,6 @@ void read_intrinsics(const Entry& entry, ImageRecord& image) {
     camera.cy = entry.number("cy").value_or(0.5 * camera.height);
 }
 
-/// The nearest rotation (the orthogonal factor of the polar decomposition), by Higham's iteration.
-glm::dmat3 nearest_rotation(glm::dmat3 m) {
-    for (int i = 0; i < 30; ++i) m = 0.5 * (m + glm::transpose(glm::inverse(m)));
-    return m;
-}
-
-double rotation_error(const glm::dmat3& m) {
-    const glm::dmat3 product = glm::transpose(m) * m;
-    double error = 0;
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) error = std::max(error, std::abs(product[i][j] - (i == j ? 1.0 : 0.0)));
-    return error;
-}
-
 void read_pose(const Entry& entry, Camera& camera) {
     const json* rows = entry.find("transform_matrix");
     if (!rows) entry.fail("\"transform_matrix\" is missing");
@@ -221,25 +205,13 @@ void read_pose(const Entry& entry, Camera& camera) {
             (column < 3 ? axes[column][row] : center[row]) = value.get<double>();
         }
     }
-    const double determinant = glm::determinant(axes);
-    if (!(determinant > 0)) entry.fail("\"transform_matrix\" is not a rotation: it mirrors or is degenerate");
-    axes /= std::cbrt(determinant);
-    if (!(rotation_error(axes) <= kMaxRotationError))
-        entry.fail(
-            "\"transform_matrix\" is not a rotation: its columns differ in length or are not at right "
-            "angles");
-    axes = nearest_rotation(axes);
-    // OpenGL's camera looks along -z with y up, OpenCV's along z with y down.
-    axes[1] = -axes[1];
-    axes[2] = -axes[2];
-    camera.rotation = glm::transpose(axes);
-    camera.translation = -(camera.rotation * center);
+    if (const std::string fault = rotation_fault(axes); !fault.empty())
+        entry.fail("\"transform_matrix\" is not a rotation: " + fault);
+    set_pose(camera, from_opengl(nearest_rotation(axes)), center);
 }
 
 Json matrix_of(const Camera& camera) {
-    glm::dmat3 axes = glm::transpose(camera.rotation);
-    axes[1] = -axes[1];
-    axes[2] = -axes[2];
+    const glm::dmat3 axes = from_opengl(glm::transpose(camera.rotation));
     const glm::dvec3 position = camera.position();
     Json rows = Json::array();
     for (int row = 0; row < 3; ++row)
@@ -261,6 +233,7 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
     const std::filesystem::path folder = path.parent_path();
     result.folder = folder / "images";
     result.files = {path};
+    result.format = "transforms";
     for (size_t i = 0; i < frames->size(); ++i) {
         const Entry entry(name + ": frame " + std::to_string(i), top, (*frames)[i]);
         if (!(*frames)[i].is_object()) entry.fail("is not a JSON object");

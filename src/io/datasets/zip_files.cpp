@@ -209,6 +209,21 @@ void ZipFiles::read(const Entry& entry, const std::function<void(std::string_vie
     if (!whole) state_->fail(entry.name.string(), "is damaged or cut off");
 }
 
+std::string ZipFiles::head(const Entry& entry, size_t bytes) const {
+    const unzFile zip = state_->zip;
+    std::string text(size_t(std::min<uint64_t>(bytes, entry.bytes)), '\0');
+    bool whole = unzGoToFilePos64(zip, &state_->places[size_t(entry.index)]) == UNZ_OK &&
+                 unzOpenCurrentFile(zip) == UNZ_OK;
+    for (size_t done = 0; whole && done < text.size();) {
+        const int got = unzReadCurrentFile(zip, text.data() + done, unsigned(text.size() - done));
+        whole = got > 0;
+        if (whole) done += size_t(got);
+    }
+    unzCloseCurrentFile(zip);  // which says that the checksum differs, since the rest is not read
+    if (!whole) state_->fail(entry.name.string(), "is damaged or cut off");
+    return text;
+}
+
 bool ZipFiles::unpack(const fs::path& folder, const std::function<bool(int)>& progress) const {
     core::make_folder(folder);
     std::error_code unknown;

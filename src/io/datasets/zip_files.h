@@ -39,6 +39,9 @@ class ZipFiles {
     /// Gives the content of an entry in pieces. Throws InputError if it is damaged.
     void read(const Entry& entry, const std::function<void(std::string_view)>& piece) const;
 
+    /// The first bytes of an entry, at most this many. Throws as read does.
+    std::string head(const Entry& entry, size_t bytes) const;
+
     /// Writes all entries into a new folder. progress(entries done) is called after each; false ends it, and the result is
     /// false. Throws InputError, RunError (disk).
     bool unpack(const std::filesystem::path& folder, const std::function<bool(int)>& progress) const;

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/datasets/importers/importer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "core/file_reader.h"
+#include "core/folders.h"
+#include "core/text.h"
+#include "core/typing.h"
+#include "ewa/error.h"
+
+namespace ewa::io {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string extension_in_lower_case(const fs::path& file) {
+    return core::lower(file.extension().string());
+}
+
+bool is_json(const fs::path& name) {
+    return extension_in_lower_case(name) == ".json";
+}
+
+bool holds(std::string_view head, std::string_view word) {
+    return head.find(word) != std::string_view::npos;
+}
+
+/// A list of reconstructions, each with cameras and shots.
+bool begins_as_open_sfm(std::string_view head) {
+    const std::string_view text = core::trim(head);
+    return !text.empty() && text.front() == '[' && (holds(text, "\"cameras\"") || holds(text, "\"shots\""));
+}
+
+bool begins_as_open_mvg(std::string_view head) {
+    return holds(head, "\"sfm_data_version\"");
+}
+
+std::string head_of(const fs::path& file) try {
+    core::FileReader reader(file);
+    const size_t size = size_t(std::min<uint64_t>(reader.size(), kHeadBytes));
+    return {reinterpret_cast<const char*>(reader.take(size, "the beginning")), size};
+} catch (const InputError&) {
+    return {};
+}
+
+bool is_usual(const CameraImporter& importer, const fs::path& name) {
+    return importer.named(name) && name.string().starts_with(importer.usual);
+}
+
+bool reads(const CameraImporter& importer, const fs::path& file) {
+    return importer.named(file.filename()) && core::is_file(file) && importer.begins(head_of(file));
+}
+
+/// The dataset that the file is of: without the folder that the program made for it.
+fs::path dataset_of_file(const CameraImporter& importer, const fs::path& file) {
+    const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+    if (core::is_folder(folder / "images")) return folder;
+    const fs::path whole = fs::absolute(folder / "x").lexically_normal().parent_path();
+    for (const std::string_view place : importer.places) {
+        const fs::path inner(place);
+        const auto parts = size_t(std::distance(inner.begin(), inner.end()));
+        fs::path above = whole, tail;
+        for (size_t i = 0; i < parts; ++i, above = above.parent_path())
+            tail = tail.empty() ? above.filename() : above.filename() / tail;
+        if (parts > 0 && tail == inner && above != whole) {
+            // As the user has named it, where that is possible.
+            fs::path named = folder;
+            for (size_t i = 0; i < parts; ++i) named = named.parent_path();
+            return named.empty() ? above : named;
+        }
+    }
+    return folder;
+}
+
+/// Files of programs that hold cameras in a form which only these programs read.
+struct Unread {
+    std::string_view name, extension, advice;
+};
+constexpr std::array kUnread{
+    Unread{"sfm_data.bin", ".bin",
+           "OpenMVG's binary file; make sfm_data.json of it: openMVG_main_ConvertSfM_DataFormat -i "
+           "sfm_data.bin -o sfm_data.json"},
+    Unread{"", ".psx", "a project of Metashape; export cameras.xml there: File, Export, Export Cameras"},
+    Unread{"", ".psz", "a project of Metashape; export cameras.xml there: File, Export, Export Cameras"},
+    Unread{"", ".rcproj",
+           "a project of RealityCapture; export the registration there, as COLMAP or as XMP files"},
+    Unread{"", ".rsproj",
+           "a project of RealityScan; export the registration there, as COLMAP or as XMP files"},
+    Unread{"", ".sfm", "a file of Meshroom; export the cameras there, as COLMAP or as sfm_data.json"},
+    Unread{"", ".nvm", "a file of VisualSFM; open it in COLMAP, and export a model"}};
+
+}  // namespace
+
+const std::vector<CameraImporter>& camera_importers() {
+    static const std::vector<CameraImporter> importers{
+        {"OpenSfM reconstruction",
+         {"", "opensfm"},
+         "reconstruction",
+         is_json,
+         begins_as_open_sfm,
+         import_open_sfm},
+        {"OpenMVG sfm_data", {""}, "sfm_data", is_json, begins_as_open_mvg, import_open_mvg}};
+    return importers;
+}
+
+std::optional<FoundImporter> find_importer(const fs::path& path) {
+    if (core::is_file(path)) {
+        for (const CameraImporter& importer : camera_importers())
+            if (reads(importer, path))
+                return FoundImporter{&importer, {path, dataset_of_file(importer, path)}};
+        return std::nullopt;
+    }
+    for (const CameraImporter& importer : camera_importers())
+        for (const std::string_view place : importer.places) {
+            const fs::path folder = place.empty() ? path : path / place;
+            if (!core::is_folder(folder)) continue;
+            for (const fs::path& file : files_of_folder(folder))
+                if (is_usual(importer, file.filename()) && reads(importer, file))
+                    return FoundImporter{&importer, {file, dataset_of_file(importer, file)}};
+        }
+    return std::nullopt;
+}
+
+bool is_imported(const fs::path& entry, const std::function<std::string()>& head) {
+    std::optional<std::string> read;
+    return std::ranges::any_of(camera_importers(), [&](const CameraImporter& importer) {
+        if (!is_usual(importer, entry.filename())) return false;
+        if (!read) read = head();
+        return importer.begins(*read);
+    });
+}
+
+std::string export_advice(const fs::path& path) {
+    const auto advice = [](const fs::path& file) -> std::string {
+        for (const Unread& unread : kUnread)
+            if (extension_in_lower_case(file) == unread.extension &&
+                (unread.name.empty() || file.filename() == unread.name))
+                return core::one_line(file.filename().string()) + " is " + std::string(unread.advice);
+        return {};
+    };
+    if (!core::is_folder(path)) return advice(path);
+    for (const fs::path& file : files_of_folder(path))
+        if (std::string text = advice(file); !text.empty()) return text;
+    return {};
+}
+
+std::vector<fs::path> files_of_folder(const fs::path& folder) {
+    constexpr size_t kMostFiles = 1000000;
+    std::vector<fs::path> files;
+    std::error_code error;
+    for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
+        if (files.size() < kMostFiles) files.push_back(at->path());
+    std::sort(files.begin(), files.end());
+    return files;
+}
+
+void finish_record(ImageRecord& record, const std::string& where) {
+    const Camera& c = record.camera;
+    const Distortion& d = record.distortion;
+    bool finite = std::isfinite(c.fx) && std::isfinite(c.fy) && std::isfinite(c.cx) && std::isfinite(c.cy);
+    for (const double term : {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4, d.skew})
+        finite = finite && std::isfinite(term);
+    if (!finite) throw InputError(core::one_line(where + ": an intrinsic is not finite"));
+    if (c.width > 0 && !(c.fx > 0 && c.fy > 0))
+        throw InputError(core::one_line(where + ": a focal length is not positive"));
+    for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k) finite = finite && std::isfinite(c.rotation[i][k]);
+    if (!finite) throw InputError(core::one_line(where + ": the rotation is not finite"));
+}
+
+void set_sphere(Camera& camera) {
+    camera.fx = camera.fy = std::max(camera.width, camera.height) / (2 * std::numbers::pi);
+    camera.cx = 0.5 * camera.width;
+    camera.cy = 0.5 * camera.height;
+}
+
+void add_points_beside(const fs::path& folder, bool with_points, ImageRecords& records) {
+    std::vector<fs::path> found;
+    for (const fs::path& file : files_of_folder(folder)) try {
+            if (extension_in_lower_case(file) == ".ply" && core::is_file(file) && is_point_cloud(file))
+                found.push_back(file);
+        } catch (const InputError&) {
+            continue;  // it may belong to something else
+        }
+    if (found.size() > 1)
+        records.notes.push_back("points are in " + std::to_string(found.size()) +
+                                " PLY files; --init FILE takes one");
+    if (found.size() != 1) return;
+    records.files.push_back(found[0]);
+    if (!with_points) return;
+    PlyPoints cloud = read_points_ply(found[0]);
+    records.points = std::move(cloud.points);
+    records.dropped = std::move(cloud.dropped);
+}
+
+void note_unplaced(size_t count, ImageRecords& records) {
+    if (count > 0)
+        records.notes.push_back(core::counted(uint64_t(count), "image") + " without a pose " +
+                                std::string(core::is_or_are(count)) + " skipped");
+}
+
+}  // namespace ewa::io

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// The importers of other programs' cameras, and how their files are recognised.
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/datasets/image_records.h"
+
+namespace ewa::io {
+
+/// What an importer reads.
+struct ImportSource {
+    std::filesystem::path file;     // with the cameras; the first one, if each image has a file
+    std::filesystem::path dataset;  // the folder that the images are in or below
+    bool with_points = true;
+};
+
+/// A format. World and cameras are as in the file, but cameras get OpenCV's axes. Throws InputError of one line that names the file
+/// and the place.
+struct CameraImporter {
+    std::string_view format;  // Dataset::format
+    std::vector<std::string_view>
+        places;  // folders of a dataset that may hold the file; "" is the dataset's own
+    std::string_view
+        usual;  // how the file's name begins, where nobody names the file; photos may have other files beside them
+    bool (*named)(const std::filesystem::path& name);  // whether a file's name may be of the format
+    bool (*begins)(std::string_view head);             // whether these first bytes are; at most kHeadBytes
+    ImageRecords (*read)(const ImportSource& source);
+};
+inline constexpr size_t kHeadBytes = size_t(1) << 16;
+
+/// The programs, for messages.
+inline constexpr std::string_view kImportedFrom = "OpenSfM, OpenDroneMap or OpenMVG";
+
+/// In the order in which they are tried.
+const std::vector<CameraImporter>& camera_importers();
+
+struct FoundImporter {
+    const CameraImporter* importer = nullptr;
+    ImportSource source;
+};
+
+/// The importer of a dataset's folder, or of a file that the user names. Empty if none reads it.
+std::optional<FoundImporter> find_importer(const std::filesystem::path& path);
+
+/// Whether an entry of an archive has cameras. head: gives the entry's first bytes, and is only called for names that fit.
+bool is_imported(const std::filesystem::path& entry, const std::function<std::string()>& head);
+
+/// What to export, for a folder or file with the cameras of a program in a form that is not read, such as its own project. Empty if
+/// there is none.
+std::string export_advice(const std::filesystem::path& path);
+
+/// The folder's files in the order of names.
+std::vector<std::filesystem::path> files_of_folder(const std::filesystem::path& folder);
+
+/// Checks the intrinsics and the rotation of a record. `where` begins the errors.
+void finish_record(ImageRecord& record, const std::string& where);
+
+/// Gives the camera of a 360 degree image as many px per angle along both sides: the larger side shows the whole circle.
+void set_sphere(Camera& camera);
+
+/// Adds the points of the PLY of points that is alone in the folder.
+void add_points_beside(const std::filesystem::path& folder, bool with_points, ImageRecords& records);
+
+/// A note about `count` images of the file without a pose, if there are any.
+void note_unplaced(size_t count, ImageRecords& records);
+
+ImageRecords import_open_sfm(const ImportSource& source);
+ImageRecords import_open_mvg(const ImportSource& source);
+
+}  // namespace ewa::io

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/datasets/rotation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/matrix.hpp>
+
+namespace ewa::io {
+
+namespace {
+
+// Deviation of a rotation's columns from unit length and right angles. Files with four decimals stay below it.
+constexpr double kMaxRotationError = 1e-2;
+
+glm::dmat3 of_unit_volume(const glm::dmat3& m) {
+    return m / std::cbrt(glm::determinant(m));
+}
+
+double rotation_error(const glm::dmat3& m) {
+    const glm::dmat3 product = glm::transpose(m) * m;
+    double error = 0;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) error = std::max(error, std::abs(product[i][j] - (i == j ? 1.0 : 0.0)));
+    return error;
+}
+
+}  // namespace
+
+std::string rotation_fault(const glm::dmat3& matrix) {
+    const double determinant = glm::determinant(matrix);
+    if (!(determinant > 0) || !std::isfinite(determinant)) return "it mirrors or is degenerate";
+    if (!(rotation_error(of_unit_volume(matrix)) <= kMaxRotationError))
+        return "its columns differ in length or are not at right angles";
+    return {};
+}
+
+glm::dmat3 nearest_rotation(const glm::dmat3& matrix) {
+    // The orthogonal factor of the polar decomposition, by Higham's iteration.
+    glm::dmat3 m = of_unit_volume(matrix);
+    for (int i = 0; i < 30; ++i) m = 0.5 * (m + glm::transpose(glm::inverse(m)));
+    return m;
+}
+
+void set_pose(Camera& camera, const glm::dmat3& axes, const glm::dvec3& center) {
+    camera.rotation = glm::transpose(axes);
+    camera.translation = -(camera.rotation * center);
+}
+
+}  // namespace ewa::io

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rotations as files have them: with a uniform factor, or rounded to a few decimals.
+#pragma once
+#include <glm/mat3x3.hpp>
+#include <string>
+
+#include "ewa/camera.h"
+
+namespace ewa::io {
+
+/// Why the matrix is no rotation times a positive factor; empty if it is one, up to rounding to four decimals.
+std::string rotation_fault(const glm::dmat3& matrix);
+
+/// The nearest rotation. The matrix must have no fault.
+glm::dmat3 nearest_rotation(const glm::dmat3& matrix);
+
+/// Puts the camera at `center`. axes: its x (right), y (down) and z (forward) in the world, as columns.
+void set_pose(Camera& camera, const glm::dmat3& axes, const glm::dvec3& center);
+
+/// The same axes in OpenCV's order, from those of OpenGL and ARKit: x right, y up, z back.
+inline glm::dmat3 from_opengl(const glm::dmat3& axes) {
+    return {axes[0], -axes[1], -axes[2]};
+}
+
+}  // namespace ewa::io
