@@ -94,6 +94,7 @@ const std::vector<std::pair<std::string, Modules>> kLibraries = {
     {"httplib.h", {"src/live"}},
     {"nanoflann", {"src/scene"}},
     {"tiny_gltf", {"src/io/gltf"}},
+    {"pugixml", {"src/io/datasets"}},
     {"zstd", {"src/io/splats"}},
     {"zlib", {"src/image", "src/io/splats", "src/portions", "src/train"}},
     {"nlohmann/",

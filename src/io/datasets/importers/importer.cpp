@@ -36,6 +36,26 @@ bool begins_as_open_sfm(std::string_view head) {
     return !text.empty() && text.front() == '[' && (holds(text, "\"cameras\"") || holds(text, "\"shots\""));
 }
 
+template <const auto& extension>
+bool has_extension(const fs::path& name) {
+    return extension_in_lower_case(name) == extension;
+}
+constexpr std::string_view kXml = ".xml", kXmp = ".xmp", kCsv = ".csv";
+
+bool begins_as_metashape(std::string_view head) {
+    return holds(head, "<document") && holds(head, "<chunk");
+}
+
+/// RealityScan also writes files that have a calibration without a pose.
+bool begins_as_reality_scan_xmp(std::string_view head) {
+    return holds(head, "capturingreality.com/ns/xcr/") && holds(head, ":Rotation");
+}
+
+bool begins_as_reality_scan_csv(std::string_view head) {
+    const std::string_view line = head.substr(0, head.find('\n'));
+    return holds(line, "name,") && holds(line, "heading") && holds(line, "pitch") && holds(line, "roll");
+}
+
 bool begins_as_open_mvg(std::string_view head) {
     return holds(head, "\"sfm_data_version\"");
 }
@@ -104,7 +124,20 @@ const std::vector<CameraImporter>& camera_importers() {
          is_json,
          begins_as_open_sfm,
          import_open_sfm},
-        {"OpenMVG sfm_data", {""}, "sfm_data", is_json, begins_as_open_mvg, import_open_mvg}};
+        {"OpenMVG sfm_data", {""}, "sfm_data", is_json, begins_as_open_mvg, import_open_mvg},
+        {"Metashape XML", {""}, "", has_extension<kXml>, begins_as_metashape, import_metashape},
+        {"RealityScan CSV",
+         {""},
+         "",
+         has_extension<kCsv>,
+         begins_as_reality_scan_csv,
+         import_reality_scan_csv},
+        {"RealityScan XMP",
+         {"", "images"},
+         "",
+         has_extension<kXmp>,
+         begins_as_reality_scan_xmp,
+         import_reality_scan_xmp}};
     return importers;
 }
 

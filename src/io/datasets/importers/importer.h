@@ -34,7 +34,8 @@ struct CameraImporter {
 inline constexpr size_t kHeadBytes = size_t(1) << 16;
 
 /// The programs, for messages.
-inline constexpr std::string_view kImportedFrom = "OpenSfM, OpenDroneMap or OpenMVG";
+inline constexpr std::string_view kImportedFrom =
+    "OpenSfM, OpenDroneMap, OpenMVG, Metashape or RealityScan";
 
 /// In the order in which they are tried.
 const std::vector<CameraImporter>& camera_importers();
@@ -71,5 +72,8 @@ void note_unplaced(size_t count, ImageRecords& records);
 
 ImageRecords import_open_sfm(const ImportSource& source);
 ImageRecords import_open_mvg(const ImportSource& source);
+ImageRecords import_metashape(const ImportSource& source);
+ImageRecords import_reality_scan_xmp(const ImportSource& source);
+ImageRecords import_reality_scan_csv(const ImportSource& source);
 
 }  // namespace ewa::io
