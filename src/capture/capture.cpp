@@ -229,7 +229,7 @@ void move_up(const fs::path& root, const fs::path& folder) {
         names.push_back(entry.path().filename());
     // The cameras last: an interrupted move continues as long as they exist.
     const auto last = [&](const fs::path& name) {
-        return !is_folder(root / name) || name == "sparse" || name == "opensfm";
+        return !is_folder(root / name) || name == "sparse" || name == "opensfm" || name == "keyframes";
     };
     std::stable_partition(names.begin(), names.end(), [&](const fs::path& name) { return !last(name); });
     for (const fs::path& name : names) fs::rename(root / name, folder / name);
@@ -316,7 +316,8 @@ std::string splat_kind(const fs::path& file) try {
 }  // namespace
 
 bool is_archive(const fs::path& path) {
-    return extension_of(path) == ".zip" && io::is_zip(path);
+    // A recording of Record3D is an archive under another name.
+    return (extension_of(path) == ".zip" || extension_of(path) == ".r3d") && io::is_zip(path);
 }
 
 bool archive_has_cameras(const fs::path& archive) {

@@ -131,6 +131,19 @@ def transforms(folder):
     (folder / "transforms.json").write_text(json.dumps(value))
 
 
+def imported(folder):
+    """Datasets of other programs: the name of each, and its files that may be damaged."""
+    seeds = {"OpenSfM": ("read_open_sfm/three", "reconstruction.json"), "OpenMVG": ("read_open_mvg/three", "sfm_data.json"),
+             "Metashape": ("read_metashape/three", "cameras.xml"), "RealityScan": ("read_reality_scan_csv/two", "cameras.csv"),
+             "XMP": ("read_reality_scan_xmp/elements", "images/a.xmp"), "Record3D": ("read_record3d/frames", "metadata.json")}
+    for name, (seed, file) in seeds.items():
+        (folder / name / "images").mkdir(parents=True)
+        for image in "abc0123":
+            (folder / name / "images" / f"{image}.png").write_bytes(png(48, 36))
+        (folder / name / file).write_bytes((SEEDS / seed).read_bytes().split(b"@@@")[0])
+    return {name: [file] for name, (_, file) in seeds.items()}
+
+
 class Case:
     """What is damaged, and the commands that read it. {} is its path, {out} a free name, {good} the undamaged original."""
 
@@ -173,6 +186,8 @@ def make_cases(ewa, folder):
                                                                   (folder / name).rglob("*") if p.is_file()]))
     transforms(folder / "nerf")
     cases.append(Case("transforms.json", folder / "nerf", look, ["transforms.json", "images/1.png"]))
+    for name, files in imported(folder / "imported").items():
+        cases.append(Case(name, folder / "imported" / name, look, files))
     run = folder / "run"
     run.mkdir()
     shutil.copy(base, run / "splats.ply")

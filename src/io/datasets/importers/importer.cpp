@@ -56,6 +56,21 @@ bool begins_as_reality_scan_csv(std::string_view head) {
     return holds(line, "name,") && holds(line, "heading") && holds(line, "pitch") && holds(line, "roll");
 }
 
+bool begins_as_polycam(std::string_view head) {
+    return holds(head, "\"t_00\"") && holds(head, "\"fx\"");
+}
+
+/// A .r3d has its metadata in a file without an extension.
+bool is_record3d_metadata(const fs::path& name) {
+    return name == "metadata" || name == "metadata.json";
+}
+
+bool begins_as_record3d(std::string_view head) {
+    const std::string_view text = core::trim(head);
+    return !text.empty() && text.front() == '{' &&
+           (holds(text, "\"poses\"") || holds(text, "\"perFrameIntrinsicCoeffs\""));
+}
+
 bool begins_as_open_mvg(std::string_view head) {
     return holds(head, "\"sfm_data_version\"");
 }
@@ -137,7 +152,14 @@ const std::vector<CameraImporter>& camera_importers() {
          "",
          has_extension<kXmp>,
          begins_as_reality_scan_xmp,
-         import_reality_scan_xmp}};
+         import_reality_scan_xmp},
+        {"Polycam raw data",
+         {"keyframes/corrected_cameras", "keyframes/cameras", "corrected_cameras", "cameras"},
+         "",
+         is_json,
+         begins_as_polycam,
+         import_polycam},
+        {"Record3D", {""}, "metadata", is_record3d_metadata, begins_as_record3d, import_record3d}};
     return importers;
 }
 
