@@ -135,6 +135,31 @@ TEST(Colmap, ModelMayLieElsewhere) {
     EXPECT_TRUE(dataset.points.positions.empty());
 }
 
+TEST(Colmap, ARigsImagesHaveTheirWholePose) {
+    const Model model;
+    // COLMAP 4: a rig of two cameras, the second beside the first, and a frame of both.
+    std::string rig = bytes_of(uint32_t(1)) + bytes_of(uint32_t(2)) + bytes_of(int32_t(0)) +
+                      bytes_of(uint32_t(3)) + bytes_of(int32_t(0)) + bytes_of(uint32_t(9)) +
+                      bytes_of(uint8_t(1));
+    std::string frame = bytes_of(uint32_t(1)) + bytes_of(uint32_t(1));
+    for (const double v : {1., 0., 0., 0., 0.25, 0., 0.}) rig += bytes_of(v);
+    for (const double v : kPose) frame += bytes_of(v);
+    frame += bytes_of(uint32_t(2)) + bytes_of(int32_t(0)) + bytes_of(uint32_t(3)) + bytes_of(uint64_t(1)) +
+             bytes_of(int32_t(0)) + bytes_of(uint32_t(9)) + bytes_of(uint64_t(2));
+    const Dataset before = model.load();
+    EXPECT_EQ(before.format, "COLMAP");
+    EXPECT_EQ(before.program, "");
+    model.folder.write("sparse/0/rigs.bin", list({rig}));
+    model.folder.write("sparse/0/frames.bin", list({frame}));
+    const Dataset after = model.load();
+    EXPECT_NE(after.program.find("rigs"), std::string::npos);
+    ASSERT_EQ(after.frames.size(), before.frames.size());
+    for (size_t i = 0; i < after.frames.size(); ++i) {
+        EXPECT_EQ(after.frames[i].camera.rotation, before.frames[i].camera.rotation);
+        EXPECT_EQ(after.frames[i].camera.translation, before.frames[i].camera.translation);
+    }
+}
+
 TEST(Colmap, ADenseCloudStandsInForMissingPoints) {
     Model model;
     io::write_points_ply(model.folder / "fused.ply",

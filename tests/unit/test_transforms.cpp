@@ -5,6 +5,7 @@
 
 #include "ewa/dataset.h"
 #include "io/datasets/image_records.h"
+#include "scene/lens.h"
 #include "support/temp_folder.h"
 
 namespace {
@@ -95,6 +96,67 @@ TEST(Transforms, NerfstudioFramesHaveTheirOwnIntrinsicsAndPoints) {
     std::filesystem::remove(scene.folder / "sparse.ply");
     scene.refuse({"sparse.ply"});
     EXPECT_EQ(scene.load(false).frames.size(), 2u);
+}
+
+TEST(Transforms, NerfstudiosListOfTerms) {
+    Scene scene;
+    scene.model["camera_model"] = "OPENCV_FISHEYE";
+    scene.model["distortion_params"] = {0.04, -0.01, 0.003, -0.001, 0, 0};
+    scene.model["frames"][0].update(
+        {{"camera_model", "OPENCV"}, {"distortion_params", {-0.1, 0.02, 0.001, 0, 0.003, -0.002}}});
+    const Dataset dataset = scene.load();
+    EXPECT_EQ(dataset.frames[0].distortion,
+              (Distortion{.k1 = 0.04, .k2 = -0.01, .k3 = 0.003, .k4 = -0.001, .lens = Lens::fisheye}));
+    EXPECT_EQ(dataset.frames[1].distortion,
+              (Distortion{.k1 = -0.1, .k2 = 0.02, .p1 = 0.003, .p2 = -0.002, .k3 = 0.001}));
+    scene.model["frames"][0]["distortion_params"] = {0.1, 0.2, 0.3, 0.4, 0, 0};
+    scene.refuse({"the distortion term k4 is not supported"});
+    scene.model["frames"][0]["distortion_params"] = {0.1, 0.2};
+    scene.refuse({"frame 0", "\"distortion_params\" is not a list of 6 numbers"});
+    scene.model["frames"][0]["distortion_params"] = {0.1, 0.2, 0, 0, 0, "x"};
+    scene.refuse({"\"distortion_params\" holds an entry that is not a finite number"});
+}
+
+TEST(Transforms, Fisheye624IsProjectArias) {
+    Scene scene;
+    scene.model["camera_model"] = "FISHEYE624";
+    scene.model["fisheye_crop_radius"] = 700;
+    scene.refuse({"\"distortion_params\" is missing"});
+    scene.model["distortion_params"] = {0.03,   -0.02, 0.01,  -0.004, 0.002, -0.001,
+                                        0.0031, 0.002, 0.004, -0.003, 0.005, -0.006};
+    const Dataset dataset = scene.load();
+    ASSERT_EQ(dataset.notes.size(), 1u);
+    EXPECT_NE(dataset.notes[0].find("fisheye_crop_radius"), std::string::npos);
+    const Distortion& lens = dataset.frames[0].distortion;
+    const glm::dvec2 ray(0.4, -0.3);
+    const glm::dvec2 q = ray * (std::atan(0.5) / 0.5);
+    const double w = glm::dot(q, q);
+    const glm::dvec2 p =
+        q * (1 + w * (0.03 + w * (-0.02 + w * (0.01 + w * (-0.004 + w * (0.002 + w * -0.001))))));
+    // Aria: p + 2 (p . t) p + |p|^2 t with t = (p0, p1), then the thin prism of |p|^2.
+    const glm::dvec2 t(0.0031, 0.002);
+    const double p2 = glm::dot(p, p);
+    const glm::dvec2 expected =
+        p + 2 * glm::dot(p, t) * p + p2 * t + p2 * glm::dvec2(0.004 - 0.003 * p2, 0.005 - 0.006 * p2);
+    EXPECT_NEAR(glm::length(scene::distort(lens, ray) - expected), 0, 1e-15);
+}
+
+TEST(Transforms, ModelsOfNerfstudioThatAreNoLens) {
+    Scene scene;
+    scene.model["camera_model"] = "ORTHOPHOTO";
+    EXPECT_EQ(scene.load().frames[0].camera.distortion.lens, Lens::orthographic);
+    for (const char* model : {"OMNIDIRECTIONALSTEREO_L", "VR180_R"}) {
+        scene.model["camera_model"] = model;
+        scene.refuse({"the camera model", model, "another place for each direction; export"});
+    }
+}
+
+TEST(Transforms, TheProgramShowsInTheKeys) {
+    Scene scene;
+    EXPECT_EQ(scene.load().program, "instant-ngp");
+    EXPECT_EQ(scene.load().format, "transforms");
+    scene.model["applied_transform"] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
+    EXPECT_EQ(scene.load().program, "nerfstudio");
 }
 
 TEST(Transforms, BlenderSplits) {
@@ -189,8 +251,8 @@ TEST(Transforms, Lenses) {
 
 TEST(Transforms, OtherLensesAreNamed) {
     Scene other;
-    other.model["camera_model"] = "ORTHOPHOTO";
-    other.refuse({"frame 0", "ORTHOPHOTO", "undistort"});
+    other.model["camera_model"] = "FTHETA";
+    other.refuse({"frame 0", "FTHETA", "undistort"});
     // No pinhole shows these.
     for (const auto& [model, lens] :
          {std::pair{"EQUIRECTANGULAR", Lens::equirectangular}, {"ORTHOGRAPHIC", Lens::orthographic}}) {

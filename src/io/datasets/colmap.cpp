@@ -362,6 +362,9 @@ ImageRecords read_colmap(const std::filesystem::path& model, const std::filesyst
     if (std::filesystem::exists(points)) (binary ? read_binary_points : read_text_points)(points, builder);
     ImageRecords records = builder.take();
     records.format = "COLMAP";
+    // The images of a rig have their whole pose in the list of images, too.
+    if (core::is_file(model / (binary ? "rigs.bin" : "rigs.txt")))
+        records.program = "COLMAP 3.12 or later, which writes rigs";
     // The dense cloud of COLMAP's stereo fusion replaces points that the model lacks.
     if (const std::filesystem::path dense = images.parent_path() / "fused.ply";
         records.points.positions.empty() && records.dropped.count == 0 && core::is_file(dense)) {

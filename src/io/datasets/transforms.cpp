@@ -6,6 +6,7 @@
 //   camera_angle_x camera_angle_y  angles of view in radians, in place of fl_x and fl_y
 //   k1 k2 k3 p1 p2                 OpenCV's distortion
 //   camera_model, is_fisheye       OPENCV_FISHEYE: fisheye with k1 to k4; FULL_OPENCV: k1 to k6
+//   distortion_params              k1 k2 k3 k4 p1 p2; of FISHEYE624 k1 to k6, p2, p1, s1 to s4: in place of keys of their own
 //   transform_matrix               camera to world; camera axes are OpenGL's (x right, y up, z back)
 //   file_path                      relative to the file's folder; may lack .png, .jpg or .jpeg
 //   mask_path                      the image's mask
@@ -75,6 +76,50 @@ class Entry {
     std::string where_;
 };
 
+using Term = double Distortion::*;
+
+constexpr std::pair<const char*, Term> kTerms[] = {
+    {"k1", &Distortion::k1}, {"k2", &Distortion::k2}, {"k3", &Distortion::k3}, {"k4", &Distortion::k4},
+    {"k5", &Distortion::k5}, {"k6", &Distortion::k6}, {"p1", &Distortion::p1}, {"p2", &Distortion::p2}};
+
+/// A list of terms; false if the entry has none.
+bool read_terms(const Entry& entry, std::initializer_list<Term> terms, Distortion& d) {
+    const json* list = entry.find("distortion_params");
+    if (!list) return false;
+    if (!list->is_array() || list->size() != terms.size())
+        entry.fail("\"distortion_params\" is not a list of " + std::to_string(terms.size()) + " numbers");
+    size_t i = 0;
+    for (const Term term : terms) {
+        const json& value = (*list)[i++];
+        if (!value.is_number() || !std::isfinite(value.get<double>()))
+            entry.fail("\"distortion_params\" holds an entry that is not a finite number");
+        d.*term = value.get<double>();
+    }
+    return true;
+}
+
+/// Project Aria's lens. Its p0 and p1 are OpenCV's p2 and p1.
+Distortion read_fisheye624(const Entry& entry) {
+    using Of = Distortion;
+    Distortion d;
+    d.lens = Lens::fisheye624;
+    if (!read_terms(entry,
+                    {&Of::k1, &Of::k2, &Of::k3, &Of::k4, &Of::k5, &Of::k6, &Of::p2, &Of::p1, &Of::s1, &Of::s2,
+                     &Of::s3, &Of::s4},
+                    d))
+        entry.fail("\"distortion_params\" is missing, which has the terms of FISHEYE624");
+    return d;
+}
+
+/// Throws for models that no lens of ewa's is.
+void refuse_model_of(const Entry& entry, const std::string& model) {
+    if (model.starts_with("OMNIDIRECTIONALSTEREO") || model.starts_with("VR180"))
+        entry.fail(
+            "the camera model " + model +
+            " has another place for each direction; export each eye as EQUIRECTANGULAR, or PINHOLE images");
+    entry.fail("the camera model " + model + " is not supported; undistort the images to PINHOLE first");
+}
+
 /// The lenses of nerfstudio and instant-ngp. They disagree on k4: a fourth radial term, or as in OpenCV a
 /// term of the denominator. It is accepted only where its meaning is certain: for a fisheye and for
 /// FULL_OPENCV.
@@ -88,26 +133,43 @@ Distortion read_lens(const Entry& entry) {
     };
     const std::string model = entry.text("camera_model");
     if (model == "EQUIRECTANGULAR") return {.lens = Lens::equirectangular};
-    if (model == "ORTHOGRAPHIC") return {.lens = Lens::orthographic};
+    if (model == "ORTHOGRAPHIC" || model == "ORTHOPHOTO") return {.lens = Lens::orthographic};
+    if (model == "FISHEYE624") return read_fisheye624(entry);
     const json* flag = entry.find("is_fisheye");
     const bool fisheye = holds(kFisheye, model) || (flag && *flag != json(false) && *flag != json(0));
-    if (!fisheye && !holds(kPerspective, model))
-        entry.fail("the camera model " + model + " is not supported; undistort the images to PINHOLE first");
+    if (!fisheye && !holds(kPerspective, model)) refuse_model_of(entry, model);
     Distortion d;
     d.lens = fisheye ? Lens::fisheye : Lens::brown;
-    const std::pair<const char*, double Distortion::*> terms[] = {
-        {"k1", &Distortion::k1}, {"k2", &Distortion::k2}, {"k3", &Distortion::k3}, {"k4", &Distortion::k4},
-        {"k5", &Distortion::k5}, {"k6", &Distortion::k6}, {"p1", &Distortion::p1}, {"p2", &Distortion::p2}};
-    for (const auto& [key, term] : terms) d.*term = entry.number(key).value_or(0);
-    const std::pair<const char*, bool> unsure[] = {{"k4", !fisheye && model != "FULL_OPENCV"},
-                                                   {"k5", model != "FULL_OPENCV"},
-                                                   {"k6", model != "FULL_OPENCV"},
-                                                   {"ftheta_p0", true}};
+    using Of = Distortion;
+    if (!read_terms(entry, {&Of::k1, &Of::k2, &Of::k3, &Of::k4, &Of::p1, &Of::p2}, d))
+        for (const auto& [key, term] : kTerms) d.*term = entry.number(key).value_or(0);
+    const bool full = model == "FULL_OPENCV";
+    const std::pair<const char*, bool> unsure[] = {{"k4", d.k4 != 0 && !fisheye && !full},
+                                                   {"k5", d.k5 != 0 && !full},
+                                                   {"k6", d.k6 != 0 && !full},
+                                                   {"ftheta_p0", entry.number("ftheta_p0").value_or(0) != 0}};
     for (const auto& [key, refused] : unsure)
-        if (refused && entry.number(key).value_or(0) != 0)
+        if (refused)
             entry.fail(std::string("the distortion term ") + key +
                        " is not supported; undistort the images to PINHOLE first");
     return d;
+}
+
+/// The program that writes a file with these keys; empty if many do.
+std::string program_of(const json& top) {
+    if (top.contains("applied_transform") || top.contains("orientation_override")) return "nerfstudio";
+    if (top.contains("aabb_scale")) return "instant-ngp";
+    if (top.contains("camera_angle_x") && !top.contains("fl_x")) return "Blender";
+    return {};
+}
+
+/// Notes about keys that change nothing.
+void add_notes(const json& top, ImageRecords& records) {
+    if (top.contains("fisheye_crop_radius"))
+        records.notes.emplace_back(
+            "fisheye_crop_radius is not used: masks can hide what is outside the circle");
+    if (top.contains("rolling_shutter_time"))
+        records.notes.emplace_back("rolling_shutter_time is not used: ewa has no rolling shutter");
 }
 
 /// The file that the entry names under this key, relative to `folder`. Empty if it names none.
@@ -234,6 +296,8 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
     result.folder = folder / "images";
     result.files = {path};
     result.format = "transforms";
+    result.program = program_of(top);
+    add_notes(top, result);
     for (size_t i = 0; i < frames->size(); ++i) {
         const Entry entry(name + ": frame " + std::to_string(i), top, (*frames)[i]);
         if (!(*frames)[i].is_object()) entry.fail("is not a JSON object");
