@@ -21,7 +21,7 @@ struct Segment {
 
 /// The frustum as lines: four edges from the camera's centre to the image's corners at that depth, the
 /// image's four sides (top, right, bottom, left), and two sides of a roof over the top one that mark the up
-/// direction. Of a fisheye and 360° the middle of the image is shown, half as wide and high. Parallel rays begin in the plane of
+/// direction. A fisheye and 360° show the middle of the image, half as wide and high. Parallel rays begin in the plane of
 /// the camera. depth > 0.
 std::array<Segment, 10> frustum_segments(const Camera& camera, double depth);
 
