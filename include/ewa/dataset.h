@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -43,11 +45,18 @@ struct Frame {
     Camera source;          // the camera of the file's pixels, before undistortion and downscaling
     bool reduced = false;   // DatasetOptions::max_width has made `source` smaller than the file
     std::filesystem::path mask_path;  // empty: none
-    MaskUse masks = MaskUse::cut;     // the use of alpha in load_frame_image's result; never automatic
+    MaskUse masks = MaskUse::cut;     // the use of the file's alpha and mask; never automatic
+    /// A further mask of `camera`'s image, of one channel and any size. Black pixels do not count, whatever `masks` says. Null: none.
+    std::shared_ptr<const Image> left_out;
+    /// With left_out, if `masks` cuts: the colour of pixels that are cut out. Empty: they do not count.
+    std::optional<std::array<float, 3>> behind;
     Distortion distortion;  // of the file, which load_frame_image takes out; none with LensUse::native
     Camera pinhole;         // `camera` before downscaling
     int downscale = 1;      // factor that is applied to the file, which may be a smaller copy already
     int split = 0;          // 1 train, 2 test; 0: split_frames decides
+
+    /// Whether alpha in load_frame_image's result is the weight of pixels.
+    bool alpha_weighs() const { return left_out || masks == MaskUse::ignore; }
 };
 
 struct PointCloud {
@@ -98,7 +107,7 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
 /// Loads the frame's image as `frame.camera` sees it: turned, reduced, undistorted and downscaled.
 /// Undistortion is bilinear and keeps the focal lengths; the size changes so that no pixel is blank
 /// (src/scene/lens.h). The result has 3 channels, or 4 if the frame has a mask or the file has alpha. The
-/// fourth is their product, which is used as frame.masks says. Throws InputError, also if a value of the file is not
+/// fourth is their product, which is used as frame.masks says. With frame.left_out, it is the weight of pixels. Throws InputError, also if a value of the file is not
 /// finite.
 Image load_frame_image(const Frame& frame);
 

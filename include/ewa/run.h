@@ -22,6 +22,7 @@ struct RunResult {
 /// - checkpoint.ewa, times.json: the state to resume from, and the times up to it.
 /// - splats.ply: the splats.
 /// - cameras.json and the COLMAP model cameras/sparse/0, with TrainOptions::refine_poses: the refined cameras.
+/// - passers_by/*.png, with `robust`: the masks of what single training images show.
 /// - exposures.json, with TrainOptions::exposure: three rows of four numbers for each training image.
 /// - splats_007000.ply and so on, with `keep`: the splats after these steps.
 /// - inria/, with `inria`: cfg_args, cameras.json, input.ply, point_cloud/iteration_N/point_cloud.ply.

@@ -52,6 +52,7 @@ struct RunOptions {
     LensUse lens = LensUse::automatic;
     int test_every = 8;         // every K-th image in name order is held out; 0: none
     bool skip_blurred = false;  // training images are skipped that are blurred far more than the others
+    bool robust = false;        // masks what single images show and the others do not
     int eval_every = 0;         // evaluates the held-out views every N steps; 0: only at the end
     std::string metrics;        // that evaluations measure beside PSNR and SSIM: see metrics_named
     std::filesystem::path lpips_weights;  // see Meter; empty: LPIPS is not computed

@@ -204,6 +204,9 @@ void read_settings(const Json& settings, TrainerStart& start) {
     if (run.skip_blurred)
         throw InputError(
             "was written with --skip-blurred, which Python does not have; ewa train --resume continues it");
+    if (run.robust)
+        throw InputError(
+            "was written with --robust, which Python does not have; ewa train --resume continues it");
     start.run.train = run.train;
     start.run.dense_start = run.dense_start;
     start.run.init_opacity = run.init_opacity;

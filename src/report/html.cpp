@@ -127,7 +127,8 @@ std::string settings(const ReportData& data) {
 
 std::string html_report(const ReportData& data) {
     return html_page(data.title, headline(data) + views_html(data.views, data.held_out) +
-                                     charts(data.metrics) + step_time_html(data.times, data.earlier_steps) +
+                                     left_out_html(data.left_out) + charts(data.metrics) +
+                                     step_time_html(data.times, data.earlier_steps) +
                                      ranks_html(data.summary.ranks) + chunks_html(data.summary.chunks) +
                                      data.section + plan(data.plan) + settings(data));
 }

@@ -23,6 +23,7 @@ struct ReportData {
     std::vector<std::string> remarks;                           // warnings, e.g. "3 images are missing"
     std::vector<std::pair<std::string, std::string>> settings;  // name, value
     std::vector<ReportView> views;                              // sorted
+    std::vector<LeftOutView> left_out;                          // training images, the most first
     std::string section;                                        // HTML that the report contains as it is
     bool held_out = true;                                       // the views were not trained on
 };

@@ -20,6 +20,9 @@ inline constexpr std::array kRunFiles{kConfigFile,  kMetricsFile, kCheckpointFil
                                       kSplatsFile,  kSummaryFile, kReportFile,     kExposuresFile,
                                       kCamerasFile, kEventsFile,  kAppearanceFile, kSkyFile};
 
+/// With --robust: a mask for each training image that shows what the others do not.
+inline constexpr const char* kPassersByFolder = "passers_by";
+
 /// The COLMAP model of the refined cameras.
 inline constexpr std::array kCameraModelFiles{"cameras/sparse/0/cameras.bin", "cameras/sparse/0/images.bin",
                                               "cameras/sparse/0/points3D.bin"};

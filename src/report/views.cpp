@@ -4,7 +4,9 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <set>
 
 #include "core/typing.h"
@@ -23,6 +25,11 @@ constexpr int kSmallQuality = 80, kFullQuality = 92;
 
 ReportView::Jpeg jpeg(const Image& image, int factor, int quality) {
     return image::encode_jpeg(factor > 1 ? downscale(image, factor) : image, quality);
+}
+
+/// By which a small picture is smaller.
+int small_factor(const Image& image) {
+    return std::max(1, int(std::lround(double(std::max(image.width, image.height)) / kSmallSide)));
 }
 
 std::string picture(const ReportView::Jpeg& bytes, const char* alt) {
@@ -103,8 +110,7 @@ std::string decibels(double psnr) {
 
 ReportView small_view(const std::string& name, const Image& photo, const Image& rendering, double psnr,
                       double ssim) {
-    const int factor =
-        std::max(1, int(std::lround(double(std::max(photo.width, photo.height)) / kSmallSide)));
+    const int factor = small_factor(photo);
     ReportView view{name, psnr, ssim, -1, photo.width, photo.height, {}, {}, {}, {}, {}};
     view.small_photo = jpeg(photo, factor, kSmallQuality);
     view.small_rendering = jpeg(rendering, factor, kSmallQuality);
@@ -133,6 +139,34 @@ std::vector<size_t> full_size_order(size_t count) {
     for (size_t parts = 1; order.size() < count; parts *= 2)
         for (size_t k = 0; k <= parts; ++k) take(k * (count - 1) / parts);
     return order;
+}
+
+LeftOutView left_out_view(const std::string& name, const Image& image, const Image& mask, double share) {
+    constexpr std::array<float, 3> kTint{1.0f, 0.0f, 0.6f};
+    constexpr float kTinted = 0.6f;
+    Image tinted = image;
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x) {
+            if (*mask.at(int(int64_t(x) * mask.width / image.width),
+                         int(int64_t(y) * mask.height / image.height)) > 0.5f)
+                continue;
+            float* pixel = tinted.at(x, y);
+            for (size_t c = 0; c < 3; ++c) pixel[c] += kTinted * (kTint[c] - pixel[c]);
+        }
+    return {name, share, jpeg(tinted, small_factor(image), kSmallQuality)};
+}
+
+std::string left_out_html(const std::vector<LeftOutView>& views) {
+    if (views.empty()) return "";
+    std::string html =
+        "<h2>Masked by --robust</h2>\n<p class=\"soft\">What other images do not show there. "
+        "Tinted pixels have no part in the training.</p>\n<div class=\"views\">\n";
+    for (const LeftOutView& view : views)
+        html += fmt::format(
+            "<figure class=\"view\"><div>{}</div><figcaption><b>{}</b> <span>{:.1f} %</span></figcaption>"
+            "</figure>\n",
+            picture(view.picture, "image"), escape_html(view.name), 100 * view.share);
+    return html + "</div>\n";
 }
 
 std::string views_html(const std::vector<ReportView>& views, bool held_out) {

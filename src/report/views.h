@@ -39,6 +39,17 @@ std::vector<size_t> full_size_order(size_t count);
 /// The views as HTML, in their order. held_out: they were not trained on.
 std::string views_html(const std::vector<ReportView>& views, bool held_out);
 
+/// A training image with the pixels that --robust masks.
+struct LeftOutView {
+    std::string name;
+    double share = 0;  // of the image
+    ReportView::Jpeg picture;
+};
+/// image: RGB. mask: one channel of any size, 0 at masked pixels.
+LeftOutView left_out_view(const std::string& name, const Image& image, const Image& mask, double share);
+/// As HTML, in their order. Empty without views.
+std::string left_out_html(const std::vector<LeftOutView>& views);
+
 /// "23.46 dB", or "∞ dB" for equal images.
 std::string decibels(double psnr);
 

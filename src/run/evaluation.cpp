@@ -75,7 +75,7 @@ RenderedView view_of_protocol(Protocol protocol, Image rendering, const Frame& f
     Frame unscaled = frame;
     if (inria) unscaled.downscale = 1;
     Image photo = load_frame_image(unscaled), weights;
-    if (photo.channels == 4 && frame.masks == MaskUse::ignore) {
+    if (photo.channels == 4 && frame.alpha_weighs()) {
         weights = channels_between(photo, 3, 4);
         if (inria) weights = downscale(weights, frame.downscale);
         photo = channels_between(photo, 0, 3);

@@ -399,6 +399,11 @@ std::vector<Row> rows() {
         {"Data", "",
          later_flag("skip-blurred", "Do not train on images that are blurred far more than the others",
                     [](RunOptions& o) -> bool& { return o.skip_blurred; })},
+        {"Data", "",
+         later_flag("robust",
+                    "Mask what single images show and the others do not, such as people who pass by. A short "
+                    "training first finds it; DIR/passers_by has the masks",
+                    [](RunOptions& o) -> bool& { return o.robust; })},
         {"Quality", "seed",
          number<uint64_t>(
              "seed", "S", "The same seed on the same device gives the same bytes", kDecides,

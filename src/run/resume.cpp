@@ -7,6 +7,7 @@
 #include "core/hash.h"
 #include "core/json.h"
 #include "ewa/error.h"
+#include "report/run_file_names.h"
 #include "run/option_table.h"
 #include "train/schedule.h"
 
@@ -161,6 +162,9 @@ void check_resumable(const std::filesystem::path& path, const std::string& store
                              other.dump().substr(0, kLongestValue) + ", not " + value.dump() +
                              "; with its own value the run continues, -o DIR starts another run");
     }
+    if (now.contains(kMasksSetting) && then.value(kMasksSetting, Json()) != now[kMasksSetting])
+        throw InputError(path.string() + ": the masks of --robust beside it, in " + report::kPassersByFolder +
+                         "/, have changed; with the former ones it continues, -o DIR starts another run");
     // Options such as --downscale change the dataset too, and say more.
     if (then.value("dataset", Json()) != now["dataset"])
         throw InputError(path.string() +

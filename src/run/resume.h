@@ -26,6 +26,9 @@ nlohmann::ordered_json checkpoint_settings(const RunOptions& options, const std:
 int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, const TrainOptions& asked,
                   RunOptions& options);
 
+/// The setting that --robust adds: fingerprint_of its masks.
+inline constexpr const char* kMasksSetting = "passers_by";
+
 /// Throws InputError that names the first difference, except in the number of steps, if a run with the settings `now`
 /// would continue differently. stored: the settings of the checkpoint at `path`.
 void check_resumable(const std::filesystem::path& path, const std::string& stored,

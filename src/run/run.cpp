@@ -12,12 +12,9 @@
 #include <utility>
 
 #include "core/atomic_file.h"
-#include "core/folders.h"
-#include "core/outputs.h"
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "gpu/device.h"
-#include "io/datasets/dataset_folders.h"
 #include "pipeline/model.h"
 #include "report/run_file_names.h"
 #include "report/step_time.h"
@@ -33,9 +30,10 @@
 #include "run/run_cameras.h"
 #include "run/run_files.h"
 #include "run/run_input.h"
+#include "run/run_outputs.h"
 #include "run/run_saves.h"
 #include "run/run_times.h"
-#include "scene/dataset_files.h"
+#include "run/scout.h"
 #include "train/checkpoint.h"
 
 namespace ewa {
@@ -54,25 +52,6 @@ std::vector<PlanLine> plan_of(const Trainer& trainer, const train::RunInput& inp
                     "the dataset says that no colour depends on the view",
                     copies * (bytes(kMaxShDegree) - bytes(0))});
     return plan;
-}
-
-/// The run's folder, after a check that no file in it is an input. --config may be the config.json that the run
-/// writes, since that has the same options.
-const std::filesystem::path& checked_folder(const train::RunInput& input) {
-    const std::filesystem::path& folder = input.options.output;
-    if (!input.options.resume || !core::is_file(folder / report::kCheckpointFile))
-        io::check_output_folder("-o", folder, input.dataset);
-    std::vector<core::NamedFile> written, read = scene::files_of(input.dataset, "DATASET");
-    for (const char* name : report::kRunFiles) written.push_back({"the run's file", folder / name});
-    for (const char* name : report::kCameraModelFiles) written.push_back({"the run's file", folder / name});
-    for (const auto& [frame, file] : train::saved_renders(input))
-        written.push_back({"the run's render", file});
-    if (input.options.init != "sfm" && input.options.init != "random")
-        read.push_back({"--init", input.options.init_folder / input.options.init});
-    read.push_back({"DATASET", input.options.scene});
-    read.push_back({"--lpips-weights", input.options.lpips_weights});
-    core::check_outputs(written, read);
-    return folder;
 }
 
 report::StepTime report_times(const StepTimes& times) {
@@ -100,7 +79,7 @@ class Run {
           progress_{.seconds_before = options.seconds_before, .last = {}, .metrics = {}},
           input_(train::load_run(options)),
           measures_(train::measures_of(options)),
-          folder_(checked_folder(input_)),
+          folder_(train::checked_folder(input_)),
           cameras_(input_),
           saves_(folder_, input_.options, cameras_, progress_) {
         read_checkpoint(options.train);
@@ -112,6 +91,7 @@ class Run {
     const RunOptions& options() const { return input_.options; }
     void read_checkpoint(const TrainOptions& asked);
     void begin_files();
+    void leave_out_passers_by();
     void choose_cap();
     TrainOptions capped_options() const;
     void start();
@@ -138,6 +118,7 @@ class Run {
     train::RunCameras cameras_;
     train::RunSaves saves_;
     std::optional<EarlierRun> earlier_;
+    std::optional<train::Masks> masks_;  // of --robust, once they are known
     std::shared_ptr<gpu::Device> device_;
     std::optional<MetricsFiles> files_;
     report::ReportData report_;
@@ -153,6 +134,10 @@ void Run::read_checkpoint(const TrainOptions& asked) {
     }
     saves_.settings() =
         train::checkpoint_settings(options(), train::dataset_fingerprint(input_.dataset, input_.split));
+    if (earlier_ && options().robust && earlier_->reader->checkpoint().state.report.step > 0) {
+        masks_ = train::saved_masks(input_);
+        saves_.settings()[train::kMasksSetting] = train::fingerprint_of(*masks_);
+    }
     if (earlier_)
         train::check_resumable(folder_.checkpoint(), earlier_->reader->checkpoint().settings,
                                saves_.settings());
@@ -161,6 +146,7 @@ void Run::read_checkpoint(const TrainOptions& asked) {
 /// Called as late as possible, since it ends an earlier run that is replaced.
 void Run::begin_files() {
     folder_.begin(train::to_config(options()), earlier_.has_value());
+    if (options().robust) train::save_masks(input_);
     if (!earlier_) train::remove_inria_splats(folder_.path());
     files_.emplace(MetricsFiles{report::MetricsLog(folder_.metrics(), progress_.metrics), {}});
     if (options().tensorboard)
@@ -230,6 +216,16 @@ void Run::start() {
     start.memory =
         estimate_memory(*device_, input_.dataset, input_.split.train, input_.start, capped_options());
     observer_.on_start(start);
+}
+
+/// A run that was stopped before its first step looks for them again.
+void Run::leave_out_passers_by() {
+    if (!options().robust) return;
+    const std::string note = train::leave_out_passers_by(device_, input_, masks_, &observer_);
+    saves_.settings()[train::kMasksSetting] = train::fingerprint_of(train::masks_of(input_));
+    if (note.empty()) return;
+    report_.notes.push_back(note);
+    observer_.on_note(note);
 }
 
 /// Continues from the checkpoint, if there is one.
@@ -426,6 +422,7 @@ void Run::finish(std::unique_ptr<Trainer> trainer) {
     report_.summary.interrupted = !shown || !evaluation.add_section();
     first_render_ = evaluation.first_render();
     fill_summary();
+    report_.left_out = train::left_out_views(input_);
     report_.metrics = progress_.metrics;
     folder_.save_report(report_);
 }
@@ -455,6 +452,7 @@ RunResult Run::run() {
     list_settings();
     train::agree(input_.options, saves_.settings(), saves_.settings().at("dataset").get<std::string>(),
                  input_.start, *device_);
+    leave_out_passers_by();
     std::unique_ptr<Trainer> trainer = make_trainer();
     progress_.last.splats = trainer->splats();
     restore(*trainer);
@@ -475,6 +473,7 @@ RunResult follow_training(const RunOptions& asked) {
     const std::shared_ptr<gpu::Device> device = open_device(asked.device);
     train::agree(input.options, {}, train::dataset_fingerprint(input.dataset, input.split), input.start,
                  *device);
+    if (input.options.robust) train::leave_out_passers_by(device, input, {}, nullptr);
     Trainer trainer(device, input.dataset, input.split.train, std::exchange(input.start, {}),
                     input.options.train, asked.ranks);
     trainer.follow();

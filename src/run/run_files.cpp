@@ -70,7 +70,8 @@ void RunFolder::begin(const nlohmann::ordered_json& config, bool continues) cons
 }
 
 void RunFolder::remove_links() const {
-    for (const char* folder : {"test", "train", "cameras", "cameras/sparse", "cameras/sparse/0"})
+    for (const char* folder :
+         {"test", "train", report::kPassersByFolder, "cameras", "cameras/sparse", "cameras/sparse/0"})
         without_link(path_ / folder);
     for (const char* file : report::kRunFiles) without_link(path_ / file);
     for (const char* file : report::kCameraModelFiles) without_link(path_ / file);

@@ -399,6 +399,8 @@ constexpr std::array kRunExclusions{
     RunExclusion{"--init-opacity",
                  [](const RunOptions& o) { return o.init_opacity != RunOptions().init_opacity; },
                  Relation::excludes, "--points", draws_points, "a sphere has no opacity"},
+    RunExclusion{"--robust", [](const RunOptions& o) { return o.robust; }, Relation::excludes, "--points",
+                 draws_points, "spheres show no passer-by faintly"},
     RunExclusion{"--nearest",
                  [](const RunOptions& o) { return o.train.render.nearest != RenderOptions().nearest; },
                  Relation::needs, "--points", draws_points},

@@ -63,12 +63,17 @@ Image load_file(const Frame& frame) {
     return with_mask(image, mask);
 }
 
+/// The image with the weights of its pixels as alpha. frame: with left_out.
+Image without_left_out(const Image& image, const Frame& frame) {
+    const bool cut = frame.masks == MaskUse::cut && frame.behind && image.channels == 4;
+    return with_mask(cut ? over_background(image, *frame.behind) : image, *frame.left_out);
+}
+
 }  // namespace
 
 TrainingImage load_training_image(const Frame& frame, const std::array<float, 3>& background) {
     const Image image = load_frame_image(frame);
-    if (image.channels == 3 || frame.masks != MaskUse::ignore)
-        return {over_background(image, background), {}};
+    if (image.channels == 3 || !frame.alpha_weighs()) return {over_background(image, background), {}};
     return {channels_of(image, 0, 3), channels_of(image, 3, 1)};
 }
 
@@ -102,7 +107,8 @@ Image load_frame_image(const Frame& frame) {
                          std::to_string(frame.source.width) + " x " + std::to_string(frame.source.height));
     if (!frame.distortion.none())
         image = scene::undistort_image(image, frame.source, frame.distortion, frame.pinhole);
-    return frame.downscale == 1 ? image : downscale(image, frame.downscale);
+    if (frame.downscale != 1) image = downscale(image, frame.downscale);
+    return frame.left_out ? without_left_out(image, frame) : image;
 }
 
 }  // namespace ewa

@@ -53,7 +53,8 @@ class ParallelLoader {
 
 bool may_be_cut(const Frame& frame) {
     const std::string type = core::lower(frame.image_path.extension().string());
-    return frame.masks == MaskUse::cut && (!frame.mask_path.empty() || (type != ".jpg" && type != ".jpeg"));
+    return frame.masks == MaskUse::cut && !frame.left_out &&
+           (!frame.mask_path.empty() || (type != ".jpg" && type != ".jpeg"));
 }
 
 ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, const Dataset& dataset,
@@ -81,7 +82,7 @@ ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, 
             cached.push_back(i);
         } else {
             ++on_disk_;
-            any_masked_ = any_masked_ || frame.masks == MaskUse::ignore;
+            any_masked_ = any_masked_ || frame.alpha_weighs();
             any_cut_ = any_cut_ || may_be_cut(frame);
         }
     }
@@ -100,9 +101,9 @@ ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, 
 ImageCache::Photo ImageCache::upload(const Frame& frame, const Image& image) const {
     if (image.width != frame.camera.width || image.height != frame.camera.height)
         throw InputError("frame " + frame.name + " changed its size while it was read");
-    const bool partly = pipeline::transparent(image), masked = partly && frame.masks == MaskUse::ignore;
+    const bool partly = pipeline::transparent(image), masked = partly && frame.alpha_weighs();
     return {pipeline::upload_photo(device_, image, frame.eight_bit), masked,
-            partly && frame.masks == MaskUse::cut, masked ? mean_weight(image) : 1};
+            partly && !masked && frame.masks == MaskUse::cut, masked ? mean_weight(image) : 1};
 }
 
 const ImageCache::Photo& ImageCache::photo(size_t i) {

@@ -240,7 +240,7 @@ MemoryEstimate MemoryEstimator::up_to(uint32_t max_splats) {
                                    .height = rows > 0 ? rows : uint32_t(frame.camera.height),
                                    .instances = instances_needed,
                                    .gradients = true,
-                                   .masks = frame.masks == MaskUse::ignore,
+                                   .masks = frame.alpha_weighs(),
                                    .appearance = plan.appearance,
                                    .overlaid = true,
                                    .motion = plan.motion,

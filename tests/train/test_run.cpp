@@ -342,6 +342,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                              {"lens", "native"},
                                              {"test-every", "5"},
                                              {"skip-blurred", "true"},
+                                             {"robust", "true"},
                                              {"seed", "18446744073709551615"},
                                              {"moments", "32"},
                                              {"image-cache", "9"},

@@ -250,6 +250,25 @@ TEST(Report, ViewsAreSortedWorstFirstAndOpenAtFullSize) {
     EXPECT_EQ(views_html({}, true), "");
 }
 
+/// Black pixels of a mask of another size are tinted.
+TEST(Report, ShowsMaskedPixelsOfTrainingImages) {
+    Image image(32, 16, 3), mask(2, 1, 1);
+    std::ranges::fill(image.pixels, 0.25f);
+    mask.pixels = {1, 0};
+    const LeftOutView view = left_out_view("<a>.jpg", image, mask, 0.5);
+    TempFolder folder;
+    const Image shown =
+        load_image(folder.write("a.jpg", std::string(view.picture.begin(), view.picture.end())));
+    ASSERT_EQ(shown.width, 32);
+    EXPECT_NEAR(shown.at(4, 8)[0], 0.25, 0.03);
+    EXPECT_GT(shown.at(28, 8)[0], 0.6);
+    EXPECT_LT(shown.at(28, 8)[1], 0.2);
+    const std::string html = left_out_html({view});
+    EXPECT_NE(html.find("Masked by --robust"), std::string::npos);
+    EXPECT_NE(html.find("&lt;a&gt;.jpg</b> <span>50.0 %"), std::string::npos);
+    EXPECT_EQ(left_out_html({}), "");
+}
+
 TEST(Report, ViewsKeepTheFileSmallAndSaySo) {
     std::vector<ReportView> views(5, made_up_view("v.jpg", 20));
     const ReportView::Jpeg large(kSmallBytes / 2);
