@@ -7,12 +7,15 @@ const bool STATISTICS = (MODE & UPDATE_STATISTICS) != 0u, REGULARISED = (MODE & 
            ABSOLUTE = (MODE & UPDATE_ABSOLUTE) != 0u, PACKED_MOMENTS = (MODE & UPDATE_PACKED_MOMENTS) != 0u;
 #include "lib/adam.glsl"
 
-// by_mean: and by the logit of opacity. by_scale: and by the colour in plane 2. opacity: without the kernel's factor.
-void move_splat(uint i, vec4 p0, vec4 p1, vec4 p2, vec4 by_mean, vec4 by_quaternion, vec4 by_scale, float opacity, float depth) {
+// by_mean: and by the logit of opacity. by_scale: and by the colour in plane 2. opacity: without the kernel's factor. widest:
+// the largest logarithm of a scale, with SPEC_LENSES.
+void move_splat(uint i, vec4 p0, vec4 p1, vec4 p2, vec4 by_mean, vec4 by_quaternion, vec4 by_scale, float opacity, float depth,
+                float widest) {
     const vec4 scale_pull = REGULARISED ? vec4(push.scale_weight * exp(p2.xyz), 0.0) : vec4(0.0);
     const vec4 opacity_pull =
         REGULARISED ? vec4(vec3(0.0), push.opacity_weight * opacity * transparency_of(p0.w)) : vec4(0.0);
-    move(2, i, p2, by_scale + scale_pull, vec4(vec3(push.scale_rate), push.sh0_rate), depth);
+    const vec4 held = LENSES != 0u ? vec4(min(p2.xyz, vec3(widest)), p2.w) : p2;
+    move(2, i, held, by_scale + scale_pull, vec4(vec3(push.scale_rate), push.sh0_rate), depth);
     move(1, i, p1, by_quaternion, vec4(push.quaternion_rate), depth);
     move(0, i, p0, by_mean + opacity_pull, vec4(vec3(push.mean_rate), push.opacity_rate), depth);
 }

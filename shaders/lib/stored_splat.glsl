@@ -63,6 +63,13 @@ Projection project_through_lens(View view, mat3 directions, vec3 scale) {
 }
 
 // By which splats are ordered, in world units; they are in front of the camera where it is above NEAR_PLANE.
+// The largest logarithm of a scale that a step leaves. Within the angles of a fisheye or 360 degrees, every splat has an image. A
+// pinhole at the same place has none of a splat that reaches behind it.
+float widest_log_scale(Projection p) {
+    const bool wide = LENSES != 0u && (camera.lens == LENS_FISHEYE || camera.lens == LENS_EQUIRECTANGULAR);
+    return wide ? log(float(WIDEST_SHARE) * p.image.depth) : 3.4e38;
+}
+
 float depth_of_splat(Projection p) { return LENSES != 0u ? p.image.depth : p.view.z.x; }
 
 // The direction in which the camera sees the splat.

@@ -98,7 +98,7 @@ MotionGradient update_splat(uint i) {
     const vec4 zero = vec4(0.0);
     move_splat(i, p0, p1, p2, visible ? vec4(g.mean, g.logit) : zero, visible ? g.quaternion : zero,
                visible ? vec4(g.log_scale, red_gradient) : zero,
-               KERNEL == KERNEL_DENSITY ? sigmoid(p0.w) : stored.peak, depth);
+               KERNEL == KERNEL_DENSITY ? sigmoid(p0.w) : stored.peak, depth, visible ? widest_log_scale(p) : 3.4e38);
     if (STATISTICS && visible) statistics[i] += statistics_of(f, vec2(push.half_size[0], push.half_size[1]));
     const MotionGradient none = MotionGradient(vec4(0.0), vec3(0.0));
     if (!MOTION || !visible) return none;

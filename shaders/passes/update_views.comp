@@ -71,7 +71,7 @@ void main() {
     const StoredSplat splat = StoredSplat(p0.xyz, p0.w, p1, p2.xyz);
     vec4 by_mean = vec4(0.0), by_quaternion = vec4(0.0), by_scale = vec4(0.0), by_sh[16];
     [[unroll]] for (uint plane = FIRST_SH_PLANE; plane < PLANES; ++plane) by_sh[plane] = vec4(0.0);
-    float depth = 3.4e38;
+    float depth = 3.4e38, widest = 3.4e38;
     vec2 seen = vec2(0.0);
     for (uint view = 0u; view < push.views; ++view) {
         Sums s;
@@ -94,13 +94,14 @@ void main() {
         by_quaternion = added(first, by_quaternion, g.quaternion);
         by_scale = added(first, by_scale, vec4(g.log_scale, basis.value[0] * s.color.r));
         depth = min(depth, depth_of_splat(p));
+        widest = min(widest, widest_log_scale(p));
         seen += statistics_of(f, 0.5 * vec2(camera.size[0], camera.size[1]));
     }
 
     [[unroll]] for (uint plane = FIRST_SH_PLANE; plane < PLANES; ++plane) {
         move(plane, i, fetch(params, index_of(plane, i)), by_sh[plane], sh_rates(plane), 0.0);
     }
-    move_splat(i, p0, p1, p2, by_mean, by_quaternion, by_scale, sigmoid(p0.w), depth);
+    move_splat(i, p0, p1, p2, by_mean, by_quaternion, by_scale, sigmoid(p0.w), depth, widest);
     if (STATISTICS && seen.y > 0.0) statistics[i] += seen;
     count_updates();
 }

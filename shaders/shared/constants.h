@@ -90,6 +90,8 @@ EWA_REAL(STEP_NORM_SHARE, 0.5);   // a quaternion moves by at most this share of
 // A step keeps the logarithm of a scale in this range, which is 1e-30 to 1e18 world units.
 EWA_REAL(LOG_SCALE_MIN, -69.0);
 EWA_REAL(LOG_SCALE_MAX, 41.0);
+// Through a fisheye or 360 degrees, a step keeps the scales of a splat below this share of its distance.
+EWA_REAL(WIDEST_SHARE, 0.125);
 
 // Adaptive density control (3DGS, section 5.2 and its published code).
 EWA_REAL(SPLIT_SCALE, 1.6);  // a split child's scales are the parent's divided by this

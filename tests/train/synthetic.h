@@ -12,6 +12,7 @@
 #include "ewa/dataset.h"
 #include "ewa/train_options.h"
 #include "reference/render.h"
+#include "scene/native_lens.h"
 #include "support/random_scene.h"
 #include "support/temp_folder.h"
 
@@ -90,6 +91,26 @@ inline const Synthetic& small_capture() {
         return &synthetic;
     }();
     return *made;
+}
+
+/// Cameras at the places of small_capture's, and their images through a lens.
+inline void put_lens(Synthetic& out, const Distortion& lens) {
+    out.truth = small_capture().truth;
+    out.dataset = small_capture().dataset;
+    for (Frame& frame : out.dataset.frames) {
+        frame.camera = scene::through_lens(frame.camera, lens, 70, glm::dvec3(0));
+        if (lens.lens == Lens::equirectangular) {
+            frame.camera.width = 96;
+            scene::set_equirectangular(frame.camera);
+        }
+        frame.pinhole = frame.source = frame.camera;
+        frame.image_path = out.folder / frame.image_path.filename().string();
+        const auto render = reference::render(out.truth, frame.camera, {});
+        Image picture(frame.camera.width, frame.camera.height, 3);
+        for (size_t i = 0; i < picture.pixels.size(); ++i)
+            picture.pixels[i] = float(render.blended.color.values[i]);
+        save_image(frame.image_path, picture);
+    }
 }
 
 inline std::vector<int> all_frames(const Dataset& dataset) {

@@ -15,7 +15,6 @@
 #include "io/datasets/image_records.h"
 #include "io/datasets/refined_cameras.h"
 #include "run/refined_cameras.h"
-#include "scene/native_lens.h"
 #include "train/synthetic.h"
 
 namespace ewa::test {
@@ -152,26 +151,6 @@ TEST(RefinedCameras, AlignmentFindsCamerasOfFixedSplats) {
         const CameraDistance after = distance_between(moved(start, motions[i]), camera);
         EXPECT_LT(after.degrees, before.degrees / 10);
         EXPECT_LT(after.length, before.length / 10);
-    }
-}
-
-/// Cameras at the places of small_capture's, and their images through a lens.
-void put_lens(Synthetic& out, const Distortion& lens) {
-    out.truth = small_capture().truth;
-    out.dataset = small_capture().dataset;
-    for (Frame& frame : out.dataset.frames) {
-        frame.camera = scene::through_lens(frame.camera, lens, 70, glm::dvec3(0));
-        if (lens.lens == Lens::equirectangular) {
-            frame.camera.width = 96;
-            scene::set_equirectangular(frame.camera);
-        }
-        frame.pinhole = frame.source = frame.camera;
-        frame.image_path = out.folder / frame.image_path.filename().string();
-        const auto render = reference::render(out.truth, frame.camera, {});
-        Image picture(frame.camera.width, frame.camera.height, 3);
-        for (size_t i = 0; i < picture.pixels.size(); ++i)
-            picture.pixels[i] = float(render.blended.color.values[i]);
-        save_image(frame.image_path, picture);
     }
 }
 
