@@ -112,23 +112,24 @@ TEST(BenchProgram, StabilityIsMeasuredAndWritten) {
     const Ended ended =
         run(kProgram + " --stability --cases ordinary,value_nan --training-steps 3 --json " + json);
     ASSERT_EQ(ended.status, 0) << ended.output;
-    EXPECT_NE(ended.output.find("12 scenes. Each is rendered"), std::string::npos) << ended.output;
-    EXPECT_NE(ended.output.find("all 18 results are within their bounds\n"), std::string::npos)
+    EXPECT_NE(ended.output.find("13 scenes. Each is rendered"), std::string::npos) << ended.output;
+    EXPECT_NE(ended.output.find("all 20 results are within their bounds\n"), std::string::npos)
         << ended.output;
     const nlohmann::json results = read_json(json);
-    // Three kernels and the one of NaNs, and the same of points, rays and marches.
-    ASSERT_EQ(results.at("cases").size(), 12u);
+    // Three kernels and the one of NaNs, and the same of points, rays, marches and a lens.
+    ASSERT_EQ(results.at("cases").size(), 13u);
     for (const auto& one : results.at("cases")) {
         const std::string name = one.at("name");
         EXPECT_EQ(one.at("good"), true) << one;
         EXPECT_EQ(one.at("finite"), true);
-        const bool moves_camera = name.starts_with("ordinary") || name == "value_nan";
+        const bool moves_camera =
+            name.starts_with("ordinary") || name == "value_nan" || name.starts_with("lens_");
         EXPECT_EQ(one.at("comparisons").size(), moves_camera ? 10u : 7u) << name;
         if (name == "value_nan") {
             EXPECT_EQ(one.at("skipped"), 59);
         }
     }
-    EXPECT_EQ(results.at("training").size(), 6u);  // along rays nothing trains
+    EXPECT_EQ(results.at("training").size(), 7u);  // along rays nothing trains
     EXPECT_EQ(run(kProgram + " --stability /nowhere.ply").status, 2);
 }
 
