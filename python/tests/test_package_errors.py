@@ -161,6 +161,7 @@ COMMAND_LINE = {
     "metrics",
     "output",
     "resume",
+    "robust",
     "save-every",
     "test-every",
     "transform",
