@@ -134,8 +134,9 @@ INSTANTIATE_TEST_SUITE_P(All, Gradient,
 /// Through each lens: the device's and the reference's gradient against central differences of the reference's loss.
 TEST(GradientThroughALens, IsTheSlopeOfTheReferencesLoss) {
     for (const Footprint kernel : {Footprint::peak, Footprint::antialias, Footprint::density})
-        for (const auto& [name, camera] : random_lenses(5200, 25, 17)) {
-            SCOPED_TRACE(name);
+        for (const NamedCamera& lens : random_lenses(5200, 25, 17)) {
+            SCOPED_TRACE(lens.name);
+            const Camera& camera = lens.camera;
             const Gaussians gaussians = gaussians_around(5201, 9, camera, 1);
             const Image target = random_target(5202, 25, 17);
             RenderOptions options;
