@@ -107,8 +107,8 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
 /// Loads the frame's image as `frame.camera` sees it: turned, reduced, undistorted and downscaled.
 /// Undistortion is bilinear and keeps the focal lengths; the size changes so that no pixel is blank
 /// (src/scene/lens.h). The result has 3 channels, or 4 if the frame has a mask or the file has alpha. The
-/// fourth is their product, which is used as frame.masks says. With frame.left_out, it is the weight of pixels. Throws InputError, also if a value of the file is not
-/// finite.
+/// fourth is their product, which is used as frame.masks says. With frame.left_out, it is the weight of pixels.
+/// Throws InputError, also if a value of the file is not finite.
 Image load_frame_image(const Frame& frame);
 
 /// The frame's image in the form that a render is compared with.
