@@ -43,9 +43,9 @@ Image oriented(const Image& image, int orientation);
 /// 65,535 px per side. Throws InputError, also for a truncated file.
 Image load_image(const std::filesystem::path& path);
 
-/// Writes .png (8 bit), .jpg or .jpeg (8 bit, RGB alone, quality 95) or .exr (float32, not clamped). Values of 8 bits are rounded
+/// Writes .png (8 bit), .jpg or .jpeg (8 bit, RGB or grey, quality 95) or .exr (float32, not clamped). Values of 8 bits are rounded
 /// and clamped to [0, 1], with NaN as 0. Colour is not multiplied by alpha. A temporary file is written and renamed.
-/// Throws RunError (disk, other channels than RGB for a JPEG), InputError (extension, no pixels).
+/// Throws RunError (disk, more channels than a PNG or JPEG can have), InputError (extension, no pixels).
 void save_image(const std::filesystem::path& path, const Image& image);
 
 /// As save_image, of an equirectangular image of all directions: a PNG or JPEG says so to viewers of panoramas, by XMP's

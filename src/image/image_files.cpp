@@ -124,6 +124,12 @@ namespace {
 
 constexpr int kJpegQuality = 95;
 
+Image grey_as_rgb(const Image& grey) {
+    Image rgb(grey.width, grey.height, 3);
+    for (size_t i = 0; i < rgb.pixels.size(); ++i) rgb.pixels[i] = grey.pixels[i / 3];
+    return rgb;
+}
+
 /// xmp: empty for none.
 void save(const fs::path& path, const Image& image, const std::string& xmp) {
     const std::string extension = core::lower(path.extension().string());
@@ -136,8 +142,8 @@ void save(const fs::path& path, const Image& image, const std::string& xmp) {
     std::vector<unsigned char> bytes;
     try {
         bytes = extension == ".exr" ? image::openimageio().encode_exr(image)
-                : jpeg              ? image::encode_jpeg(image, kJpegQuality)
-                                    : image::encode_png(image);
+                : jpeg ? image::encode_jpeg(image.channels == 1 ? grey_as_rgb(image) : image, kJpegQuality)
+                       : image::encode_png(image);
         if (!xmp.empty() && extension != ".exr") bytes = image::with_xmp(std::move(bytes), xmp);
     } catch (const std::runtime_error& error) {
         throw RunError(core::one_line(path.string() + ": " + error.what()));
