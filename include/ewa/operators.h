@@ -13,6 +13,7 @@
 #include <span>
 #include <vector>
 
+#include "ewa/camera.h"
 #include "ewa/device.h"
 
 namespace ewa {
@@ -35,6 +36,8 @@ struct SplatArrays {
 struct ViewArrays {
     std::span<const float> view_matrices;  // [C, 4, 4], world to camera; the last row is not read
     std::span<const float> intrinsics;     // [C, 3, 3]: fx 0 cx, 0 fy cy, 0 0 1 (px)
+    // [C]; empty: pinholes. Brown, a fisheye of k1 to k4, or orthographic. Depths are view z through each of them.
+    std::span<const Distortion> lenses{};
     size_t size() const { return view_matrices.size() / 16; }
 };
 

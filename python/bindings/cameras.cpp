@@ -95,6 +95,20 @@ Distortion distortion_of(const LensArguments& arguments) {
 
 }  // namespace
 
+std::vector<Distortion> distortions_of(const std::string& model, nb::handle terms, const Shape& cameras,
+                                       size_t count) {
+    std::vector<Distortion> lenses(count, distortion_of({model, nb::none()}));
+    if (terms.is_none()) return lenses;
+    Shape shape = cameras;
+    shape.push_back(std::size(kBrownTerms));
+    const Array<float> given(terms, "distortions", shape);
+    for (size_t i = 0; i < given.size(); ++i) {
+        if (!std::isfinite(given.data()[i])) refuse("distortions are not finite");
+        lenses[i / std::size(kBrownTerms)].*kBrownTerms[i % std::size(kBrownTerms)] = given.data()[i];
+    }
+    return lenses;
+}
+
 std::string model_of(const Distortion& lens) {
     if (lens.none()) return "pinhole";
     for (const auto& [name, model] : kModels)

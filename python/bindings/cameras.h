@@ -30,6 +30,10 @@ struct LensArguments {
 Cameras cameras_of(nb::handle viewmats, nb::handle intrinsics, int width, int height,
                    const LensArguments& lens);
 
+/// One lens a camera. terms: None, or [cameras..., 12] in OpenCV's order k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4. count: of the cameras.
+std::vector<Distortion> distortions_of(const std::string& model, nb::handle terms, const Shape& cameras,
+                                       size_t count);
+
 /// What cameras_of takes for this camera's lens; distortion is None without one.
 std::string model_of(const Distortion& lens);
 nb::object terms_of(const Distortion& lens);

@@ -18,6 +18,7 @@
 
 #include "arrays.h"
 #include "bindings.h"
+#include "cameras.h"
 #include "device.h"
 #include "errors.h"
 #include "ewa/error.h"
@@ -130,7 +131,7 @@ class Projection {
   public:
     Projection(nb::handle m, nb::handle q, nb::handle s, nb::handle c, nb::handle o, nb::handle v,
                nb::handle k, int width, int height, float eps2d, float near, float far, float radius_clip,
-               bool compensations)
+               bool compensations, const std::string& camera_model, nb::handle distortions)
         : means_(m, "means", {kLeading, any('N'), 3}),
           quats_(optional_array<float>(q, "quats", joined(means_.leading(1), {4}))),
           scales_(optional_array<float>(s, "scales", joined(means_.leading(1), {3}))),
@@ -148,6 +149,8 @@ class Projection {
         if (covars_ ? quats_ || scales_ : !quats_ || !scales_)
             throw InputError("a splat has quats and scales, or covars; neither more nor less");
         for (const ptrdiff_t length : means_.leading(2)) scenes_ *= size_t(length);
+        if (camera_model == "pinhole" && distortions.is_none()) return;
+        lenses_ = distortions_of(camera_model, distortions, viewmats_.leading(2), intrinsics_.size() / 9);
     }
 
     Footprints footprints() const {
@@ -206,12 +209,15 @@ class Projection {
                 part_of(covars_, i, scenes_), part_of(opacities_, i, scenes_)};
     }
     ViewArrays views(size_t i) const {
-        return {part_of(viewmats_, i, scenes_), part_of(intrinsics_, i, scenes_)};
+        const size_t each = lenses_.size() / scenes_;
+        return {part_of(viewmats_, i, scenes_), part_of(intrinsics_, i, scenes_),
+                std::span(lenses_).subspan(i * each, each)};
     }
 
     Array<float> means_;
     std::optional<Array<float>> quats_, scales_, covars_, opacities_;
     Array<float> viewmats_, intrinsics_;
+    std::vector<Distortion> lenses_;  // empty: pinholes
     ProjectionOptions options_;
     size_t scenes_ = 1;
 };
@@ -444,11 +450,11 @@ void bind_operators(nb::module_& module) {
         .def_prop_ro("features", field<&Footprints::features>, "[..., D]");
     nb::class_<Projection>(own, "Projection", "Splats [..., N] in the views of cameras [..., C].")
         .def(nb::init<nb::handle, nb::handle, nb::handle, nb::handle, nb::handle, nb::handle, nb::handle, int,
-                      int, float, float, float, float, bool>(),
+                      int, float, float, float, float, bool, const std::string&, nb::handle>(),
              nb::arg("means"), nb::arg("quats").none(), nb::arg("scales").none(), nb::arg("covars").none(),
              nb::arg("opacities").none(), nb::arg("viewmats"), nb::arg("Ks"), nb::arg("width"),
              nb::arg("height"), nb::arg("eps2d"), nb::arg("near"), nb::arg("far"), nb::arg("radius_clip"),
-             nb::arg("compensations"))
+             nb::arg("compensations"), nb::arg("camera_model"), nb::arg("distortions").none())
         .def("footprints", &Projection::footprints, "Footprints [..., C, N], with radii.")
         .def("gradients", &Projection::gradients, nb::arg("by"), nb::arg("need_viewmats"),
              "Gradients by means, quats, scales, covars and viewmats; None for what there is not. by: the "

@@ -177,8 +177,8 @@ def test_culling_by_planes_radius_and_opacity(camera_model):
     assert not depths[~seen].any()
 
 
-@pytest.mark.parametrize("camera_model", ["ortho", "fisheye"])
-def test_compensations_tighten_radii_on_the_host(camera_model):
+@pytest.mark.parametrize("camera_model", ["pinhole", "ortho", "fisheye"])
+def test_compensations_tighten_radii(camera_model):
     s = Scene()
     # Without compensation these are just visible; a compensated splat is fainter.
     call = dict(eps2d=1e6, opacities=torch.full_like(s.opacities, 0.005), camera_model=camera_model)

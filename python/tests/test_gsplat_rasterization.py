@@ -319,7 +319,7 @@ def test_covariances_replace_quaternions_and_scales(packed):
 
 
 @pytest.mark.parametrize("camera_model", ["ortho", "fisheye"])
-def test_cameras_of_the_host(camera_model):
+def test_other_cameras(camera_model):
     s = Scene(cameras=2)
     if camera_model == "ortho":
         s.Ks[:, :2, :2] /= 4
@@ -336,6 +336,91 @@ def test_cameras_of_the_host(camera_model):
     assert_close(image, expected[0])
     for a, e in zip(gradients((image, alpha), s.tensors()), gradients(expected, s.tensors())):
         assert_close(a, e, tolerance=5e-3)
+
+
+def _opencv(point, K, radial, tangential, prism):
+    """The pixel of a point in camera coordinates (OpenCV, calib3d, "Detailed Description")."""
+    x, y = point[0] / point[2], point[1] / point[2]
+    w = x * x + y * y
+    bent = (1 + w * (radial[0] + w * (radial[1] + w * radial[2]))) / (
+        1 + w * (radial[3] + w * (radial[4] + w * radial[5]))
+    )
+    p1, p2 = tangential
+    u = x * bent + 2 * p1 * x * y + p2 * (w + 2 * x * x) + w * (prism[0] + w * prism[1])
+    v = y * bent + p1 * (w + 2 * y * y) + 2 * p2 * x * y + w * (prism[2] + w * prism[3])
+    return torch.stack((K[0, 0] * u + K[0, 2], K[1, 1] * v + K[1, 2]))
+
+
+def _bent_fisheye(point, K, radial):
+    r = torch.hypot(point[0], point[1])
+    angle = torch.atan2(r, point[2])
+    w = angle * angle
+    bent = angle * (1 + w * (radial[0] + w * (radial[1] + w * (radial[2] + w * radial[3])))) / r
+    return torch.stack((K[0, 0] * bent * point[0] + K[0, 2], K[1, 1] * bent * point[1] + K[1, 2]))
+
+
+_LENSES = {
+    "pinhole": (
+        _opencv,
+        dict(
+            radial_coeffs=[-0.12, 0.05, -0.01, 0.02, -0.004, 0.003],
+            tangential_coeffs=[0.012, -0.017],
+            thin_prism_coeffs=[0.011, -0.004, 0.007, 0.003],
+        ),
+    ),
+    "fisheye": (_bent_fisheye, dict(radial_coeffs=[0.05, -0.02, 0.006, -0.001])),
+}
+
+
+@pytest.mark.parametrize("camera_model", _LENSES)
+def test_coefficients_bend_the_image(camera_model):
+    s = Scene(cameras=2, splats=30)
+    pixel, coefficients = _LENSES[camera_model]
+    given = {k: torch.tensor([v, [0.5 * x for x in v]]) for k, v in coefficients.items()}
+    call = dict(camera_model=camera_model, packed=False, **given)
+    _, _, meta = ours.rasterization(**s.arguments(**call))
+    seen = (meta["radii"] > 0).all(-1).nonzero()
+    assert len(seen) > 20
+    covars = reference._quat_scale_to_covar_preci(s.quats, s.scales)[0]
+    means2d, conics = [], []
+    for c, i in seen.tolist():
+        terms = [v[c] for v in given.values()]
+        R, t = s.viewmats[c, :3, :3], s.viewmats[c, :3, 3]
+
+        def to_pixel(point):
+            return pixel(point, s.Ks[c], *terms)
+
+        point = R @ s.means[i] + t
+        means2d.append(to_pixel(point))
+        J = torch.autograd.functional.jacobian(to_pixel, point, create_graph=True) @ R
+        inverse = torch.linalg.inv(J @ covars[i] @ J.T + 0.3 * torch.eye(2))
+        conics.append(torch.stack((inverse[0, 0], inverse[0, 1], inverse[1, 1])))
+    expected = torch.stack(means2d), torch.stack(conics)
+    found = tuple(meta[name][seen[:, 0], seen[:, 1]] for name in ("means2d", "conics"))
+    # J is taken within the image and a margin, and here everywhere.
+    inside = (expected[0] > 0).all(-1) & (expected[0] < torch.tensor([WIDTH, HEIGHT])).all(-1)
+    assert inside.sum() > 10
+    for a, e in zip(found, expected):
+        torch.testing.assert_close(a[inside], e[inside], rtol=2e-3, atol=2e-3)
+    for k, inputs in enumerate(((s.means, s.viewmats), (s.means, s.viewmats, s.quats, s.scales))):
+        by = [gradients((o[k][inside],), inputs) for o in (found, expected)]
+        for a, e in zip(*by):
+            assert_close(a, e, tolerance=5e-3)
+
+
+@pytest.mark.parametrize(
+    "call,said",
+    [
+        (dict(radial_coeffs=torch.zeros(1, 4)), r"radial_coeffs has shape \(1, 4\)"),
+        (dict(radial_coeffs=torch.zeros(1, 6), camera_model="fisheye"), "radial_coeffs has shape"),
+        (dict(tangential_coeffs=torch.zeros(1, 2), camera_model="fisheye"), "are no terms of"),
+        (dict(radial_coeffs=torch.zeros(1, 4), camera_model="ortho"), "are no terms of"),
+        (dict(thin_prism_coeffs=torch.full((1, 4), float("nan"))), "distortions are not finite"),
+    ],
+)
+def test_wrong_coefficients(call, said):
+    with pytest.raises(ValueError, match=said):
+        ours.rasterization(**Scene().arguments(**call))
 
 
 def test_sparse_gradients():

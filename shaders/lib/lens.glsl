@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where a lens shows a point, and J = d(pixel)/d(point), of cameras with SPEC_LENSES. Points are in camera coordinates, and planes
-// in units of the focal length. src/reference/lens.h has the formulas. Needs camera.glsl and projection.glsl.
+// in units of the focal length. src/reference/lens.h has the formulas. Needs projection.glsl, and a block `camera`.
 #ifndef EWA_LIB_LENS
 #define EWA_LIB_LENS
 
@@ -181,5 +181,27 @@ LensImage lens_image(View v) {
     image.exact_x = image.jx;
     image.exact_y = image.jy;
     return image;
+}
+
+// As project_shape, with the lens's J.
+Projection project_through_lens(View view, mat3 directions, mat3 cofactors, vec3 scale, float low_pass_px) {
+    Projection p;
+    p.view = view;
+    p.low_pass = low_pass_px;
+    p.scale = scale;
+    p.image = lens_image(view);
+    [[unroll]] for (int k = 0; k < 3; ++k) p.axes[k] = directions[k] * scale[k];
+    const vec3 x = camera.focal_hi[0] * p.image.jx, y = camera.focal_hi[1] * p.image.jy;
+    p.m0 = x * p.axes;
+    p.m1 = y * p.axes;
+    set_unit(p);
+    const vec3 both = cross(x, y);
+    const vec3 sizes = p.unit * scale;
+    set_covariance(p, (both * cofactors) * sizes.yzx * sizes.zxy);
+    if (KERNEL == KERNEL_DENSITY) {
+        const float root = sqrt(length(both));
+        p.factor = mean_shadow(scale, vec2(p.unit * root)) / sqrt(p.det);
+    }
+    return p;
 }
 #endif

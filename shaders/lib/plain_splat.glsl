@@ -10,6 +10,9 @@ layout(constant_id = SPEC_MODE) const uint MODE = 0;
 const bool COVARIANCES = (MODE & VIEWS_COVARIANCES) != 0u, COMPENSATIONS = KERNEL == KERNEL_ANTIALIAS;
 
 layout(set = 0, binding = 0, scalar) readonly buffer Views { ViewBlock views[]; };
+uint view_index = 0u;  // whose lens lens.glsl reads
+#define camera views[view_index]
+#include "lib/lens.glsl"
 layout(set = 0, binding = 1, scalar) readonly buffer Means { vec3 means[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer Shapes { float shapes[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Scales { vec3 scales[]; };
@@ -102,10 +105,13 @@ View view_of_mean(ViewBlock view, vec3 mean) {
     return View(vec3(0.0), p[0], p[1], p[2]);
 }
 
+// view: views[view_index].
 Projection project_in_view(PlainSplat splat, ViewBlock view, float low_pass) {
-    const Lens lens = Lens(rotation_of_view(view), vec2(view.focal[0], view.focal[1]),
+    const Lens lens = Lens(rotation_of_view(view), vec2(view.focal_hi[0], view.focal_hi[1]),
                            vec2(view.tan_min[0], view.tan_min[1]), vec2(view.tan_max[0], view.tan_max[1]));
-    return project_shape(view_of_mean(view, splat.mean), lens, lens.rotation * splat.directions,
-                         cofactors_of(lens.rotation) * splat.cofactors, splat.scale, low_pass);
+    const View at = view_of_mean(view, splat.mean);
+    const mat3 directions = lens.rotation * splat.directions, cofactors = cofactors_of(lens.rotation) * splat.cofactors;
+    if (LENSES != 0u) return project_through_lens(at, directions, cofactors, splat.scale, low_pass);
+    return project_shape(at, lens, directions, cofactors, splat.scale, low_pass);
 }
 #endif

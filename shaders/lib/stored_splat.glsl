@@ -41,28 +41,6 @@ vec3 scale_ratios(vec3 log_scale) {
     return twice_sinh(l.yzx - l.zxy);
 }
 
-Projection project_through_lens(View view, mat3 directions, vec3 scale) {
-    Projection p;
-    p.view = view;
-    p.low_pass = float(LOW_PASS);
-    p.scale = scale;
-    p.image = lens_image(view);
-    [[unroll]] for (int k = 0; k < 3; ++k) p.axes[k] = directions[k] * scale[k];
-    const vec3 x = camera.focal_hi[0] * p.image.jx, y = camera.focal_hi[1] * p.image.jy;
-    p.m0 = x * p.axes;
-    p.m1 = y * p.axes;
-    set_unit(p);
-    const vec3 both = cross(x, y);
-    const vec3 sizes = p.unit * scale;
-    set_covariance(p, (both * directions) * sizes.yzx * sizes.zxy);
-    if (KERNEL == KERNEL_DENSITY) {
-        const float root = sqrt(length(both));
-        p.factor = mean_shadow(scale, vec2(p.unit * root)) / sqrt(p.det);
-    }
-    return p;
-}
-
-// By which splats are ordered, in world units; they are in front of the camera where it is above NEAR_PLANE.
 // The largest logarithm of a scale that a step leaves. Within the angles of a fisheye or 360 degrees, every splat has an image. A
 // pinhole at the same place has none of a splat that reaches behind it.
 float widest_log_scale(Projection p) {
@@ -70,6 +48,7 @@ float widest_log_scale(Projection p) {
     return wide ? log(float(WIDEST_SHARE) * p.image.depth) : 3.4e38;
 }
 
+// By which splats are ordered, in world units; they are in front of the camera where it is above NEAR_PLANE.
 float depth_of_splat(Projection p) { return LENSES != 0u ? p.image.depth : p.view.z.x; }
 
 // The direction in which the camera sees the splat.
@@ -93,7 +72,7 @@ StoredProjection project_splat(StoredSplat splat) {
     const mat3 directions = lens.rotation * rotation_of(p.unit_quaternion);
     const vec3 scale = exp(computable_log_scale(splat.log_scale));
     if (LENSES != 0u)
-        p.footprint = project_through_lens(view, directions, scale);
+        p.footprint = project_through_lens(view, directions, directions, scale, float(LOW_PASS));
     else
         p.footprint = project_shape(view, lens, directions, directions, scale, float(LOW_PASS));
     const vec3 far = abs(view.offset);

@@ -23,7 +23,7 @@ vec2 radii_of(Projection p, vec2 mean, float opacity) {
     const vec3 position = abs(vec3(p.view.x.x, p.view.y.x, p.view.z.x));
     // A NaN fails these comparisons.
     const bool in_range = position.x <= float(VIEW_MAX) && position.y <= float(VIEW_MAX) && position.z <= float(VIEW_MAX) &&
-                          p.view.z.x > push.near && p.view.z.x < push.far && p.footprint_in_range && p.det > 0.0 &&
+                          p.view.z.x > push.near && (LENSES == 0u || p.image.shown) && p.view.z.x < push.far && p.footprint_in_range && p.det > 0.0 &&
                           is_finite(vec3(mean, p.ux)) && is_finite(p.vy) && p.ux > 0.0 && p.vy > 0.0;
     float sigmas = float(RADIUS_SIGMAS);
     bool shown = true;
@@ -45,9 +45,11 @@ void main() {
     const ViewBlock view = views[gl_WorkGroupID.z];
     vec4 unit_quaternion;
     float norm;
+    view_index = gl_WorkGroupID.z;
     const Projection p = project_in_view(read_splat(i, unit_quaternion, norm), view, push.low_pass);
-    const vec2 mean = vec2(pixel_of(p.view.x, p.view.z, vec2(view.focal[0], 0.0), vec2(view.center[0], 0.0)).x,
-                           pixel_of(p.view.y, p.view.z, vec2(view.focal[1], 0.0), vec2(view.center[1], 0.0)).x);
+    const vec2 fx = vec2(view.focal_hi[0], 0.0), fy = vec2(view.focal_hi[1], 0.0), cx = vec2(view.center[0], 0.0), cy = vec2(view.center[1], 0.0);
+    const vec2 mean = LENSES != 0u ? vec2(df_add(df_mul(p.image.x, fx), cx).x, df_add(df_mul(p.image.y, fy), cy).x)
+                                   : vec2(pixel_of(p.view.x, p.view.z, fx, cx).x, pixel_of(p.view.y, p.view.z, fy, cy).x);
     const vec2 radius = radii_of(p, mean, OPACITIES ? opacities[i] : 1.0);
     const bool visible = radius.x > 0.0 && radius.y > 0.0;
     radii[at] = visible ? ivec2(radius) : ivec2(0);

@@ -8,6 +8,7 @@
 #include "lib/prelude.glsl"
 #include "lib/plain_splat.glsl"
 #include "lib/footprint_gradient.glsl"
+#include "lib/lens_gradient.glsl"
 #include "lib/subgroup.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
@@ -77,16 +78,21 @@ void add_covariance_gradient(inout float total[6], Sums s, Projection p, vec3 t0
 void add_view(uint v, uint i, PlainSplat splat, inout Total total, out vec3 by_view, out mat3 by_rotation) {
     const uint at = v * push.splats + i;
     const ViewBlock view = views[v];
+    view_index = v;
     const Projection p = project_in_view(splat, view, push.low_pass);
     const Sums s = sums_of(conics_gradient[at], COMPENSATIONS ? compensations_gradient[at] : 0.0, p);
     FootprintGradient f = footprint_gradient(s, p);
     f.mean = means2d_gradient[at];
-    by_view = view_point_gradient(f, p);
+    by_view = LENSES != 0u ? lens_point_gradient(f, p, 0.0) : view_point_gradient(f, p);
     by_view.z += depths_gradient[at];
 
     const mat3 rotation = rotation_of_view(view);
     total.mean += by_view * rotation;
-    const vec3 j0 = p.focal_over_z.x * vec3(1.0, 0.0, -p.tangent.x), j1 = p.focal_over_z.y * vec3(0.0, 1.0, -p.tangent.y);
+    vec3 j0 = p.focal_over_z.x * vec3(1.0, 0.0, -p.tangent.x), j1 = p.focal_over_z.y * vec3(0.0, 1.0, -p.tangent.y);
+    if (LENSES != 0u) {
+        j0 = view.focal_hi[0] * p.image.jx;
+        j1 = view.focal_hi[1] * p.image.jy;
+    }
     if (COVARIANCES) {
         add_covariance_gradient(total.covariance, s, p, j0 * rotation, j1 * rotation);
     } else {

@@ -264,10 +264,14 @@ struct CameraBlock {
 struct ViewBlock {
     float rotation[9];  // world to camera, rows
     float translation[3];
-    float focal[2];    // px
-    float center[2];   // principal point, px
-    float tan_min[2];  // bounds of x/z, y/z in the Jacobian
+    float focal_hi[2];  // px
+    float center[2];    // principal point, px
+    float tan_min[2];   // bounds of x/z, y/z in the Jacobian
     float tan_max[2];
+    float lens_hi[12];  // as in CameraBlock, where SPEC_LENSES is set
+    float lens_lo[12];
+    float lens_limit;
+    uint lens;
 };
 
 // dL/d(view matrix): rotation, rows; translation

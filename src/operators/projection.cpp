@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The operators of projection: arguments are checked and uploaded, a pass runs, results are downloaded.
+#include <algorithm>
 #include <cmath>
 
 #include "operators/context.h"
 #include "passes/passes.h"
+#include "pipeline/frame_inputs.h"
+#include "scene/native_lens.h"
 
 namespace ewa {
 namespace {
@@ -12,6 +15,7 @@ using operators::check_size;
 using operators::ProjectionBuffers;
 
 constexpr size_t kViewsMax = 65535 / shared::VIEW_GRADIENT_FLOATS;  // layers of a dispatch
+constexpr int kWide = 1 << 24;                                       // px: beyond all angles
 constexpr uint32_t kReduceBlock = 4096;                             // items a subgroup adds
 
 void check_arguments(const SplatArrays& splats, const ViewArrays& views, const ProjectionOptions& options) {
@@ -38,6 +42,14 @@ void check_arguments(const SplatArrays& splats, const ViewArrays& views, const P
             if (!(views.intrinsics[9 * v + entry] > 0) || !std::isfinite(views.intrinsics[9 * v + entry]))
                 throw InputError("intrinsics: a focal length of view " + std::to_string(v) +
                                  " is not a number above 0");
+    if (!views.lenses.empty()) check_size("lenses", views.lenses.size(), c, "[C]");
+    for (const Distortion& lens : views.lenses)
+        if (!scene::is_native(lens) || lens.lens == Lens::equirectangular)
+            throw InputError("lenses: one is neither brown, nor a fisheye of k1 to k4, nor orthographic");
+}
+
+bool through_lenses(const ViewArrays& views) {
+    return std::ranges::any_of(views.lenses, [](const Distortion& lens) { return !lens.none(); });
 }
 
 shared::ViewBlock view_block(const ViewArrays& views, size_t v, const ProjectionOptions& options) {
@@ -52,11 +64,22 @@ shared::ViewBlock view_block(const ViewArrays& views, size_t v, const Projection
     for (int k = 0; k < 2; ++k) {
         const double focal = intrinsics[4 * k], center = intrinsics[3 * k + 2];
         const double margin = shared::JACOBIAN_MARGIN * size[k] / (2 * focal);
-        block.focal[k] = float(focal);
+        block.focal_hi[k] = float(focal);
         block.center[k] = float(center);
         block.tan_min[k] = float(-(center / focal + margin));
         block.tan_max[k] = float((size[k] - center) / focal + margin);
     }
+    // A fisheye of the operators shows all up to where it folds, as gsplat's does, and not only what is near the image.
+    const bool fisheye = through_lenses(views) && views.lenses[v].lens == Lens::fisheye;
+    if (through_lenses(views))
+        pipeline::set_lens({.width = fisheye ? kWide : int(options.width),
+                            .height = fisheye ? kWide : int(options.height),
+                            .fx = intrinsics[0],
+                            .fy = intrinsics[4],
+                            .cx = intrinsics[2],
+                            .cy = intrinsics[5],
+                            .distortion = views.lenses[v]},
+                           block);
     return block;
 }
 
@@ -71,13 +94,14 @@ shared::ViewsPush push_of(const SplatArrays& splats, const ViewArrays& views,
             .radius_clip = options.radius_clip};
 }
 
-/// SPEC_KERNEL and SPEC_MODE. bits: VIEWS_* beyond VIEWS_COVARIANCES.
-passes::Constants variant_of(const SplatArrays& splats, const ProjectionOptions& options, bool compensations,
-                             uint32_t bits) {
+/// SPEC_KERNEL, SPEC_MODE and SPEC_LENSES. bits: VIEWS_* beyond VIEWS_COVARIANCES.
+passes::Constants variant_of(const SplatArrays& splats, const ViewArrays& views,
+                             const ProjectionOptions& options, bool compensations, uint32_t bits) {
     if (options.whiteners) bits |= shared::SHAPE_WHITENERS;
     if (!splats.covariances.empty()) bits |= shared::VIEWS_COVARIANCES;
     return {{shared::SPEC_KERNEL, compensations ? shared::KERNEL_ANTIALIAS : shared::KERNEL_PEAK},
-            {shared::SPEC_MODE, bits}};
+            {shared::SPEC_MODE, bits},
+            {shared::SPEC_LENSES, through_lenses(views) ? 1u : 0u}};
 }
 
 void upload_splats(gpu::Device& device, ProjectionBuffers& b, const SplatArrays& splats,
@@ -165,7 +189,7 @@ ProjectedSplats Operators::project(const SplatArrays& splats, const ViewArrays& 
                              .depths = b.depths.buffer(),
                              .conics = b.conics.buffer(),
                              .compensations = b.compensations.buffer()},
-        push_of(splats, views, options), variant_of(splats, options, options.compensations, bits));
+        push_of(splats, views, options), variant_of(splats, views, options, options.compensations, bits));
     context_->executor.run(recording);
     b.give_back();
     ProjectedSplats out;
@@ -229,7 +253,7 @@ SplatGradient Operators::project_backward(const SplatArrays& splats, const ViewA
                                            .shapes_gradient = b.shapes_gradient.buffer(),
                                            .scales_gradient = b.scales_gradient.buffer(),
                                            .view_sums = b.view_sums.buffer()},
-              push, variant_of(splats, options, compensations, view_gradients ? shared::VIEWS_GRADIENTS : 0));
+              push, variant_of(splats, views, options, compensations, view_gradients ? shared::VIEWS_GRADIENTS : 0));
     operators::Array* sums = view_gradients ? &reduce_rows(on, *context_, subgroups, rows) : nullptr;
     context_->executor.run(recording);
     b.give_back();

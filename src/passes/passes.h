@@ -107,7 +107,8 @@ struct UpdatePoints : UpdateBuffers {
 // The operators of projection and of spherical harmonics. Their arrays are the caller's: include/ewa/operators.h.
 
 /// Projects splats in several views. shapes: quaternions, or covariances with VIEWS_COVARIANCES. Variant: SPEC_KERNEL
-/// (KERNEL_ANTIALIAS writes compensations), SPEC_MODE (VIEWS_COVARIANCES, VIEWS_OPACITIES, SHAPE_WHITENERS).
+/// (KERNEL_ANTIALIAS writes compensations), SPEC_MODE (VIEWS_COVARIANCES, VIEWS_OPACITIES, SHAPE_WHITENERS),
+/// SPEC_LENSES.
 struct ProjectViews {
     static constexpr char shader[] = "project_views";
     using Work = PerViewElement<shared::ViewsPush>;
@@ -115,7 +116,7 @@ struct ProjectViews {
 };
 
 /// Gradient of ProjectViews, added over the views. view_sums: VIEW_GRADIENT_FLOATS rows a view, of one float a subgroup.
-/// Variant: SPEC_KERNEL, SPEC_MODE (VIEWS_COVARIANCES, VIEWS_GRADIENTS, SHAPE_WHITENERS).
+/// Variant: SPEC_KERNEL, SPEC_MODE (VIEWS_COVARIANCES, VIEWS_GRADIENTS, SHAPE_WHITENERS), SPEC_LENSES.
 struct ProjectViewsBackward {
     static constexpr char shader[] = "project_views_backward";
     using Work = PerElement<&shared::ViewsPush::splats>;

@@ -46,14 +46,6 @@ uint32_t lens_of(const Distortion& lens) {
     }
 }
 
-void set_lens(const Camera& camera, shared::CameraBlock& block) {
-    const Distortion& d = camera.distortion;
-    const double terms[] = {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4};
-    for (size_t i = 0; i < std::size(terms); ++i) split(terms[i], block.lens_hi[i], block.lens_lo[i]);
-    block.lens_limit = float(std::min(scene::lens_limit(camera), double(std::numeric_limits<float>::max())));
-    block.lens = lens_of(d);
-}
-
 template <class Value, class Convert>
 gpu::Buffer upload_texels(gpu::Device& device, const Image& image, gpu::Texel texel, Value opaque,
                           Convert convert) {
@@ -66,7 +58,25 @@ gpu::Buffer upload_texels(gpu::Device& device, const Image& image, gpu::Texel te
     return buffer;
 }
 
+template <class Block>
+void set_lens_of(const Camera& camera, Block& block) {
+    const Distortion& d = camera.distortion;
+    const double terms[] = {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4};
+    for (size_t i = 0; i < std::size(terms); ++i) split(terms[i], block.lens_hi[i], block.lens_lo[i]);
+    block.lens_limit = float(std::min(scene::lens_limit(camera), double(std::numeric_limits<float>::max())));
+    block.lens = lens_of(d);
+    const scene::TangentBounds bounds = scene::tangent_bounds(camera);
+    for (int i = 0; i < 2; ++i) {
+        block.tan_min[i] = float(bounds.low[i]);
+        block.tan_max[i] = float(bounds.high[i]);
+    }
+}
+
 }  // namespace
+
+void set_lens(const Camera& camera, shared::ViewBlock& block) {
+    set_lens_of(camera, block);
+}
 
 shared::CameraBlock camera_block(const Camera& camera, const passes::KernelConfig& config,
                                  const glm::dvec3& origin) {
@@ -81,16 +91,13 @@ shared::CameraBlock camera_block(const Camera& camera, const passes::KernelConfi
     const double focal[2] = {camera.fx, camera.fy}, center[2] = {camera.cx, camera.cy};
     const int size[2] = {camera.width, camera.height};
     const uint32_t tile[2] = {config.tile_width, config.tile_height};
-    const scene::TangentBounds bounds = scene::tangent_bounds(camera);
     for (int i = 0; i < 2; ++i) {
         split(focal[i], block.focal_hi[i], block.focal_lo[i]);
         split(center[i], block.center_hi[i], block.center_lo[i]);
-        block.tan_min[i] = float(bounds.low[i]);
-        block.tan_max[i] = float(bounds.high[i]);
         block.size[i] = uint32_t(size[i]);
         block.tiles[i] = (uint32_t(size[i]) + tile[i] - 1) / tile[i];
     }
-    set_lens(camera, block);
+    set_lens_of(camera, block);
     return block;
 }
 

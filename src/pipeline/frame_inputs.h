@@ -52,6 +52,9 @@ Band band_of(const passes::KernelConfig& config, uint32_t height, uint32_t bands
 shared::CameraBlock camera_block(const Camera& camera, const passes::KernelConfig& config,
                                  const glm::dvec3& origin = glm::dvec3(0));
 
+/// The lens of a view of the operators, and its bounds of tangents. The lens must be native.
+void set_lens(const Camera& camera, shared::ViewBlock& block);
+
 /// A buffer of one such block.
 gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passes::KernelConfig& config,
                           const glm::dvec3& origin = glm::dvec3(0));

@@ -7,6 +7,7 @@
 #include <glm/mat2x2.hpp>
 #include <glm/matrix.hpp>
 
+#include "reference/lens.h"
 #include "reference/projection.h"
 #include "shared/constants.h"
 
@@ -18,6 +19,7 @@ namespace {
 
 struct PlainSteps {
     glm::dvec3 p{0};
+    std::optional<LensImage> image;  // of a lens; else slope and slope_free are set
     glm::dvec2 slope{0};
     glm::bvec2 slope_free{true};
     std::array<double, 4> unit_quaternion{};
@@ -36,10 +38,23 @@ PlainSteps plain_steps(const PlainSplat& splat, const PlainView& view, const Pla
     PlainSteps s;
     s.p = view.rotation * splat.mean + view.translation;
     const int size[2] = {int(options.width), int(options.height)};
-    for (int k = 0; k < 2; ++k)
-        s.slope[k] = clamp_slope(s.p[k] / s.p.z, view.focal[k], view.center[k], size[k], s.slope_free[k]);
-    s.j = {view.focal.x / s.p.z * glm::dvec3(1, 0, -s.slope.x),
-           view.focal.y / s.p.z * glm::dvec3(0, 1, -s.slope.y)};
+    if (view.lens.none()) {
+        for (int k = 0; k < 2; ++k)
+            s.slope[k] = clamp_slope(s.p[k] / s.p.z, view.focal[k], view.center[k], size[k], s.slope_free[k]);
+        s.j = {view.focal.x / s.p.z * glm::dvec3(1, 0, -s.slope.x),
+               view.focal.y / s.p.z * glm::dvec3(0, 1, -s.slope.y)};
+    } else {
+        const bool fisheye = view.lens.lens == Lens::fisheye;  // the image's size does not limit its angles
+        s.image = lens_image({.width = fisheye ? 1 << 24 : size[0],
+                              .height = fisheye ? 1 << 24 : size[1],
+                              .fx = view.focal.x,
+                              .fy = view.focal.y,
+                              .cx = view.center.x,
+                              .cy = view.center.y,
+                              .distortion = view.lens},
+                             s.p);
+        s.j = s.image->jacobian;
+    }
     s.t = {s.j.x * view.rotation, s.j.y * view.rotation};
     const glm::dvec3 n = glm::cross(s.t.x, s.t.y);
     if (splat.has_covariance) {
@@ -94,6 +109,13 @@ glm::dvec3 point_gradient(const PlainSteps& s, const PlainView& view, const Plai
     const double z = s.p.z;
     glm::dvec3 out(0, 0, g.depth);
     const glm::dvec3 by[2] = {by_j.x, by_j.y};
+    if (s.image) {
+        out += g.mean2d.x * s.image->exact.x + g.mean2d.y * s.image->exact.y;
+        for (size_t row = 0; row < 2; ++row)
+            for (size_t column = 0; column < 3; ++column)
+                out += by[row][int(column)] * s.image->hessian[row][column];
+        return out;
+    }
     for (int k = 0; k < 2; ++k) {
         const double f = view.focal[k];
         out[k] += g.mean2d[k] * f / z;
@@ -112,7 +134,7 @@ PlainProjected project(const PlainSplat& splat, const PlainView& view, const Pla
     const PlainSteps s = plain_steps(splat, view, options);
     PlainProjected out;
     out.depth = s.p.z;
-    out.mean2d = view.focal * glm::dvec2(s.p) / s.p.z + view.center;
+    out.mean2d = s.image ? s.image->pixel : view.focal * glm::dvec2(s.p) / s.p.z + view.center;
     const double a = s.a0 + options.low_pass, c = s.c0 + options.low_pass;
     out.conic = options.whiteners ? whitener_of(s, c) : glm::dvec3(c, -s.b, a) / s.det;
     out.compensation = std::sqrt(std::max(0.0, s.det0 / s.det));
@@ -121,7 +143,7 @@ PlainProjected project(const PlainSplat& splat, const PlainView& view, const Pla
     const double sigmas = std::min(RADIUS_SIGMAS, std::sqrt(2 * std::log(std::max(ratio, 1.0))));
     out.reach = sigmas * glm::sqrt(glm::dvec2(a, c));
     const glm::dvec2 radius = glm::ceil(out.reach);
-    out.visible = s.p.z > options.near && s.p.z < options.far && s.det > 0 && ratio >= 1 &&
+    out.visible = (!s.image || s.image->shown) && s.p.z > options.near && s.p.z < options.far && s.det > 0 && ratio >= 1 &&
                   (radius.x > options.radius_clip || radius.y > options.radius_clip) &&
                   out.mean2d.x + radius.x > 0 && out.mean2d.x - radius.x < options.width &&
                   out.mean2d.y + radius.y > 0 && out.mean2d.y - radius.y < options.height;

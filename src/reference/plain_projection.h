@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The projection of the operators: of splats with linear scales or covariances, in views whose matrix need not be a rotation.
 //
-// With p = R mean + t, J as in reference/projection.h and T = J R, the 2D covariance is Sigma2 = T Sigma T^T + low_pass I, with
+// With p = R mean + t, J as in reference/projection.h or reference/lens.h and T = J R, the 2D covariance is Sigma2 = T Sigma T^T + low_pass I, with
 // Sigma = (Q S)(Q S)^T of quaternion and scales.
 //   conic        = Sigma2^-1 = [a b; b c]^-1
 //   whitener     = (ux, k, vy) = (sqrt(c / (2 det(Sigma2))), b / c, sqrt(1 / (2 c)))
@@ -18,6 +18,8 @@
 #include <glm/vec3.hpp>
 #include <optional>
 
+#include "ewa/camera.h"
+
 namespace ewa::reference {
 
 struct PlainSplat {
@@ -33,6 +35,7 @@ struct PlainView {
     glm::dmat3 rotation{1};  // any matrix
     glm::dvec3 translation{0};
     glm::dvec2 focal{1}, center{0};  // px
+    Distortion lens{};               // reference/lens.h has its J; none: a pinhole
 };
 
 /// As ewa::ProjectionOptions.

@@ -192,12 +192,14 @@ void compile_operators(Compiler& compiler) {
         {{SPEC_KERNEL, kernels},
          {SPEC_MODE,
           {0, VIEWS_COVARIANCES, VIEWS_OPACITIES, VIEWS_COVARIANCES | VIEWS_OPACITIES, SHAPE_WHITENERS,
-           VIEWS_OPACITIES | SHAPE_WHITENERS}}});
+           VIEWS_OPACITIES | SHAPE_WHITENERS}},
+         {SPEC_LENSES, {0, 1}}});
     compiler.compile<passes::ProjectViewsBackward>(
         {{SPEC_KERNEL, kernels},
          {SPEC_MODE,
           {0, VIEWS_COVARIANCES, VIEWS_GRADIENTS, VIEWS_COVARIANCES | VIEWS_GRADIENTS, SHAPE_WHITENERS,
-           VIEWS_GRADIENTS | SHAPE_WHITENERS}}});
+           VIEWS_GRADIENTS | SHAPE_WHITENERS}},
+         {SPEC_LENSES, {0, 1}}});
     const Values degrees = {0, 1, 2, 3, 4};
     compiler.compile<passes::Harmonics>(
         {{SPEC_SH_DEGREE, degrees}, {SPEC_MODE, {0, HARMONICS_MASKED, HARMONICS_RGB}}});

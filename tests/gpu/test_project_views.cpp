@@ -13,6 +13,7 @@
 #include "gpu/guarded.h"
 #include "passes/passes.h"
 #include "support/gradient_check.h"
+#include "support/temp_folder.h"
 #include "support/plain_splats.h"
 
 namespace ewa::test {
@@ -33,6 +34,7 @@ struct ViewsCase {
     double shape, gradient;  // largest relative errors
     bool whiteners = false;
     float near = 0.01f, far = 1e10f, radius_clip = 0;
+    Distortion lens{};  // of all views but the second, which is a pinhole
 };
 
 class ViewsPass : public testing::TestWithParam<ViewsCase> {
@@ -47,6 +49,13 @@ class ViewsPass : public testing::TestWithParam<ViewsCase> {
         scene.options.radius_clip = c.radius_clip;
         if (c.covariances) scene.use_covariances();
         if (!c.opacities) scene.opacities.clear();
+        if (!c.lens.none()) {
+            scene.lenses.assign(c.views, c.lens);
+            if (c.views > 1) scene.lenses[1] = {};
+        }
+        if (c.lens.lens == Lens::orthographic)  // px per world unit
+            for (size_t v = 0; v < c.views; ++v)
+                for (const size_t k : {0, 4}) scene.intrinsics[9 * v + k] /= 5;
     }
     ViewsCase c;
     PlainScene scene;
@@ -232,6 +241,9 @@ std::string views_case_name(const testing::TestParamInfo<ViewsCase>& tested) {
     return tested.param.name;
 }
 
+constexpr Distortion kBrown{.k1 = -0.28, .k2 = 0.09, .p1 = 0.004, .p2 = -0.003, .k3 = -0.01, .s1 = 0.002};
+constexpr Distortion kFisheye{.k1 = 0.03, .k2 = -0.02, .k3 = 0.004, .lens = Lens::fisheye};
+
 INSTANTIATE_TEST_SUITE_P(
     All, ViewsPass,
     testing::Values(
@@ -247,6 +259,14 @@ INSTANTIATE_TEST_SUITE_P(
         ViewsCase{"whiteners", SplatKind::mixed, 300, 2, false, true, true, 0, 0.3f, 3e-5, 5e-4, true},
         ViewsCase{"planes_and_clip", SplatKind::ordinary, 1000, 2, false, false, false, 0, 0.3f, 3e-5, 5e-4,
                   false, 3, 6, 12},
+        ViewsCase{"brown", SplatKind::mixed, 500, 2, false, true, true, 0, 0.3f, 3e-5, 5e-4, true, 0.01f,
+                  1e10f, 0, kBrown},
+        ViewsCase{"brown_covariances", SplatKind::mixed, 300, 1, true, false, true, 0.2, 0.3f, 3e-5, 5e-4,
+                  false, 0.01f, 1e10f, 0, kBrown},
+        ViewsCase{"fisheye", SplatKind::ordinary, 500, 2, false, false, true, 0.2, 0.3f, 3e-5, 5e-4, false,
+                  0.01f, 1e10f, 0, kFisheye},
+        ViewsCase{"orthographic", SplatKind::ordinary, 500, 2, true, true, false, 0, 0.3f, 3e-5, 5e-4, false,
+                  0.01f, 1e10f, 0, Distortion{.lens = Lens::orthographic}},
         ViewsCase{"two_reductions", SplatKind::ordinary, 40000, 1, false, false, false, 0, 0.3f, 3e-5, 1e-3},
         ViewsCase{"one_splat", SplatKind::ordinary, 1, 1, false, false, false, 0, 0.3f, 1e-5, 1e-4}),
     views_case_name);
@@ -302,6 +322,23 @@ void expect_reference(const PlainScene& scene, double shape, double gradient) {
     } else {
         EXPECT_LT(worst_of_rows(actual.covariances, expected.shapes, 6), gradient);
     }
+}
+
+/// Without coefficients, brown is a pinhole; at the axis, so is a fisheye.
+TEST(ViewsEdges, LensesThatBendNothing) {
+    PlainScene scene = plain_scene(5, 200, SplatKind::ordinary, 1, 160, 120);
+    const ProjectedSplats pinhole = project_scene(scene);
+    scene.lenses = {Distortion{}};
+    EXPECT_EQ(project_scene(scene).means2d, pinhole.means2d);
+    scene.lenses = {Distortion{.k6 = 1e-30}};
+    const ProjectedSplats brown = project_scene(scene);
+    EXPECT_EQ(brown.radii, pinhole.radii);
+    for (size_t k = 0; k < brown.means2d.size(); ++k)
+        EXPECT_NEAR(brown.means2d[k], pinhole.means2d[k], 1e-6 * (1 + std::abs(pinhole.means2d[k])));
+    scene.lenses = {Distortion{.lens = Lens::equirectangular}};
+    expect_error<InputError>([&] { project_scene(scene); }, {"lenses", "brown", "orthographic"});
+    scene.lenses.resize(2);
+    expect_error<InputError>([&] { project_scene(scene); }, {"lenses", "[C]"});
 }
 
 TEST(ViewsEdges, NoSplatsAndNoViews) {
@@ -458,7 +495,7 @@ TEST(ViewsEdges, NothingIsWrittenBehindAnArray) {
     shared::ViewBlock block{};
     for (int k = 0; k < 9; ++k) block.rotation[k] = k % 4 == 0;
     block.translation[2] = 4;
-    for (int k = 0; k < 2; ++k) block.focal[k] = block.tan_max[k] = 50, block.tan_min[k] = -50;
+    for (int k = 0; k < 2; ++k) block.focal_hi[k] = block.tan_max[k] = 50, block.tan_min[k] = -50;
     const Guarded views("views", std::vector(c, block)), means("means", scene.means),
         quaternions("quaternions", scene.quaternions), scales("scales", scene.scales);
     const Guarded radii("radii", 8 * pairs), means2d("means2d", 8 * pairs), depths("depths", 4 * pairs),

@@ -16,12 +16,13 @@ namespace ewa::test {
 
 struct PlainScene {
     std::vector<float> means, quaternions, scales, covariances, opacities, view_matrices, intrinsics;
+    std::vector<Distortion> lenses;
     ProjectionOptions options;
 
     size_t size() const { return means.size() / 3; }
     size_t views() const { return view_matrices.size() / 16; }
     SplatArrays splats() const { return {means, quaternions, scales, covariances, opacities}; }
-    ViewArrays view_arrays() const { return {view_matrices, intrinsics}; }
+    ViewArrays view_arrays() const { return {view_matrices, intrinsics, lenses}; }
     reference::PlainSplat splat(size_t i) const {
         reference::PlainSplat s;
         for (int k = 0; k < 3; ++k) s.mean[k] = means[3 * i + size_t(k)];
@@ -49,6 +50,7 @@ struct PlainScene {
         const float* k = &intrinsics[9 * v];
         out.focal = {k[0], k[4]};
         out.center = {k[2], k[5]};
+        if (!lenses.empty()) out.lens = lenses[v];
         return out;
     }
     /// Replaces quaternions and scales.

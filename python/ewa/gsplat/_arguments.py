@@ -92,7 +92,8 @@ def bytes_of(mask):
 def unavailable(what):
     """The error for what gsplat has in CUDA alone."""
     return NotImplementedError(
-        f"{what} is CUDA-only; ewa renders 3D Gaussians through pinhole, ortho and fisheye cameras"
+        f"{what} is CUDA-only; ewa renders 3D Gaussians through pinhole, ortho and fisheye cameras,"
+        " with coefficients of their lenses too"
     )
 
 

@@ -57,12 +57,14 @@ class ProjectOptions(NamedTuple):
     far: float
     radius_clip: float
     compensations: bool
+    camera_model: str = "pinhole"
+    distortions: np.ndarray | None = None
 
 
-def project_options(width, height, eps2d, near, far, radius_clip, compensations):
+def project_options(width, height, eps2d, near, far, radius_clip, compensations, lens):
     check(eps2d >= 0, f"eps2d is {eps2d}; expected 0 or more")
     floats = map(float, (eps2d, near, far, radius_clip))
-    return ProjectOptions(width, height, *floats, bool(compensations))
+    return ProjectOptions(width, height, *floats, bool(compensations), *lens)
 
 
 _FOOTPRINT = ("radii", "means2d", "depths", "conics", "compensations")

@@ -8,7 +8,6 @@ from .._native import operators
 from ._arguments import ArgumentError, check, full_precision, shape, tensor
 
 _UPPER = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
-_FULL = [0, 1, 2, 1, 3, 4, 2, 4, 5]
 
 
 def normalized_quat_to_rotmat(quat: Tensor) -> Tensor:
@@ -25,11 +24,6 @@ def normalized_quat_to_rotmat(quat: Tensor) -> Tensor:
 def upper_triangle(matrices):
     """Symmetric [..., 3, 3] to [..., 6]: xx xy xz yy yz zz."""
     return matrices[..., _UPPER[0], _UPPER[1]]
-
-
-def full_matrix(upper):
-    """[..., 6] to symmetric [..., 3, 3]."""
-    return upper[..., _FULL].reshape(upper.shape[:-1] + (3, 3))
 
 
 def _spread(rotations, factors, triu):
@@ -92,11 +86,7 @@ def proj(
     shape("means", means, lead + (3,))
     shape("covars", covars, lead + (3, 3))
     shape("Ks", Ks, lead[:-1] + (3, 3))
-    return project_rows(means, covars, Ks[..., None, :, :], width, height, camera_model)
-
-
-def project_rows(means, covars, Ks, width, height, camera_model):
-    """Projects means [..., 3] and covariances in the camera's frame; Ks broadcasts."""
+    Ks = Ks[..., None, :, :]
     fx, fy, cx, cy = Ks[..., 0, 0], Ks[..., 1, 1], Ks[..., 0, 2], Ks[..., 1, 2]
     if camera_model == "pinhole":
         center, jacobian = _pinhole(means, fx, fy, cx, cy, width, height)
@@ -152,32 +142,6 @@ def _fisheye(means, fx, fy, cx, cy):
         (fx * (xx * along + yy * across), fx * xy * (along - across), -fx * x * inverse),
         (fy * xy * (along - across), fy * (yy * along + xx * across), -fy * y * inverse),
     )
-
-
-def footprint(covars2d, eps2d):
-    """Conics, determinants and compensations of projected covariances, widened by `eps2d`."""
-    a, b, d = covars2d[..., 0, 0], covars2d[..., 0, 1], covars2d[..., 1, 1]
-    sharp = a * d - b * b
-    a, d = a + eps2d, d + eps2d
-    det = a * d - b * b
-    conics = torch.stack((d / det, -b / det, a / det), -1)
-    return conics, det, torch.sqrt(torch.clamp(sharp / det, min=1e-20)), (a, d)
-
-
-@torch.no_grad()
-def radii_of(center, depths, sides, det, opacities, options):
-    """Radii [..., 2] in whole pixels; zero where the splat reaches no pixel of the image."""
-    reach = torch.full_like(depths, operators.RADIUS_SIGMAS)
-    drawn = (det > 0) & (depths > options.near) & (depths < options.far)
-    if opacities is not None:
-        # Below the threshold the reach is 0, and so is the radius.
-        ratio = torch.clamp(opacities / operators.ALPHA_MIN, min=1.0)
-        reach = torch.minimum(reach, torch.sqrt(2.0 * torch.log(ratio)))
-    radii = torch.ceil(reach[..., None] * torch.sqrt(torch.clamp(torch.stack(sides, -1), min=0)))
-    drawn &= (radii > options.radius_clip).any(-1)
-    size = torch.tensor((options.width, options.height), dtype=center.dtype)
-    drawn &= ((center + radii > 0) & (center - radii < size)).all(-1)
-    return (radii * drawn[..., None]).nan_to_num(0, 0, 0).to(torch.int32)
 
 
 def camera_offsets(viewmats):

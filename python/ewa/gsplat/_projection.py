@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fully_fused_projection: pinhole on the device, ortho and fisheye on the host."""
+"""fully_fused_projection, and the lenses of cameras."""
 
-import math
-
-import torch
+import numpy as np
 from torch import Tensor
 
 from . import _dialect
 from .._native import operators
-from ._arguments import check, full_precision, integer, mismatch, shape, tensor, unavailable
+from ._arguments import array, check, integer, mismatch, shape, tensor, unavailable
 from ._autograd import Project, ProjectPacked, project_options
-from ._geometry import footprint, full_matrix, project_rows, quat_scale_to_covar_preci, radii_of
 
 
 def fully_fused_projection(
@@ -42,9 +39,16 @@ def fully_fused_projection(
     check(packed or not sparse_grad, "sparse_grad needs packed=True")
     width, height = integer("width", width), integer("height", height)
     options = project_options(
-        width, height, eps2d, near_plane, far_plane, radius_clip, calc_compensations
+        width,
+        height,
+        eps2d,
+        near_plane,
+        far_plane,
+        radius_clip,
+        calc_compensations,
+        lens_of(camera_model, tensors[4].shape[:-2]),
     )
-    out = project(tensors, options, packed, sparse_grad, camera_model)
+    out = project(tensors, options, packed, sparse_grad)
     if _dialect.dialect() == "1.6":
         return out
     if not packed:
@@ -85,66 +89,34 @@ def cameras_of(viewmats):
     return viewmats.shape[-3]
 
 
-def project(tensors, options, packed, sparse_grad, camera_model):
+def project(tensors, options, packed, sparse_grad):
     """The projection of checked tensors, in the dialect of gsplat 1.6."""
-    if camera_model == "pinhole":
-        if packed:
-            return ProjectPacked.apply(*tensors, options, sparse_grad)
-        return Project.apply(*tensors, options)
-    if camera_model not in ("ortho", "fisheye"):
-        raise unavailable(f"camera_model {camera_model!r}")
-    return _project_on_host(tensors, options, packed, camera_model)
-
-
-@full_precision
-def _project_on_host(tensors, options, packed, camera_model):
-    means, quats, scales, covars, viewmats, opacities, Ks = tensors
-    if covars is None:
-        covars = quat_scale_to_covar_preci(quats, scales, compute_preci=False)[0]
-    else:
-        covars = full_matrix(covars)
-    batch, count, cameras = means.shape[:-2], means.shape[-2], viewmats.shape[-3]
-    means, covars = means.reshape(-1, 3), covars.reshape(-1, 3, 3)
-    viewmats, Ks = viewmats.reshape(-1, 4, 4), Ks.reshape(-1, 3, 3)
-    if opacities is not None:
-        opacities = opacities.reshape(-1)
-
-    def rows(image, splat):
-        """Footprints of (image, splat) pairs; splats are counted over the batch."""
-        rotations = viewmats[image, :3, :3]
-        moved = (rotations @ means[splat][..., None])[..., 0] + viewmats[image, :3, 3]
-        turned = rotations @ covars[splat] @ rotations.transpose(-1, -2)
-        center, covars2d = project_rows(
-            moved, turned, Ks[image], options.width, options.height, camera_model
-        )
-        conics, det, compensations, sides = footprint(covars2d, options.eps2d)
-        return center, moved[..., 2], conics, compensations, det, sides
-
-    images = math.prod(batch) * cameras
-    image = torch.arange(images).repeat_interleave(count)
-    splat = image.div(max(cameras, 1), rounding_mode="floor") * count
-    splat = splat + torch.arange(count).repeat(images)
-    with torch.no_grad():
-        center, depths, _, compensations, det, sides = rows(image, splat)
-        visibility = None if opacities is None else opacities[splat]
-        if visibility is not None and options.compensations:
-            visibility = visibility * compensations
-        radii = radii_of(center, depths, sides, det, visibility, options)
-    # Only what is drawn is differentiated: elsewhere the formulas have no finite gradient.
-    drawn = radii[:, 0].nonzero()[:, 0]
-    out = list(rows(image[drawn], splat[drawn])[:4])
-    if not options.compensations:
-        out[3] = None
     if packed:
-        image, local = image[drawn], splat[drawn] % max(count, 1)
-        scene = image.div(max(cameras, 1), rounding_mode="floor")
-        indptr = torch.searchsorted(image, torch.arange(images + 1)).to(torch.int32)
-        return (scene, image % max(cameras, 1), local, indptr, radii[drawn], *out)
-    lead = batch + (cameras, count)
-    dense = [None if v is None else _dense(v, drawn, images * count, lead) for v in out]
-    return (radii.reshape(lead + (2,)), *dense)
+        return ProjectPacked.apply(*tensors, options, sparse_grad)
+    return Project.apply(*tensors, options)
 
 
-def _dense(values, places, count, lead):
-    full = values.new_zeros((count,) + values.shape[1:])
-    return full.index_put((places,), values).reshape(lead + values.shape[1:])
+_MODELS = {"pinhole": "opencv", "ortho": "orthographic", "fisheye": "fisheye"}
+# Where an argument's values stand among k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
+_PINHOLE_TERMS = {
+    "radial_coeffs": (0, 1, 4, 5, 6, 7),
+    "tangential_coeffs": (2, 3),
+    "thin_prism_coeffs": (8, 9, 10, 11),
+}
+_TERMS = {"pinhole": _PINHOLE_TERMS, "fisheye": {"radial_coeffs": (0, 1, 4, 5)}, "ortho": {}}
+
+
+def lens_of(camera_model, cameras, **coefficients):
+    """The lens of cameras [..., C] as ewa's operators take it: its name, and terms [..., C, 12]."""
+    if camera_model not in _MODELS:
+        raise unavailable(f"camera_model {camera_model!r}")
+    given = {name: tensor(name, v) for name, v in coefficients.items() if v is not None}
+    if camera_model == "pinhole" and not given:
+        return "pinhole", None
+    terms = np.zeros(tuple(cameras) + (12,), np.float32)
+    for name, value in given.items():
+        places = _TERMS[camera_model].get(name, ())
+        check(places, f"{name} are no terms of camera_model {camera_model!r}")
+        shape(name, value, tuple(cameras) + (len(places),))
+        terms[..., places] = array(value)
+    return _MODELS[camera_model], terms

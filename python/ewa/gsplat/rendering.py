@@ -14,7 +14,7 @@ from ._arguments import check, integer, mismatch, refusal, shape, tensor, unavai
 from ._autograd import Blend, Images, attach_absgrad, needs_gradient, project_options
 from ._geometry import camera_offsets, upper_triangle
 from ._harmonics import evaluate
-from ._projection import cameras_of, project
+from ._projection import cameras_of, lens_of, project
 from ._tiles import isect_offset_encode, isect_tiles
 
 _COLOR_MODES = {"RGB", "RGB+D", "RGB+ED", "RGB-d", "RGB-Ed"}
@@ -102,9 +102,9 @@ def rasterization(
     return_normals: bool = False,
     global_z_order: bool = True,
     rays: object = None,
-    radial_coeffs: object = None,
-    tangential_coeffs: object = None,
-    thin_prism_coeffs: object = None,
+    radial_coeffs: Tensor | None = None,
+    tangential_coeffs: Tensor | None = None,
+    thin_prism_coeffs: Tensor | None = None,
     ftheta_coeffs: object = None,
     lidar_coeffs: object = None,
     external_distortion_coeffs: object = None,
@@ -127,12 +127,15 @@ def rasterization(
     sparse gradients of means, quats, scales and covars. `absgrad` gives meta["means2d"] an
     attribute of that name after the backward pass. rasterize_mode: classic or antialiased.
 
+    camera_model: pinhole, ortho or fisheye. radial_coeffs [..., C, 6] (k1 to k6), tangential_coeffs
+    [..., C, 2] and thin_prism_coeffs [..., C, 4] bend a pinhole as OpenCV's model does, and
+    radial_coeffs [..., C, 4] a fisheye. They get no gradient.
+
     Returns images [..., C, H, W, X], alphas [..., C, H, W, 1] and meta. The entries isect_ids,
     flatten_ids, isect_offsets and tiles_per_gauss of meta are computed when they are first read.
     """
     _refuse(
         distributed,
-        camera_model,
         global_z_order,
         return_normals,
         render_mode,
@@ -140,9 +143,6 @@ def rasterization(
         with_ut=with_ut,
         with_eval3d=with_eval3d,
         rays=rays,
-        radial_coeffs=radial_coeffs,
-        tangential_coeffs=tangential_coeffs,
-        thin_prism_coeffs=thin_prism_coeffs,
         ftheta_coeffs=ftheta_coeffs,
         lidar_coeffs=lidar_coeffs,
         external_distortion_coeffs=external_distortion_coeffs,
@@ -169,9 +169,22 @@ def rasterization(
         )
     scene = _Scene(means, quats, scales, covars, opacities, viewmats, Ks)
     options = project_options(
-        width, height, eps2d, near_plane, far_plane, radius_clip, rasterize_mode == "antialiased"
+        width,
+        height,
+        eps2d,
+        near_plane,
+        far_plane,
+        radius_clip,
+        rasterize_mode == "antialiased",
+        lens_of(
+            camera_model,
+            scene.dims,
+            radial_coeffs=radial_coeffs,
+            tangential_coeffs=tangential_coeffs,
+            thin_prism_coeffs=thin_prism_coeffs,
+        ),
     )
-    prints = project(scene.tensors, options, packed, sparse_grad, camera_model)
+    prints = project(scene.tensors, options, packed, sparse_grad)
     ids, (radii, means2d, depths, conics, factors) = (
         (prints[:4], prints[4:]) if packed else ((None,) * 4, prints)
     )
@@ -217,7 +230,6 @@ def rasterization(
 
 def _refuse(
     distributed,
-    camera_model,
     global_z_order,
     return_normals,
     render_mode,
@@ -239,8 +251,6 @@ def _refuse(
             raise unavailable(name)
     if distributed:
         raise unavailable("distributed=True")
-    if camera_model not in ("pinhole", "ortho", "fisheye"):
-        raise unavailable(f"camera_model {camera_model!r}")
     if not global_z_order:
         raise unavailable("global_z_order=False")
     if return_normals:
