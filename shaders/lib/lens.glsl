@@ -4,7 +4,7 @@
 #ifndef EWA_LIB_LENS
 #define EWA_LIB_LENS
 
-layout(constant_id = SPEC_LENSES) const uint LENSES = 0u;
+#include "lib/lens_slopes.glsl"
 
 vec2 df_root(vec2 a) {
     const float r = sqrt(a.x);
@@ -60,27 +60,6 @@ void brown_point(vec2 a, vec2 b, out vec2 x, out vec2 y) {
     const vec2 prism_y = df_mul(w, df_add(lens_term(LENS_S3), df_mul(w, lens_term(LENS_S4))));
     x = df_add(df_add(df_mul(radial, a), df_mul(p1, ab)), df_add(df_mul(p2, df_add(w, df_twice(aa))), prism_x));
     y = df_add(df_add(df_mul(radial, b), df_mul(p2, ab)), df_add(df_mul(p1, df_add(w, df_twice(bb))), prism_y));
-}
-
-// The radial factor and its first and second derivative by w.
-vec3 brown_radial(float w) {
-    const float k1 = camera.lens_hi[LENS_K1], k2 = camera.lens_hi[LENS_K2], k3 = camera.lens_hi[LENS_K3];
-    const float k4 = camera.lens_hi[LENS_K4], k5 = camera.lens_hi[LENS_K5], k6 = camera.lens_hi[LENS_K6];
-    const float n = 1.0 + w * (k1 + w * (k2 + w * k3)), n1 = k1 + w * (2.0 * k2 + w * 3.0 * k3), n2 = 2.0 * k2 + w * 6.0 * k3;
-    const float d = 1.0 + w * (k4 + w * (k5 + w * k6)), d1 = k4 + w * (2.0 * k5 + w * 3.0 * k6), d2 = 2.0 * k5 + w * 6.0 * k6;
-    const float c = n / d, c1 = (n1 - c * d1) / d;
-    return vec3(c, c1, (n2 - 2.0 * c1 * d1 - c * d2) / d);
-}
-
-// d(x, y)/d(a, b): columns by a and by b.
-mat2 brown_slope(vec2 t) {
-    const float w = dot(t, t), p1 = camera.lens_hi[LENS_P1], p2 = camera.lens_hi[LENS_P2];
-    const float s1 = camera.lens_hi[LENS_S1], s2 = camera.lens_hi[LENS_S2], s3 = camera.lens_hi[LENS_S3], s4 = camera.lens_hi[LENS_S4];
-    const vec3 c = brown_radial(w);
-    const float beside = 2.0 * (c.y * t.x * t.y + p1 * t.x + p2 * t.y);
-    return mat2(c.x + 2.0 * c.y * t.x * t.x + 2.0 * p1 * t.y + 6.0 * p2 * t.x + 2.0 * t.x * (s1 + 2.0 * s2 * w),
-                beside + 2.0 * t.x * (s3 + 2.0 * s4 * w), beside + 2.0 * t.y * (s1 + 2.0 * s2 * w),
-                c.x + 2.0 * c.y * t.y * t.y + 6.0 * p1 * t.y + 2.0 * p2 * t.x + 2.0 * t.y * (s3 + 2.0 * s4 * w));
 }
 
 vec2 brown_tangent(vec2 t) { return clamp(t, vec2(camera.tan_min[0], camera.tan_min[1]), vec2(camera.tan_max[0], camera.tan_max[1])); }

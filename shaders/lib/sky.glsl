@@ -22,15 +22,16 @@ uint sky_texel(ivec2 at, uint size) {
 
 #ifdef BINDING_CAMERA
 #include "lib/camera.glsl"
+#include "lib/lens_ray.glsl"
 
-// World axes, of any length. pixel: of the view, px.
+// World axes, of any length; zero where the lens shows nothing. pixel: of the view, px.
 vec3 sky_direction(vec2 pixel) {
     const vec2 at = (pixel - vec2(camera.center_hi[0], camera.center_hi[1])) /
                     vec2(camera.focal_hi[0], camera.focal_hi[1]);
-    return vec3(at, 1.0) * camera_rotation();
+    return (LENSES != 0u ? lens_ray(at) : vec3(at, 1.0)) * camera_rotation();
 }
 
-// The four texels that a pixel shows, and their weights. Pixels of one cell show the same texels.
+// The four texels that a pixel shows, and their weights: zero where the lens shows nothing. Pixels of one cell show the same texels.
 struct SkyCorners {
     uint cell;
     uint texels[4];
@@ -38,7 +39,9 @@ struct SkyCorners {
 };
 
 SkyCorners sky_corners(SkyPush sky, uvec2 pixel) {
-    const vec2 place = sky_place(sky_direction(vec2(pixel.x, pixel.y + sky.first_row) + 0.5), sky.size);
+    const vec3 direction = sky_direction(vec2(pixel.x, pixel.y + sky.first_row) + 0.5);
+    const bool shown = LENSES == 0u || direction != vec3(0.0);
+    const vec2 place = shown ? sky_place(direction, sky.size) : vec2(0.0);
     const ivec2 corner = ivec2(floor(place));
     const vec2 part = place - vec2(corner);
     SkyCorners corners;
@@ -47,6 +50,7 @@ SkyCorners sky_corners(SkyPush sky, uvec2 pixel) {
         const uvec2 far = uvec2(k & 1u, k >> 1u);
         corners.texels[k] = sky_texel(corner + ivec2(far), sky.size);
         corners.weights[k] = (far.x == 1u ? part.x : 1.0 - part.x) * (far.y == 1u ? part.y : 1.0 - part.y);
+        if (!shown) corners.weights[k] = 0.0;
     }
     return corners;
 }

@@ -15,7 +15,7 @@ using operators::check_size;
 using operators::ProjectionBuffers;
 
 constexpr size_t kViewsMax = 65535 / shared::VIEW_GRADIENT_FLOATS;  // layers of a dispatch
-constexpr int kWide = 1 << 24;                                       // px: beyond all angles
+constexpr int kWide = 1 << 24;                                      // px: beyond all angles
 constexpr uint32_t kReduceBlock = 4096;                             // items a subgroup adds
 
 void check_arguments(const SplatArrays& splats, const ViewArrays& views, const ProjectionOptions& options) {
@@ -240,20 +240,22 @@ SplatGradient Operators::project_backward(const SplatArrays& splats, const ViewA
                    subgroups = groups[0] * groups[1] * (config.element_group / config.subgroup);
     b.view_sums.reserve(device, view_gradients ? uint64_t(4) * rows * subgroups : 4);
     const passes::Recorder on{recording, context_->cache};
-    on.record(passes::ProjectViewsBackward{.views = b.views.buffer(),
-                                           .means = b.means.buffer(),
-                                           .shapes = b.shapes.buffer(),
-                                           .scales = b.scales.buffer(),
-                                           .radii = b.radii.buffer(),
-                                           .means2d_gradient = b.means2d.buffer(),
-                                           .depths_gradient = b.depths.buffer(),
-                                           .conics_gradient = b.conics.buffer(),
-                                           .compensations_gradient = b.compensations.buffer(),
-                                           .means_gradient = b.means_gradient.buffer(),
-                                           .shapes_gradient = b.shapes_gradient.buffer(),
-                                           .scales_gradient = b.scales_gradient.buffer(),
-                                           .view_sums = b.view_sums.buffer()},
-              push, variant_of(splats, views, options, compensations, view_gradients ? shared::VIEWS_GRADIENTS : 0));
+    on.record(
+        passes::ProjectViewsBackward{.views = b.views.buffer(),
+                                     .means = b.means.buffer(),
+                                     .shapes = b.shapes.buffer(),
+                                     .scales = b.scales.buffer(),
+                                     .radii = b.radii.buffer(),
+                                     .means2d_gradient = b.means2d.buffer(),
+                                     .depths_gradient = b.depths.buffer(),
+                                     .conics_gradient = b.conics.buffer(),
+                                     .compensations_gradient = b.compensations.buffer(),
+                                     .means_gradient = b.means_gradient.buffer(),
+                                     .shapes_gradient = b.shapes_gradient.buffer(),
+                                     .scales_gradient = b.scales_gradient.buffer(),
+                                     .view_sums = b.view_sums.buffer()},
+        push,
+        variant_of(splats, views, options, compensations, view_gradients ? shared::VIEWS_GRADIENTS : 0));
     operators::Array* sums = view_gradients ? &reduce_rows(on, *context_, subgroups, rows) : nullptr;
     context_->executor.run(recording);
     b.give_back();

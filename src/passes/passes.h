@@ -547,14 +547,14 @@ struct Perturb {
 
 // The sky behind the splats.
 
-/// Adds the sky to an image that was blended over black.
+/// Adds the sky to an image that was blended over black. Variant: SPEC_LENSES.
 struct AddSky {
     static constexpr char shader[] = "add_sky";
     using Work = PerElement<pixels<shared::SkyPush>>;
     gpu::BufferPart planes, camera, sky;
 };
 
-/// Gradient of AddSky by the sky, which it adds to the slot. Adds to Counts.dropped_updates.
+/// Gradient of AddSky by the sky, which it adds to the slot. Adds to Counts.dropped_updates. Variant: SPEC_LENSES.
 struct SkyGradient {
     static constexpr char shader[] = "sky_gradient";
     struct Work : OneSubgroup<shared::SkyGradientPush> {

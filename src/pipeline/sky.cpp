@@ -52,7 +52,7 @@ void LearnedSky::set(uint32_t slot, std::span<const uint64_t> words) {
 
 void FramePasses::add_sky() const {
     record(passes::AddSky{.planes = frame.planes, .camera = camera(), .sky = inputs.sky->values},
-           sky_push(frame, *inputs.sky, inputs.band));
+           sky_push(frame, *inputs.sky, inputs.band), {lenses()});
 }
 
 void FramePasses::sky_gradient(const LearnedSky& sky, uint32_t slot) const {
@@ -62,7 +62,7 @@ void FramePasses::sky_gradient(const LearnedSky& sky, uint32_t slot) const {
                                .camera = camera(),
                                .slots = sky.slots,
                                .counts = frame.counts},
-           {.sky = sky_push(frame, sky, inputs.band), .slot = 3 * sky.size * sky.size * slot});
+           {.sky = sky_push(frame, sky, inputs.band), .slot = 3 * sky.size * sky.size * slot}, {lenses()});
 }
 
 void record_sky_update(const passes::Recorder& on, const LearnedSky& sky, const FrameBuffers& frame,

@@ -143,8 +143,8 @@ PlainProjected project(const PlainSplat& splat, const PlainView& view, const Pla
     const double sigmas = std::min(RADIUS_SIGMAS, std::sqrt(2 * std::log(std::max(ratio, 1.0))));
     out.reach = sigmas * glm::sqrt(glm::dvec2(a, c));
     const glm::dvec2 radius = glm::ceil(out.reach);
-    out.visible = (!s.image || s.image->shown) && s.p.z > options.near && s.p.z < options.far && s.det > 0 && ratio >= 1 &&
-                  (radius.x > options.radius_clip || radius.y > options.radius_clip) &&
+    out.visible = (!s.image || s.image->shown) && s.p.z > options.near && s.p.z < options.far && s.det > 0 &&
+                  ratio >= 1 && (radius.x > options.radius_clip || radius.y > options.radius_clip) &&
                   out.mean2d.x + radius.x > 0 && out.mean2d.x - radius.x < options.width &&
                   out.mean2d.y + radius.y > 0 && out.mean2d.y - radius.y < options.height;
     return out;

@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 #include <glm/matrix.hpp>
+#include <optional>
 
+#include "scene/native_lens.h"
 #include "shared/constants.h"
 
 namespace ewa::reference {
@@ -45,9 +47,11 @@ std::array<SkyCorner, 4> sky_corners(int size, const glm::dvec3& direction) {
              {sky_texel_number(size, left + 1, top + 1), right_share * lower_share}}};
 }
 
-glm::dvec3 ray_direction(const Camera& camera, int x, int y) {
-    const glm::dvec3 ray((x + 0.5 - camera.cx) / camera.fx, (y + 0.5 - camera.cy) / camera.fy, 1);
-    return glm::transpose(camera.rotation) * ray;
+/// World axes. Empty where the lens shows nothing. limit: scene::lens_limit(camera).
+std::optional<glm::dvec3> ray_direction(const Camera& camera, double limit, int x, int y) {
+    const auto ray = scene::ray_of(camera, limit, x + 0.5, y + 0.5);
+    if (!ray) return std::nullopt;
+    return glm::transpose(camera.rotation) * ray->direction;
 }
 
 }  // namespace
@@ -62,9 +66,12 @@ glm::dvec3 sky_color(const Sky& sky, const glm::dvec3& direction) {
 Raster over_sky(const Raster& color, const Raster& left, const Camera& camera, const Sky& sky,
                 int first_row) {
     Raster out = color;
+    const double limit = scene::lens_limit(camera);
     for (int y = 0; y < out.height; ++y)
         for (int x = 0; x < out.width; ++x) {
-            const glm::dvec3 behind = sky_color(sky, ray_direction(camera, x, y + first_row));
+            const auto direction = ray_direction(camera, limit, x, y + first_row);
+            if (!direction) continue;
+            const glm::dvec3 behind = sky_color(sky, *direction);
             for (int c = 0; c < 3; ++c) out.at(x, y)[c] += left.at(x, y)[0] * behind[c];
         }
     return out;
@@ -73,11 +80,15 @@ Raster over_sky(const Raster& color, const Raster& left, const Camera& camera, c
 std::vector<double> sky_gradient(const Sky& sky, const Raster& left, const Camera& camera,
                                  const Raster& gradient) {
     std::vector<double> out(sky.texels.size());
+    const double limit = scene::lens_limit(camera);
     for (int y = 0; y < left.height; ++y)
-        for (int x = 0; x < left.width; ++x)
-            for (const SkyCorner& corner : sky_corners(sky.size, ray_direction(camera, x, y)))
+        for (int x = 0; x < left.width; ++x) {
+            const auto direction = ray_direction(camera, limit, x, y);
+            if (!direction) continue;
+            for (const SkyCorner& corner : sky_corners(sky.size, *direction))
                 for (size_t c = 0; c < 3; ++c)
                     out[3 * corner.texel + c] += corner.weight * left.at(x, y)[0] * gradient.at(x, y)[c];
+        }
     return out;
 }
 

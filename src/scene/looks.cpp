@@ -54,7 +54,6 @@ void check_lens(const RenderOptions& render, const Camera& camera) {
     if (camera.distortion.none()) return;
     const std::string_view option = render.points                            ? "--points"
                                     : render.integrator != Integrator::splat ? "--integrator"
-                                    : render.sky                             ? "--background sky"
                                                                              : "";
     if (!option.empty())
         throw InputError(std::string(option) +

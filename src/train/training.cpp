@@ -51,9 +51,8 @@ void check_lenses(const TrainOptions& options, const Dataset& dataset, const std
         const Frame& frame = dataset.frames[size_t(index)];
         if (frame.camera.distortion.none()) continue;
         scene::check_lens(options.render, frame.camera);
-        if (options.refine_focal || options.sky)
-            throw InputError(std::string(options.sky ? "--background sky" : "--refine-focal") +
-                             " takes pinholes only, and frame \"" + frame.name +
+        if (options.refine_focal)
+            throw InputError("--refine-focal takes pinholes only, and frame \"" + frame.name +
                              "\" has another lens; take --lens undistort");
     }
 }

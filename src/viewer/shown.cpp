@@ -101,7 +101,6 @@ Camera Shown::camera() const {
 Look Shown::look_for(const Camera& camera) const {
     Look look = state_.settings.look;
     if (camera.distortion.none()) return look;
-    look.sky.reset();
     look.points = false;
     return look;
 }

@@ -168,8 +168,8 @@ void compile_training(Compiler& compiler) {
     compiler.compile<passes::GridSliceBackward>();
     compiler.compile<passes::GridGradient>();
     compiler.compile<passes::GridUpdate>();
-    compiler.compile<passes::AddSky>();
-    compiler.compile<passes::SkyGradient>();
+    compiler.compile<passes::AddSky>({{SPEC_LENSES, {0, 1}}});
+    compiler.compile<passes::SkyGradient>({{SPEC_LENSES, {0, 1}}});
     compiler.compile<passes::SkyUpdate>();
     compiler.compile<passes::MoveCamera>();
     compiler.compile<passes::MotionUpdate>();

@@ -17,6 +17,7 @@
 #include "reference/render.h"
 #include "reference/sky.h"
 #include "reference/training.h"
+#include "support/random_lens.h"
 #include "support/random_sky.h"
 
 namespace ewa::test {
@@ -26,6 +27,7 @@ struct SkyCase {
     int width, height;
     uint64_t seed;
     double zoom = 1;  // of the focal lengths
+    int lens = -1;    // of random_lenses; else a pinhole
 };
 
 /// A camera with light that reaches the sky, and dL/d(image).
@@ -38,6 +40,9 @@ struct SkyInputs {
           color(reference::to_double(random_target(c.seed + 1, c.width, c.height))),
           left(c.width, c.height, 1),
           gradient(c.width, c.height, 3) {
+        if (c.lens >= 0) camera = random_lenses(c.seed, c.width, c.height).at(size_t(c.lens)).camera;
+        if (c.zoom != 1 && camera.distortion.lens == Lens::fisheye)  // folds over at 74 degrees
+            camera.distortion = {.k1 = -0.2, .lens = Lens::fisheye};
         camera.fx *= c.zoom;
         camera.fy *= c.zoom;
         Random random(c.seed + 2);
@@ -164,6 +169,12 @@ TEST_P(Sky, LiesBehindWhatWasBlended) {
 INSTANTIATE_TEST_SUITE_P(Sizes, Sky,
                          testing::Values(SkyCase{1, 1, 61}, SkyCase{61, 47, 62}, SkyCase{200, 131, 63},
                                          SkyCase{61, 47, 64, 0.1}, SkyCase{61, 47, 65, 0.01}));
+// Each lens that splats are rendered through. One fisheye shows nothing in the corners.
+INSTANTIATE_TEST_SUITE_P(Lenses, Sky,
+                         testing::Values(SkyCase{90, 70, 67, 1, 0}, SkyCase{90, 70, 68, 1, 1},
+                                         SkyCase{90, 70, 69, 1, 2}, SkyCase{90, 70, 70, 1, 3},
+                                         SkyCase{90, 45, 71, 1, 4}, SkyCase{61, 47, 72, 1, 5},
+                                         SkyCase{90, 70, 73, 2, 2}));
 // Few texels have the sums of all pixels.
 INSTANTIATE_TEST_SUITE_P(LargeSize, Sky, testing::Values(SkyCase{800, 800, 66, 20}));
 
