@@ -324,7 +324,7 @@ void expect_reference(const PlainScene& scene, double shape, double gradient) {
     }
 }
 
-/// Without coefficients, brown is a pinhole; at the axis, so is a fisheye.
+/// Without coefficients, brown is a pinhole.
 TEST(ViewsEdges, LensesThatBendNothing) {
     PlainScene scene = plain_scene(5, 200, SplatKind::ordinary, 1, 160, 120);
     const ProjectedSplats pinhole = project_scene(scene);
@@ -339,6 +339,17 @@ TEST(ViewsEdges, LensesThatBendNothing) {
     expect_error<InputError>([&] { project_scene(scene); }, {"lenses", "brown", "orthographic"});
     scene.lenses.resize(2);
     expect_error<InputError>([&] { project_scene(scene); }, {"lenses", "[C]"});
+}
+
+/// The image of this lens turns back at x / z = 0.82, and x / z = 1.5 would be within it.
+TEST(ViewsEdges, NothingIsSeenBeyondTheFold) {
+    PlainScene scene = empty_scene();
+    for (const float x : {0.5f, 3.0f, 6.0f}) add_splat(scene, {x, 0, 4}, {1, 0, 0, 0}, {0.1f, 0.1f, 0.1f});
+    scene.lenses = {Distortion{.k1 = -0.5}};
+    const ProjectedSplats out = project_scene(scene);
+    EXPECT_GT(out.radii[0], 0);
+    EXPECT_GT(out.radii[2], 0);
+    EXPECT_EQ(out.radii[4], 0);
 }
 
 TEST(ViewsEdges, NoSplatsAndNoViews) {
