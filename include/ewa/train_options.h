@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The options of a training.
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "ewa/appearance.h"
 #include "ewa/loss_weights.h"
@@ -86,6 +88,10 @@ struct TrainOptions {
     bool refine_poses = false;  // learns a rotation and a translation for each training camera, from none
     bool refine_focal = false;  // with refine_poses: also a factor of its focal lengths, from 1
     double pose_rate = 5e-3, pose_rate_final = 5e-5;  // radians by which a step moves the points of the image
+
+    /// A box in world units, x, y, z of its low corner and then of its high one. New splats come only from splats whose mean
+    /// is in it. Not with Strategy::none.
+    std::optional<std::array<double, 6>> region{};
 
     // Adaptive density control. Steps are those of a 30,000 step run; a shorter run scales them
     // (src/train/schedule.h).

@@ -72,6 +72,21 @@ void set_loss(RunOptions& options, nb::handle value) {
     options.train.loss = train::parse_loss(text);
 }
 
+nb::object region_value(const RunOptions& options) {
+    return nb::str(train::value_text(train::run_option("region"), options).c_str());
+}
+
+void set_region(RunOptions& options, nb::handle value) {
+    std::string text;
+    if (nb::isinstance<nb::str>(value)) {
+        text = nb::cast<std::string>(value);
+    } else {
+        for (const double number : nb::cast<std::array<double, 6>>(value))
+            text += (text.empty() ? "" : ",") + number_text(nb::float_(number));
+    }
+    train::run_option("region").set(options, text);
+}
+
 /// Python's unit of memory is the byte.
 template <uint64_t TrainOptions::*member>
 constexpr Special bytes(const char* name) {
@@ -94,6 +109,7 @@ constexpr std::array kSpecials{
         },
         [](RunOptions& o, nb::handle value) { o.train.render.kernel = footprint_of(nb::cast<bool>(value)); }},
     Special{"background", "numpy.typing.ArrayLike | str", background_value, set_background},
+    Special{"region", "str | collections.abc.Sequence[float]", region_value, set_region},
     Special{"loss", "str | dict[str, float]", loss_value, set_loss},
     bytes<&TrainOptions::image_cache_bytes>("image_cache_bytes"),
     bytes<&TrainOptions::device_memory_bytes>("device_memory_bytes")};

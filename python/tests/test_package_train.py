@@ -320,6 +320,17 @@ def test_the_loss_has_weights(still_life, tmp_path):
     assert not same(trained(usual), trainer.splats())
 
 
+def test_a_region_has_six_numbers(still_life):
+    trainer = ewa.Trainer(still_life, steps=2, region=(-9, -9, -9, 9, 9, 9.5), train_frames=[0])
+    assert trainer.options["region"] == "-9,-9,-9,9,9,9.5"
+    assert ewa.Trainer(still_life, steps=2, train_frames=[0]).options["region"] == ""
+    for wrong in ("1,2", (1, 0, 0, 0, 0, 0)):
+        with pytest.raises(ewa.InputError, match="region=.*lower corner first"):
+            ewa.Trainer(still_life, steps=2, region=wrong, train_frames=[0])
+    with pytest.raises(TypeError, match="region=.*wrong type"):
+        ewa.Trainer(still_life, steps=2, region=(1, 2), train_frames=[0])
+
+
 def test_the_sky_is_learned(still_life):
     trainer = ewa.Trainer(still_life, steps=20, background="sky", train_frames=[0, 1, 2])
     assert trainer.options["background"] == "sky" and np.all(trainer.sky() == 0.5)

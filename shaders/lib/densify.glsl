@@ -2,9 +2,11 @@
 // What adaptive density control does with one splat (3DGS, section 5.2 and densify_and_prune of its code). A splat
 // whose mean gradient reaches the threshold is cloned if it is small and split if it is large. A splat that has
 // become transparent is pruned, and one that is too large once prune_scale is set. The children of a split are judged
-// by their own size. A negative number of views prunes, whatever the splat is like.
+// by their own size. A negative number of views prunes, whatever the splat is like. Outside of the region no splat
+// grows.
 #ifndef EWA_LIB_DENSIFY
 #define EWA_LIB_DENSIFY
+#include "region.glsl"
 const uint ACTION_PRUNE = 0u, ACTION_KEEP = 1u, ACTION_CLONE = 2u, ACTION_SPLIT = 3u;
 
 uint outputs_of(uint action) { return min(action, 2u); }
@@ -15,7 +17,8 @@ uint action_of(DensifyPush push, vec4 mean_logit, vec4 quaternion, vec4 scale_re
     if (!(whole && opaque) || statistics.y < 0.0) return ACTION_PRUNE;
     const float size = exp(max(scale_red.x, max(scale_red.y, scale_red.z)));
     const bool limited = push.prune_scale > 0.0;
-    const bool grow = statistics.y > 0.0 && statistics.x / statistics.y >= push.grow_gradient;
+    const bool grow = statistics.y > 0.0 && statistics.x / statistics.y >= push.grow_gradient &&
+                      in_region(push.region, mean_logit.xyz);
     if (grow && size > push.split_scale)
         return limited && size / float(SPLIT_SCALE) > push.prune_scale ? ACTION_PRUNE : ACTION_SPLIT;
     if (limited && size > push.prune_scale) return ACTION_PRUNE;

@@ -570,6 +570,8 @@ struct DensifyPush {
     uint step;
     uint first;            // number of the first splat, among those of all ranks
     uint revised_opacity;  // 1: a split's two children in one place are together as opaque as their parent
+    float
+        region[6];  // low corner, then high corner: a splat whose mean is outside is neither cloned nor split
 };
 
 struct ResetPush {
@@ -592,6 +594,7 @@ struct McmcPush {
     float dead_logit;     // a splat at or below it is dead
     float least_opacity;  // lower bound of the opacity that a source and its copies share
     float spread;         // standard deviations of the source by which it and its copies move apart
+    float region[6];      // low corner, then high corner: a splat whose mean is outside is no source
     uint seed[2];
     uint step;
     uint first;  // number of the first splat, among those of all ranks

@@ -141,10 +141,9 @@ void place_splats(Gaussians& gaussians, const glm::dmat4& matrix, const std::str
 
 std::optional<std::array<double, 6>> parse_crop(const std::string& text) {
     if (text.empty()) return std::nullopt;
-    const std::vector<double> n = parse_numbers("--crop", text);
-    if (n.size() != 6 || n[0] > n[3] || n[1] > n[4] || n[2] > n[5])
-        throw InputError("--crop: '" + text + "' is not x,y,z,X,Y,Z with the lower corner first");
-    return std::array{n[0], n[1], n[2], n[3], n[4], n[5]};
+    const auto box = core::parse_box(text);
+    if (!box) throw InputError("--crop: " + core::not_a_box(text));
+    return box;
 }
 
 std::optional<std::string> apply_edits(Gaussians& gaussians, const Edits& edits, SplatFormat format) {

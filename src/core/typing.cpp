@@ -2,6 +2,7 @@
 #include "core/typing.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <numeric>
 #include <utility>
@@ -180,6 +181,25 @@ std::optional<std::array<float, 3>> parse_colour(std::string_view text) {
             return std::nullopt;
     }
     return trim(text).empty() ? std::optional(colour) : std::nullopt;
+}
+
+std::optional<std::array<double, 6>> parse_box(std::string_view text) {
+    std::array<double, 6> box{};
+    for (size_t k = 0; k < box.size(); ++k) {
+        const size_t end = std::min(text.find(','), text.size());
+        const std::optional<double> number = parse_number(trim(text.substr(0, end)));
+        if (!number || !std::isfinite(*number) || (k < 5) != (end < text.size())) return std::nullopt;
+        if (k >= 3 && *number < box[k - 3]) return std::nullopt;
+        box[k] = *number;
+        text.remove_prefix(std::min(end + 1, text.size()));
+    }
+    return box;
+}
+
+std::string not_a_box(std::string_view text) {
+    std::string message(text);
+    message.insert(message.begin(), '\'');
+    return message + "' is not x,y,z,X,Y,Z with the lower corner first";
 }
 
 std::string not_a_colour(std::string_view text) {

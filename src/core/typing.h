@@ -72,6 +72,12 @@ std::string settle_word(std::string& text, const std::vector<std::string>& words
 /// (also orange). Commas or blanks separate the numbers. Empty for other text.
 std::optional<std::array<float, 3>> parse_colour(std::string_view text);
 
+/// A box from "x,y,z,X,Y,Z", finite numbers with the lower corner first. Empty for other text.
+std::optional<std::array<double, 6>> parse_box(std::string_view text);
+
+/// What a message says of text that parse_box does not read.
+std::string not_a_box(std::string_view text);
+
 /// What a message says of text that parse_colour does not read.
 std::string not_a_colour(std::string_view text);
 

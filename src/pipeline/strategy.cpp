@@ -34,18 +34,21 @@ void record_sum(const Phase& phase, const passes::Recorder& on, const ScanBuffer
 
 shared::DensifyPush densify_push(const Model& model, const FrameBuffers& frame, const DensifyRules& rules,
                                  float threshold, uint32_t new_capacity) {
-    return {.splats = model.splats,
-            .planes = model.planes(),
-            .new_capacity = new_capacity,
-            .scan_block = frame.sizes.scan_block,
-            .grow_gradient = threshold,
-            .split_scale = rules.split_scale,
-            .prune_opacity = rules.prune_logit,
-            .prune_scale = rules.prune_scale,
-            .seed = {uint32_t(rules.seed), uint32_t(rules.seed >> 32)},
-            .step = rules.step,
-            .first = model.first,
-            .revised_opacity = rules.revised_opacity ? 1u : 0u};
+    shared::DensifyPush push{.splats = model.splats,
+                             .planes = model.planes(),
+                             .new_capacity = new_capacity,
+                             .scan_block = frame.sizes.scan_block,
+                             .grow_gradient = threshold,
+                             .split_scale = rules.split_scale,
+                             .prune_opacity = rules.prune_logit,
+                             .prune_scale = rules.prune_scale,
+                             .seed = {uint32_t(rules.seed), uint32_t(rules.seed >> 32)},
+                             .step = rules.step,
+                             .first = model.first,
+                             .revised_opacity = rules.revised_opacity ? 1u : 0u,
+                             .region = {}};
+    std::ranges::copy(rules.region, push.region);
+    return push;
 }
 
 /// The constants of a kernel that writes an array of the next generation.
@@ -61,22 +64,25 @@ uint32_t grown(uint32_t splats, const McmcRules& rules) {
 
 shared::McmcPush mcmc_push(const Phase& phase, const Model& model, const McmcRules& rules,
                            const McmcPart& part) {
-    return {.splats = model.splats,
-            .planes = model.planes(),
-            .new_splats = model.splats + part.added,
-            .scan_block = phase.frame.sizes.scan_block,
-            .dead = part.dead,
-            .draws = part.draws,
-            .total = part.all_weight,
-            .total_before = part.weight_before,
-            .own_total = part.weight,
-            .weight_scale = float(std::min(65535u, 0xffffffffu / std::max(model.all, 1u))),
-            .dead_logit = float(std::log(rules.dead_opacity / (1 - rules.dead_opacity))),
-            .least_opacity = float(rules.dead_opacity),
-            .spread = float(rules.spread),
-            .seed = {uint32_t(rules.seed), uint32_t(rules.seed >> 32)},
-            .step = rules.step,
-            .first = model.first};
+    shared::McmcPush push{.splats = model.splats,
+                          .planes = model.planes(),
+                          .new_splats = model.splats + part.added,
+                          .scan_block = phase.frame.sizes.scan_block,
+                          .dead = part.dead,
+                          .draws = part.draws,
+                          .total = part.all_weight,
+                          .total_before = part.weight_before,
+                          .own_total = part.weight,
+                          .weight_scale = float(std::min(65535u, 0xffffffffu / std::max(model.all, 1u))),
+                          .dead_logit = float(std::log(rules.dead_opacity / (1 - rules.dead_opacity))),
+                          .least_opacity = float(rules.dead_opacity),
+                          .spread = float(rules.spread),
+                          .region = {},
+                          .seed = {uint32_t(rules.seed), uint32_t(rules.seed >> 32)},
+                          .step = rules.step,
+                          .first = model.first};
+    std::ranges::copy(rules.region, push.region);
+    return push;
 }
 
 /// The weights of a model's splats as sources, and which of them are dead.

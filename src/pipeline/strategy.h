@@ -4,8 +4,10 @@
 // device holds passes from one phase to the next. A write replaces the model's arrays by those of the next generation, one
 // after another: at most one array is there twice.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <span>
 
 #include "ewa/render_options.h"
@@ -36,6 +38,11 @@ struct Phase {
     }
 };
 
+/// A box of means, relative to the model's origin: its low corner, then its high one. New splats come from splats in it.
+using Region = std::array<float, 6>;
+inline constexpr float kFarthest = std::numeric_limits<float>::max();
+inline constexpr Region kEverywhere{-kFarthest, -kFarthest, -kFarthest, kFarthest, kFarthest, kFarthest};
+
 /// The rules of adaptive density control.
 struct DensifyRules {
     float grow_gradient = 0;  // threshold of the mean gradient norm
@@ -46,6 +53,7 @@ struct DensifyRules {
     uint64_t seed = 0;
     uint32_t step = 0;
     uint32_t max_splats = 0;  // hard cap: the threshold is raised until the next generation fits
+    Region region = kEverywhere;
 };
 
 /// The splats of a model's next generation, if mean gradient norms above `threshold` grow.
@@ -75,6 +83,7 @@ struct McmcRules {
     Footprint kernel = Footprint::peak;
     uint64_t seed = 0;
     uint32_t step = 0;
+    Region region = kEverywhere;  // dead splats outside of it move into it
 };
 
 /// A portion's part of a refinement.

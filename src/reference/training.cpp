@@ -98,12 +98,18 @@ void accumulate(DensifyStatistics& statistics, std::span<const ScreenGradient> g
     }
 }
 
+bool Region::contains(const glm::dvec3& point) const {
+    for (int axis = 0; axis < 3; ++axis)
+        if (point[axis] < low[axis] || point[axis] > high[axis]) return false;
+    return true;
+}
+
 Decision decide(const Splat& splat, double mean_gradient, const DensifyOptions& options) {
     const double opacity = 1 / (1 + std::exp(-splat.opacity_logit));
     // With this comparison, an opacity of NaN is pruned.
     if (!(opacity >= options.prune_opacity)) return Decision::prune;
     const double scale = std::exp(std::max({splat.log_scale.x, splat.log_scale.y, splat.log_scale.z}));
-    const bool grows = mean_gradient >= options.grow_gradient;
+    const bool grows = mean_gradient >= options.grow_gradient && options.region.contains(splat.mean);
     const bool splits = grows && scale > options.split_scale * options.extent;
     const double left = splits ? scale / SPLIT_SCALE : scale;
     if (options.prune_large && left > options.prune_scale * options.extent) return Decision::prune;

@@ -3,6 +3,7 @@
 #pragma once
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -57,6 +58,13 @@ struct DensifyStatistics {
 void accumulate(DensifyStatistics& statistics, std::span<const ScreenGradient> gradients,
                 std::span<const uint8_t> in_view, const Camera& camera, bool absolute = false);
 
+/// A box, world units. Usually everything.
+struct Region {
+    glm::dvec3 low{-std::numeric_limits<double>::infinity()}, high{std::numeric_limits<double>::infinity()};
+
+    bool contains(const glm::dvec3& point) const;
+};
+
 struct DensifyOptions {
     double extent = 1;  // of the scene, world units
     double grow_gradient = 2e-4;
@@ -64,6 +72,7 @@ struct DensifyOptions {
     double prune_opacity = 0.005;
     double prune_scale = 0.1;  // share of extent
     bool prune_large = false;  // true once opacity has been reset
+    Region region{};           // that splats grow in
     uint64_t max_splats = UINT64_MAX;
 };
 

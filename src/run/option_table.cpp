@@ -16,6 +16,7 @@
 #include "run/advanced_options.h"
 #include "run/loss_option.h"
 #include "run/option_rows.h"
+#include "run/region_option.h"
 #include "scene/looks.h"
 
 namespace ewa::train {
@@ -337,6 +338,7 @@ std::vector<Row> rows() {
         {"Quality", "revised_opacity",
          flag("revised-opacity", "adc: both halves of a split splat are together as opaque as it was",
               [](RunOptions& o) -> bool& { return o.train.revised_opacity; })},
+        {"Quality", "region", region_option()},
         {"Quality", "loss", loss_option()},
         {"Quality", "appearance", appearance_option()},
         {"Quality", "exposure",

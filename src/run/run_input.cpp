@@ -20,6 +20,7 @@
 #include "ewa/splat_files.h"
 #include "io/datasets/image_records.h"
 #include "run/blurred_images.h"
+#include "run/region_option.h"
 #include "scene/dense_points.h"
 #include "scene/names.h"
 #include "shared/constants.h"
@@ -270,7 +271,10 @@ Gaussians splats_of(const PointCloud& points, const RunOptions& options, const D
                     const std::vector<int>& frames) {
     const size_t wanted = dense_start_size(options, dataset, frames);
     if (wanted <= points.positions.size()) return gaussians_from_points(points, options.train.sh_degree);
-    return gaussians_from_points(scene::with_midpoints(points, wanted), options.train.sh_degree);
+    return gaussians_from_points(
+        scene::with_midpoints(points, wanted,
+                              [&](const glm::dvec3& point) { return in_region(options.train, point); }),
+        options.train.sh_degree);
 }
 
 }  // namespace
@@ -367,6 +371,7 @@ RunInput load_run(const RunOptions& options) {
     train.render.sh_degree = train.sh_degree;
     input.options.output = output_folder(options);
     input.start = initial_splats(input.options, input.dataset, input.split.train);
+    if (input.options.train.region) check_region(input.options.train, input.start);
     add_remarks(input);
     return input;
 }
@@ -393,6 +398,9 @@ constexpr std::array kRunExclusions{
                  "--strategy adc", adds_by_gradient},
     RunExclusion{"--revised-opacity", [](const RunOptions& o) { return o.train.revised_opacity; },
                  Relation::needs, "--strategy adc", adds_by_gradient},
+    RunExclusion{"--region", [](const RunOptions& o) { return o.train.region.has_value(); },
+                 Relation::excludes, "--strategy none",
+                 [](const RunOptions& o) { return o.train.strategy == Strategy::none; }, "it adds no splats"},
     RunExclusion{"--device-memory", [](const RunOptions& o) { return o.train.device_memory_bytes > 0; },
                  Relation::excludes, "--accuracy",
                  [](const RunOptions& o) { return bool(o.report_section); }},

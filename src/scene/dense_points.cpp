@@ -13,10 +13,15 @@ constexpr size_t kPartners = 2;
 
 }  // namespace
 
-PointCloud with_midpoints(const PointCloud& points, size_t most) {
+PointCloud with_midpoints(const PointCloud& points, size_t most,
+                          const std::function<bool(const glm::dvec3&)>& wanted) {
     PointCloud dense = points;
     if (points.positions.size() >= most) return dense;
     std::vector<std::array<size_t, 2>> pairs = neighbor_pairs(points.positions, kPartners);
+    const auto middle = [&](const std::array<size_t, 2>& pair) {
+        return 0.5 * (points.positions[pair[0]] + points.positions[pair[1]]);
+    };
+    if (wanted) std::erase_if(pairs, [&](const auto& pair) { return !wanted(middle(pair)); });
     const size_t room = most - points.positions.size();
     if (pairs.size() > room) {
         const auto longer = [&](const std::array<size_t, 2>& a, const std::array<size_t, 2>& b) {
@@ -28,8 +33,9 @@ PointCloud with_midpoints(const PointCloud& points, size_t most) {
         std::sort(pairs.begin(), pairs.end(), longer);
         pairs.resize(room);
     }
-    for (const auto& [a, b] : pairs) {
-        dense.positions.push_back(0.5 * (points.positions[a] + points.positions[b]));
+    for (const std::array<size_t, 2>& pair : pairs) {
+        const auto [a, b] = pair;
+        dense.positions.push_back(middle(pair));
         std::array<uint8_t, 3> color;
         for (size_t c = 0; c < 3; ++c)
             color[c] = uint8_t((int(points.colors[a][c]) + int(points.colors[b][c])) / 2);

@@ -2,6 +2,8 @@
 // A denser point cloud to start a training from.
 #pragma once
 #include <cstddef>
+#include <functional>
+#include <glm/vec3.hpp>
 
 #include "ewa/dataset.h"
 
@@ -9,7 +11,8 @@ namespace ewa::scene {
 
 /// `points`, followed by the middles between neighbours: each point and the two points nearest to it. A middle has the mean
 /// of both colours. With more than `most` points in all, the middles of the longest distances are taken. `points` must be
-/// finite, and have a colour each.
-PointCloud with_midpoints(const PointCloud& points, size_t most);
+/// finite, and have a colour each. wanted: whether a middle may be taken.
+PointCloud with_midpoints(const PointCloud& points, size_t most,
+                          const std::function<bool(const glm::dvec3&)>& wanted = {});
 
 }  // namespace ewa::scene

@@ -24,6 +24,15 @@ double logit(double p) {
     return std::log(p / (1 - p));
 }
 
+/// origin: of the model.
+Region region_of(const TrainOptions& options, const glm::dvec3& origin) {
+    Region region = kEverywhere;
+    if (options.region)
+        for (size_t k = 0; k < region.size(); ++k)
+            region[k] = float((*options.region)[k] - origin[int(k % 3)]);
+    return region;
+}
+
 std::array<float, 3> random_background(int step, uint64_t seed) {
     const auto u = core::uniform4({uint32_t(step), 0x62636b67u, uint32_t(seed), uint32_t(seed >> 32)});
     return {float(u[0]), float(u[1]), float(u[2])};
@@ -350,7 +359,8 @@ void Training::follow_up(int step) {
                           .spread = schedule_.copy_spread,
                           .kernel = options_.render.kernel,
                           .seed = options_.seed,
-                          .step = uint32_t(step)};
+                          .step = uint32_t(step),
+                          .region = region_of(options_, portions_.origin())};
     refine([&](const Phase& phase) { refine_mcmc(portions_, phase, rules); });
 }
 
@@ -368,6 +378,7 @@ void Training::control_density(int step) {
         rules.seed = options_.seed;
         rules.step = uint32_t(step);
         rules.max_splats = options_.max_splats;
+        rules.region = region_of(options_, portions_.origin());
         refine([&](const Phase& phase) { densify(portions_, phase, rules); });
     }
     if (schedule_.resets_opacity(step)) {

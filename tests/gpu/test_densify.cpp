@@ -74,6 +74,10 @@ reference::DensifyOptions options_for(const DensifyRules& rules) {
     options.prune_opacity = 1 / (1 + std::exp(-double(rules.prune_logit)));
     options.prune_scale = rules.prune_scale;
     options.prune_large = rules.prune_scale > 0;
+    for (size_t axis = 0; axis < 3; ++axis) {
+        options.region.low[int(axis)] = double(rules.region[axis]);
+        options.region.high[int(axis)] = double(rules.region[3 + axis]);
+    }
     return options;
 }
 
@@ -121,15 +125,16 @@ pipeline::Refinement run_densify(pipeline::Model& model, const DensifyRules& rul
 struct DensifyCase {
     size_t splats;
     int degree;
-    bool revised_opacity = false;
+    bool revised_opacity = false, region = false;
 };
 class Densify : public testing::TestWithParam<DensifyCase> {};
 
 TEST_P(Densify, WritesTheReferencesNextGeneration) {
-    const auto [splats, degree, revised] = GetParam();
+    const auto [splats, degree, revised, region] = GetParam();
     Start start(2000 + splats, splats, degree);
     DensifyRules rules = rules_for(1u << 20);
     rules.revised_opacity = revised;
+    if (region) rules.region = middle_region(start.gaussians);
     const Expected expected = expected_of(start, rules);
     const auto result = run_densify(start.model, rules);
     ASSERT_EQ(result.before, splats);
@@ -137,7 +142,7 @@ TEST_P(Densify, WritesTheReferencesNextGeneration) {
     ASSERT_EQ(start.model.splats, expected.source.size());
     if (splats > 100) {
         const size_t fresh = size_t(std::count(expected.fresh.begin(), expected.fresh.end(), true));
-        ASSERT_GT(fresh, splats / 10);
+        ASSERT_GT(fresh, region ? splats / 50 : splats / 10);
     }
     const Gaussians actual = download_model(start.model, start.model.params);
     const auto near = [&](const std::vector<float>& a, const std::vector<double>& e, double bound) {
@@ -167,7 +172,8 @@ TEST_P(Densify, WritesTheReferencesNextGeneration) {
 
 INSTANTIATE_TEST_SUITE_P(Sizes, Densify,
                          testing::Values(DensifyCase{3, 0}, DensifyCase{1500, 0}, DensifyCase{777, 1},
-                                         DensifyCase{300, 3}, DensifyCase{1500, 0, true}));
+                                         DensifyCase{300, 3}, DensifyCase{1500, 0, true},
+                                         DensifyCase{1500, 1, false, true}));
 
 /// The kernel that writes, on its own: nothing past its capacity.
 TEST(DensifyEdges, WritesNothingPastItsCapacity) {
@@ -178,6 +184,7 @@ TEST(DensifyEdges, WritesNothingPastItsCapacity) {
     const DensifyRules rules = rules_for(0);
     const uint32_t capacity = 200;
     const auto push = [&](uint32_t new_capacity) {
+        const float far = pipeline::kFarthest;
         return shared::DensifyPush{500,
                                    start.model.planes(),
                                    new_capacity,
@@ -189,7 +196,8 @@ TEST(DensifyEdges, WritesNothingPastItsCapacity) {
                                    {1, 2},
                                    3,
                                    0,
-                                   0};
+                                   0,
+                                   {-far, -far, -far, far, far, far}};
     };
     const uint64_t bytes = pipeline::parameter_bytes(capacity, 1);
     Guarded params("params", bytes), moments("moments", bytes);

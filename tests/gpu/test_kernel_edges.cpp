@@ -93,6 +93,7 @@ Weighed weigh(const Gaussians& gaussians, float dead_logit) {
     push.planes = model.planes();
     push.weight_scale = 1000;
     push.dead_logit = dead_logit;
+    std::ranges::copy(pipeline::kEverywhere, push.region);
     r.run([&](gpu::Recording& recording) {
         r.cache.get<passes::McmcWeigh>().record(recording, {model.params, weights, dead}, push);
     });

@@ -62,7 +62,7 @@ pipeline::Refinement run_refine(pipeline::Model& model, const McmcRules& rules) 
 }
 
 /// The integer weights, from the device: their last bit hangs on its exponential. Checked to that bit here.
-std::vector<uint32_t> device_weights(const McmcStart& start) {
+std::vector<uint32_t> device_weights(const McmcStart& start, const pipeline::Region& region) {
     Rig& r = rig();
     const uint32_t n = uint32_t(start.gaussians.size());
     Guarded weights("weights", 4ull * n), dead("dead", 4ull * n);
@@ -71,6 +71,7 @@ std::vector<uint32_t> device_weights(const McmcStart& start) {
     push.planes = start.model.planes();
     push.weight_scale = float(std::min(65535u, 0xffffffffu / n));
     push.dead_logit = float(std::log(0.005 / 0.995));
+    std::ranges::copy(region, push.region);
     r.run([&](gpu::Recording& recording) {
         r.cache.get<passes::McmcWeigh>().record(recording, {start.model.params, weights, dead}, push);
     });
@@ -79,7 +80,16 @@ std::vector<uint32_t> device_weights(const McmcStart& start) {
     for (uint32_t i = 0; i < n; ++i) {
         const double logit = start.gaussians.opacity_logits[i];
         EXPECT_EQ(flags[i], logit > push.dead_logit ? 0u : 1u);
-        EXPECT_NEAR(result[i], flags[i] ? 0 : std::floor(push.weight_scale * sigmoid(logit)), 1);
+        reference::Region box;
+        for (int axis = 0; axis < 3; ++axis) {
+            box.low[axis] = double(region[size_t(axis)]);
+            box.high[axis] = double(region[size_t(axis) + 3]);
+        }
+        const std::array<float, 3> mean{start.gaussians.means[3 * i], start.gaussians.means[3 * i + 1],
+                                        start.gaussians.means[3 * i + 2]};
+        const bool source = flags[i] == 0 && box.contains({mean[0], mean[1], mean[2]});
+        EXPECT_EQ(result[i] > 0, source);
+        EXPECT_NEAR(result[i], source ? std::floor(push.weight_scale * sigmoid(logit)) : 0, 1);
     }
     return result;
 }
@@ -89,20 +99,22 @@ struct RelocationCase {
     int degree;
     double spread = 0;
     Footprint kernel = Footprint::peak;
+    bool region = false;
 };
 class Relocation : public testing::TestWithParam<RelocationCase> {};
 
 TEST_P(Relocation, WritesTheReferencesNextGeneration) {
-    const auto [splats, degree, spread, kernel] = GetParam();
+    const auto [splats, degree, spread, kernel, region] = GetParam();
     McmcStart start(3000 + splats, splats, degree);
     McmcRules rules = mcmc_rules_for(1u << 20);
     rules.spread = spread;
     rules.kernel = kernel;
-    const auto weights = device_weights(start);
+    if (region) rules.region = middle_region(start.gaussians);
+    const auto weights = device_weights(start, rules.region);
     const uint32_t n = uint32_t(splats), after = uint32_t(std::floor(rules.growth * n));
     std::vector<uint32_t> dead;
     for (uint32_t i = 0; i < n; ++i)
-        if (weights[i] == 0) dead.push_back(i);
+        if (!(start.gaussians.opacity_logits[i] > float(std::log(0.005 / 0.995)))) dead.push_back(i);
     std::vector<uint32_t> random;
     for (uint32_t d = 0; d < dead.size() + after - n; ++d)
         random.push_back(core::pcg4d(
@@ -202,7 +214,8 @@ INSTANTIATE_TEST_SUITE_P(Sizes, Relocation,
                          testing::Values(RelocationCase{3, 0}, RelocationCase{2000, 0},
                                          RelocationCase{777, 1}, RelocationCase{300, 3},
                                          RelocationCase{1000, 1, 0.8},
-                                         RelocationCase{500, 1, 0.8, Footprint::density}));
+                                         RelocationCase{500, 1, 0.8, Footprint::density},
+                                         RelocationCase{2000, 1, 0, Footprint::peak, true}));
 
 TEST(RelocationEdges, SourcesAreDrawnInProportionToTheirOpacity) {
     McmcStart start(3100, 40, 0, -2);

@@ -328,6 +328,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                              {"sh-degree", "2"},
                                              {"absgrad", "true"},
                                              {"revised-opacity", "true"},
+                                             {"region", "-1,-2,-3,0.5,1,2"},
                                              {"loss", "l1=0.5,l2=2,ssim=0.25,alpha=0.5"},
                                              {"exposure", "true"},
                                              {"appearance", "grid"},

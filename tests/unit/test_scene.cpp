@@ -94,6 +94,10 @@ TEST(DensePoints, LieBetweenNeighbours) {
     EXPECT_EQ(limited.positions[5], glm::dvec3(4, 0, 0));
     EXPECT_EQ(limited.positions[6], glm::dvec3(5, 0, 0));
     EXPECT_EQ(scene::with_midpoints(colored, 3).positions.size(), 5u);
+    const PointCloud left =
+        scene::with_midpoints(colored, 100, [](const glm::dvec3& middle) { return middle.x < 1; });
+    ASSERT_EQ(left.positions.size(), 6u);
+    EXPECT_EQ(left.positions[5], glm::dvec3(0.5, 0, 0));
 }
 
 TEST(GaussiansFromPoints, ByHand) {

@@ -115,6 +115,14 @@ TEST(Typing, Colours) {
     EXPECT_NE(not_a_colour("whit").find("did you mean white?"), std::string::npos);
 }
 
+TEST(Typing, Boxes) {
+    EXPECT_EQ(parse_box(" -1, 2e0,-.5,1,2,7"), (std::array<double, 6>{-1, 2, -0.5, 1, 2, 7}));
+    for (const char* text : {"", "1,2,3", "0,0,0,1,1,1,", "0,0,0,1,1,1,1", "0,0,0,1,1,x", "0,0,2,1,1,1",
+                             "0,0,0,1,1,inf", "0,0,0,1,,1"})
+        EXPECT_EQ(parse_box(text), std::nullopt) << text;
+    EXPECT_EQ(not_a_box("1,2"), "'1,2' is not x,y,z,X,Y,Z with the lower corner first");
+}
+
 TEST(Typing, WordsHaveValues) {
     const Words<int> words{{"gray", 1}, {"black", 2}, {"dark", 2}};
     EXPECT_EQ(value_of(words, "dark"), 2);
