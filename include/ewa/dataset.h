@@ -46,7 +46,8 @@ struct Frame {
     bool reduced = false;   // DatasetOptions::max_width has made `source` smaller than the file
     std::filesystem::path mask_path;  // empty: none
     MaskUse masks = MaskUse::cut;     // the use of the file's alpha and mask; never automatic
-    /// A further mask of `camera`'s image, of one channel and any size. Black pixels do not count, whatever `masks` says. Null: none.
+    /// A further mask of `camera`'s image, of one channel and any size. Black pixels do not count and grey ones count
+    /// less, whatever `masks` says. Null: none.
     std::shared_ptr<const Image> left_out;
     /// With left_out, if `masks` cuts: the colour of pixels that are cut out. Empty: they do not count.
     std::optional<std::array<float, 3>> behind;

@@ -50,11 +50,12 @@ struct RunOptions {
     int max_width = 0;           // px; images that are wider after `downscale` are reduced to it; 0: none are
     MaskUse masks = MaskUse::automatic;
     LensUse lens = LensUse::automatic;
-    int test_every = 8;         // every K-th image in name order is held out; 0: none
-    bool skip_blurred = false;  // training images are skipped that are blurred far more than the others
-    bool robust = false;        // masks what single images show and the others do not
-    int eval_every = 0;         // evaluates the held-out views every N steps; 0: only at the end
-    std::string metrics;        // that evaluations measure beside PSNR and SSIM: see metrics_named
+    int test_every = 8;          // every K-th image in name order is held out; 0: none
+    bool skip_blurred = false;   // training images are skipped that are blurred far more than the others
+    bool weigh_blurred = false;  // they count less
+    bool robust = false;         // masks what single images show and the others do not
+    int eval_every = 0;          // evaluates the held-out views every N steps; 0: only at the end
+    std::string metrics;         // that evaluations measure beside PSNR and SSIM: see metrics_named
     std::filesystem::path lpips_weights;  // see Meter; empty: LPIPS is not computed
     bool tensorboard = false;             // also writes the figures of metrics.jsonl as TensorBoard's events
     int save_every = 0;  // saves splats and checkpoint every N steps; 0: the checkpoint every 30 s or more

@@ -163,8 +163,10 @@ COMMAND_LINE = {
     "resume",
     "robust",
     "save-every",
+    "skip-blurred",
     "test-every",
     "transform",
+    "weigh-blurred",
 }
 
 

@@ -1,10 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run/blurred_images.h"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
+#include <memory>
+#include <string>
+#include <utility>
 
 #include "core/parallel.h"
+#include "core/typing.h"
 #include "image/metric.h"
+#include "run/option_rows.h"
 #include "scene/frame_images.h"
 #include "scene/statistics.h"
 
@@ -14,6 +21,7 @@ namespace {
 // How far above the median a blur effect is no accident: in standard deviations, and at least a value that motion over 3 px
 // exceeds.
 constexpr double kDeviations = 4, kLeastBlur = 0.05;
+constexpr float kBlurredWeight = 0.3f;  // in the loss
 
 }  // namespace
 
@@ -31,6 +39,37 @@ std::vector<int> blurred_frames(const Dataset& dataset, const std::vector<int>& 
     for (size_t k = 0; k < frames.size(); ++k)
         if (effects[k] > limit) blurred.push_back(frames[k]);
     return blurred;
+}
+
+void weigh_pixels(Frame& frame, Image weights, const TrainOptions& options) {
+    frame.left_out = std::make_shared<const Image>(std::move(weights));
+    if (!options.random_background && !options.sky) frame.behind = options.render.background;
+}
+
+std::string handle_blurred(Dataset& dataset, Split& split, const RunOptions& options) {
+    constexpr size_t kNamed = 8;
+    const std::vector<int> blurred = blurred_frames(dataset, split.train);
+    if (blurred.empty()) return {};
+    std::string names;
+    for (size_t k = 0; k < std::min(kNamed, blurred.size()); ++k)
+        names += (k == 0 ? ": " : ", ") + dataset.frames[size_t(blurred[k])].name;
+    if (blurred.size() > kNamed) names += fmt::format(" and {} more", blurred.size() - kNamed);
+    std::string done = "skipped";
+    if (options.skip_blurred) {
+        std::erase_if(split.train, [&](int i) { return std::ranges::find(blurred, i) != blurred.end(); });
+    } else {
+        done = blurred.size() == 1 ? "counts less" : "count less";
+        Image weight(1, 1, 1);
+        weight.pixels[0] = kBlurredWeight;
+        for (const int i : blurred) weigh_pixels(dataset.frames[size_t(i)], weight, options.train);
+    }
+    return fmt::format("{} {} blurred and {}{}", core::counted(blurred.size(), "training image"),
+                       core::is_or_are(blurred.size()), done, names);
+}
+
+RunOption weigh_blurred_option() {
+    return later_flag("weigh-blurred", "Images that are blurred far more than the others count less",
+                      [](RunOptions& o) -> bool& { return o.weigh_blurred; });
 }
 
 }  // namespace ewa::train

@@ -14,6 +14,7 @@
 #include "ewa/error.h"
 #include "ewa/metrics.h"
 #include "run/advanced_options.h"
+#include "run/blurred_images.h"
 #include "run/loss_option.h"
 #include "run/option_rows.h"
 #include "run/region_option.h"
@@ -401,6 +402,7 @@ std::vector<Row> rows() {
         {"Data", "",
          later_flag("skip-blurred", "Do not train on images that are blurred far more than the others",
                     [](RunOptions& o) -> bool& { return o.skip_blurred; })},
+        {"Data", "", weigh_blurred_option()},
         {"Data", "",
          later_flag("robust",
                     "Mask what single images show and the others do not, such as people who pass by. A short "

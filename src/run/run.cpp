@@ -422,7 +422,7 @@ void Run::finish(std::unique_ptr<Trainer> trainer) {
     report_.summary.interrupted = !shown || !evaluation.add_section();
     first_render_ = evaluation.first_render();
     fill_summary();
-    report_.left_out = train::left_out_views(input_);
+    if (options().robust) report_.left_out = train::left_out_views(input_);
     report_.metrics = progress_.metrics;
     folder_.save_report(report_);
 }

@@ -119,20 +119,6 @@ Split chosen_frames(const Dataset& dataset, Split split, const std::string& list
     return split;
 }
 
-void skip_blurred(RunInput& input) {
-    constexpr size_t kNamed = 8;
-    const std::vector<int> blurred = blurred_frames(input.dataset, input.split.train);
-    if (blurred.empty()) return;
-    std::string names;
-    for (size_t k = 0; k < std::min(kNamed, blurred.size()); ++k)
-        names += (k == 0 ? ": " : ", ") + input.dataset.frames[size_t(blurred[k])].name;
-    if (blurred.size() > kNamed) names += fmt::format(" and {} more", blurred.size() - kNamed);
-    input.remarks.push_back(fmt::format("{} {} blurred and skipped{}",
-                                        core::counted(blurred.size(), "training image"),
-                                        core::is_or_are(blurred.size()), names));
-    std::erase_if(input.split.train, [&](int i) { return std::ranges::find(blurred, i) != blurred.end(); });
-}
-
 /// Whether the strategy changes the number of splats at least once.
 bool refines(const TrainOptions& options) {
     const Schedule schedule = schedule_for(options);
@@ -357,7 +343,10 @@ RunInput load_run(const RunOptions& options) {
         check_downscale(options.downscale, frame.downscale, frame.pinhole.width, frame.pinhole.height,
                         "the image " + frame.name);
     }
-    if (options.skip_blurred) skip_blurred(input);
+    if (options.skip_blurred || options.weigh_blurred) {
+        const std::string remark = handle_blurred(input.dataset, input.split, options);
+        if (!remark.empty()) input.remarks.push_back(remark);
+    }
     TrainOptions& train = input.options.train;
     if (train.appearance == AppearanceModel::automatic && !train.exposure) {
         const AppearanceChoice choice = choose_appearance(train, input.dataset, input.split.train);
@@ -407,6 +396,12 @@ constexpr std::array kRunExclusions{
     RunExclusion{"--init-opacity",
                  [](const RunOptions& o) { return o.init_opacity != RunOptions().init_opacity; },
                  Relation::excludes, "--points", draws_points, "a sphere has no opacity"},
+    RunExclusion{"--weigh-blurred", [](const RunOptions& o) { return o.weigh_blurred; }, Relation::excludes,
+                 "--skip-blurred", [](const RunOptions& o) { return o.skip_blurred; },
+                 "an image that is skipped has no weight"},
+    RunExclusion{"--weigh-blurred", [](const RunOptions& o) { return o.weigh_blurred; }, Relation::excludes,
+                 "--robust", [](const RunOptions& o) { return o.robust; },
+                 "its scout finds passers-by where all images count alike"},
     RunExclusion{"--robust", [](const RunOptions& o) { return o.robust; }, Relation::excludes, "--points",
                  draws_points, "spheres show no passer-by faintly"},
     RunExclusion{"--nearest",

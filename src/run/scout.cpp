@@ -21,6 +21,7 @@
 #include "portions/collect.h"
 #include "report/pictures.h"
 #include "report/run_file_names.h"
+#include "run/blurred_images.h"
 #include "run/passers_by.h"
 #include "run/run_files.h"
 
@@ -166,8 +167,7 @@ void leave_out(RunInput& input, const Masks& masks) {
     for (size_t i = 0; i < masks.size(); ++i) {
         if (masks[i].pixels.empty()) continue;
         Frame& frame = input.dataset.frames[size_t(input.split.train[i])];
-        frame.left_out = std::make_shared<const Image>(masks[i]);
-        if (!train.random_background && !train.sky) frame.behind = train.render.background;
+        weigh_pixels(frame, masks[i], train);
     }
 }
 
