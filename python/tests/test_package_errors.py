@@ -75,7 +75,7 @@ def calls(data):
         (
             lambda: operators.Projection(1),
             "Projection lacks quats, scales, covars, opacities, viewmats, Ks, width, "
-            "height, eps2d, near, far, radius_clip and compensations",
+            "height, eps2d, near, far, radius_clip, compensations, camera_model and distortions",
         ),
     ]
 
