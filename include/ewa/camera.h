@@ -3,6 +3,7 @@
 #pragma once
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
+#include <optional>
 
 namespace ewa {
 
@@ -33,12 +34,25 @@ struct Distortion {
     bool none() const { return *this == Distortion{}; }
 };
 
+/// Where the sensor of a rolling shutter begins to read the image.
+enum class ReadoutFrom { top, bottom, left, right };
+
+/// A rolling shutter, which reads a row or column after another. Camera's own pose is that of the border where the readout begins.
+/// Between the poses the camera turns at a constant rate about one axis, and its centre moves along a line.
+struct Readout {
+    ReadoutFrom from = ReadoutFrom::top;
+    // The pose when the readout reaches the opposite border: world to camera, as Camera's.
+    glm::dmat3 rotation{1.0};
+    glm::dvec3 translation{0.0};
+};
+
 struct Camera {
     int width = 0, height = 0;              // px
     double fx = 0, fy = 0, cx = 0, cy = 0;  // px; (cx, cy) from the image's top left corner
     glm::dmat3 rotation{1.0};               // world to camera: p_camera = rotation * p_world + translation
     glm::dvec3 translation{0.0};            // world units
     Distortion distortion{};                // of the lens that images are rendered through; none: a pinhole
+    std::optional<Readout> readout{};       // empty: a global shutter
 
     /// The camera's centre in world coordinates, -R^T t.
     glm::dvec3 position() const { return -(glm::transpose(rotation) * translation); }

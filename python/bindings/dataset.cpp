@@ -84,7 +84,9 @@ LoadedDataset opened(const DatasetState& state) {
                          .max_width = max_width});
 }
 
-using CameraState = std::tuple<int, int, std::array<double, 16>, int, std::array<double, 13>>;
+// Where a rolling shutter begins, and the pose at its end.
+using ReadoutState = std::optional<std::array<double, 13>>;
+using CameraState = std::tuple<int, int, std::array<double, 16>, int, std::array<double, 13>, ReadoutState>;
 
 std::array<double, 13> stored_terms(const Distortion& d) {
     return {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4, d.skew};
@@ -94,19 +96,42 @@ Distortion distortion_of(int lens, const std::array<double, 13>& k) {
     return {k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7], k[8], k[9], k[10], k[11], Lens(lens), k[12]};
 }
 
+ReadoutState pickled(const std::optional<Readout>& readout) {
+    if (!readout) return std::nullopt;
+    std::array<double, 13> values{double(readout->from)};
+    for (int i = 0; i < 3; ++i) {
+        for (int k = 0; k < 3; ++k) values[size_t(1 + 3 * i + k)] = readout->rotation[i][k];
+        values[size_t(10 + i)] = readout->translation[i];
+    }
+    return values;
+}
+
+std::optional<Readout> readout_of(const ReadoutState& state) {
+    if (!state) return std::nullopt;
+    const std::array<double, 13>& v = *state;
+    Readout readout{ReadoutFrom(int(v[0])), {}, {}};
+    for (int i = 0; i < 3; ++i) {
+        for (int k = 0; k < 3; ++k) readout.rotation[i][k] = v[size_t(1 + 3 * i + k)];
+        readout.translation[i] = v[size_t(10 + i)];
+    }
+    return readout;
+}
+
 CameraState pickled(const Camera& c) {
     std::array<double, 16> values{c.fx, c.fy, c.cx, c.cy};
     for (int i = 0; i < 3; ++i) {
         for (int k = 0; k < 3; ++k) values[size_t(4 + 3 * i + k)] = c.rotation[i][k];
         values[size_t(13 + i)] = c.translation[i];
     }
-    return {c.width, c.height, values, int(c.distortion.lens), stored_terms(c.distortion)};
+    return {c.width,           c.height, values, int(c.distortion.lens), stored_terms(c.distortion),
+            pickled(c.readout)};
 }
 
 Camera camera_of(const CameraState& state) {
-    const auto& [width, height, v, lens, terms] = state;
+    const auto& [width, height, v, lens, terms, readout] = state;
     Camera c{.width = width, .height = height, .fx = v[0], .fy = v[1], .cx = v[2], .cy = v[3]};
     c.distortion = distortion_of(lens, terms);
+    c.readout = readout_of(readout);
     for (int i = 0; i < 3; ++i) {
         for (int k = 0; k < 3; ++k) c.rotation[i][k] = v[size_t(4 + 3 * i + k)];
         c.translation[i] = v[size_t(13 + i)];

@@ -163,12 +163,12 @@ LensImage lens_image(View v) {
 }
 
 // As project_shape, with the lens's J.
-Projection project_through_lens(View view, mat3 directions, mat3 cofactors, vec3 scale, float low_pass_px) {
+Projection project_through_lens(View view, LensImage image, mat3 directions, mat3 cofactors, vec3 scale, float low_pass_px) {
     Projection p;
     p.view = view;
     p.low_pass = low_pass_px;
     p.scale = scale;
-    p.image = lens_image(view);
+    p.image = image;
     [[unroll]] for (int k = 0; k < 3; ++k) p.axes[k] = directions[k] * scale[k];
     const vec3 x = camera.focal_hi[0] * p.image.jx, y = camera.focal_hi[1] * p.image.jy;
     p.m0 = x * p.axes;

@@ -16,8 +16,8 @@ void brown_curvature(vec2 t, out vec3 x, out vec3 y) {
         2.0 * s3 * vec3(1.0, 0.0, 1.0) + 4.0 * s4 * prism;
 }
 
-// dL/d(point) through J, given dL/d(rows of J): v0 and v1, in the plane.
-vec3 lens_bend_gradient(vec3 p, vec3 v0, vec3 v1) {
+// dL/d(point) through J, given dL/d(rows of J): v0 and v1, in the plane. clamped: of LENS_BROWN's J, else of the point itself.
+vec3 lens_bend_gradient(vec3 p, vec3 v0, vec3 v1, bool clamped) {
     if (camera.lens == LENS_ORTHOGRAPHIC) return vec3(0.0);
     if (camera.lens == LENS_FISHEYE) {
         const Fisheye f = fisheye_slopes(p);
@@ -43,7 +43,7 @@ vec3 lens_bend_gradient(vec3 p, vec3 v0, vec3 v1) {
         return gradient + y * v1;
     }
     const float i = 1.0 / p.z;
-    const vec2 given = p.xy * i, t = brown_tangent(given);
+    const vec2 given = p.xy * i, t = clamped ? brown_tangent(given) : given;
     vec3 jx, jy, cx, cy;
     brown_rows(t, i, jx, jy);
     brown_curvature(t, cx, cy);
@@ -56,19 +56,29 @@ vec3 lens_bend_gradient(vec3 p, vec3 v0, vec3 v1) {
     return i * vec3(by_t, -dot(by_t, t)) - vec3(0.0, 0.0, i * (dot(v0, jx) + dot(v1, jy)));
 }
 
-// dL/d(mean in camera coordinates), through its pixel and through M, whose rows are focal times rows of J times the axes. With
-// KERNEL_DENSITY also through |J|, the length of the rows' cross product. by_log: dL/d ln(|J|).
-vec3 lens_point_gradient(FootprintGradient f, Projection p, float by_log) {
-    const vec2 focal = vec2(camera.focal_hi[0], camera.focal_hi[1]);
-    const vec3 exact = focal.x * f.mean.x * p.image.exact_x + focal.y * f.mean.y * p.image.exact_y;
-    vec3 v0 = focal.x * (p.axes * f.dm0), v1 = focal.y * (p.axes * f.dm1);
+// dL/d(point) through the pixel.
+vec3 exact_gradient(FootprintGradient f, Projection p) {
+    return camera.focal_hi[0] * f.mean.x * p.image.exact_x + camera.focal_hi[1] * f.mean.y * p.image.exact_y;
+}
+
+// dL/d(rows of J), in the plane.
+void lens_row_gradients(FootprintGradient f, Projection p, float by_log, out vec3 v0, out vec3 v1) {
+    v0 = camera.focal_hi[0] * (p.axes * f.dm0);
+    v1 = camera.focal_hi[1] * (p.axes * f.dm1);
     if (KERNEL == KERNEL_DENSITY) {
         const vec3 n = cross(p.image.jx, p.image.jy);
         const float scale = by_log / dot(n, n);
         v0 += scale * cross(p.image.jy, n);
         v1 += scale * cross(n, p.image.jx);
     }
-    return exact + lens_bend_gradient(point_of(p.view), v0, v1);
+}
+
+// dL/d(mean in camera coordinates), through its pixel and through M, whose rows are focal times rows of J times the axes. With
+// KERNEL_DENSITY also through |J|, the length of the rows' cross product. by_log: dL/d ln(|J|).
+vec3 lens_point_gradient(FootprintGradient f, Projection p, float by_log) {
+    vec3 v0, v1;
+    lens_row_gradients(f, p, by_log, v0, v1);
+    return exact_gradient(f, p) + lens_bend_gradient(point_of(p.view), v0, v1, true);
 }
 
 // As focal_gradient, of a lens whose bounds stay.

@@ -111,7 +111,7 @@ Projection project_in_view(PlainSplat splat, ViewBlock view, float low_pass) {
                            vec2(view.tan_min[0], view.tan_min[1]), vec2(view.tan_max[0], view.tan_max[1]));
     const View at = view_of_mean(view, splat.mean);
     const mat3 directions = lens.rotation * splat.directions, cofactors = cofactors_of(lens.rotation) * splat.cofactors;
-    if (LENSES != 0u) return project_through_lens(at, directions, cofactors, splat.scale, low_pass);
+    if (LENSES != 0u) return project_through_lens(at, lens_image(at), directions, cofactors, splat.scale, low_pass);
     return project_shape(at, lens, directions, cofactors, splat.scale, low_pass);
 }
 #endif

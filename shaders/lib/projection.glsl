@@ -16,6 +16,14 @@ struct LensImage {
     bool shown;
 };
 
+// When a rolling shutter sees a splat: readout.glsl fills it.
+struct Readout {
+    float share;  // of the readout
+    vec3 motion;  // v: of the point in camera coordinates (world units a readout)
+    vec3 row;     // r: d(share of the pixel)/d(point); 0 where the share is cut off
+    float gain;   // k
+};
+
 layout(constant_id = SPEC_KERNEL) const uint KERNEL = KERNEL_PEAK;
 
 struct Projection {
@@ -35,6 +43,7 @@ struct Projection {
     float factor;          // the kernel's factor
     vec3 scale;
     LensImage image;       // with SPEC_LENSES; then tangent, tangent_clamped and focal_over_z are not set
+    Readout readout;       // with LENSES_ROLLING
 };
 
 // Chooses the unit in which no square of M overflows.

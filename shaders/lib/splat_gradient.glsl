@@ -3,6 +3,7 @@
 #ifndef EWA_LIB_SPLAT_GRADIENT
 #define EWA_LIB_SPLAT_GRADIENT
 #include "lib/lens_gradient.glsl"
+#include "lib/readout_gradient.glsl"
 
 struct SplatGradient {
     vec3 mean;
@@ -26,11 +27,14 @@ SplatGradient splat_gradient(FootprintGradient f, StoredProjection stored, Store
                              vec3 direction_gradient) {
     const Projection p = stored.footprint;
     SplatGradient result;
-    result.view = LENSES != 0u ? lens_point_gradient(f, p, g) : view_point_gradient(f, p);
-    const mat3 to_world = transpose(camera_rotation());
+    const vec3 by_offset = along_gradient(p, direction, direction_gradient);
+    result.view = ROLLING        ? readout_point_gradient(f, p, g, by_offset)
+                  : LENSES != 0u ? lens_point_gradient(f, p, g)
+                                 : view_point_gradient(f, p);
+    const mat3 to_world = transpose(seen_rotation(p));
     result.torque = f.beside * scale_ratios(splat.log_scale);
     result.quaternion = torque_on_quaternion(stored.unit_quaternion, result.torque) / stored.quaternion_norm;
-    result.mean = to_world * result.view + along_gradient(p, direction, direction_gradient);
+    result.mean = to_world * result.view + by_offset;
     result.logit = g * (KERNEL == KERNEL_DENSITY ? log_softplus_slope(splat.logit) : transparency_of(splat.logit));
     result.log_scale = f.log_scale;
     return result;

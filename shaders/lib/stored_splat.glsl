@@ -6,6 +6,7 @@
 #include "lib/camera.glsl"
 #include "lib/projection.glsl"
 #include "lib/lens.glsl"
+#include "lib/readout.glsl"
 #include "lib/quaternion.glsl"
 
 struct StoredSplat {
@@ -51,6 +52,11 @@ float widest_log_scale(Projection p) {
 // By which splats are ordered, in world units; they are in front of the camera where it is above NEAR_PLANE.
 float depth_of_splat(Projection p) { return LENSES != 0u ? p.image.depth : p.view.z.x; }
 
+// The camera's rotation when it sees the splat.
+mat3 seen_rotation(Projection p) {
+    return ROLLING ? readout_rotation(p.readout.share) * camera_rotation() : camera_rotation();
+}
+
 // The direction in which the camera sees the splat.
 vec3 seen_along(Projection p) {
     if (LENSES != 0u && camera.lens == LENS_ORTHOGRAPHIC)
@@ -71,8 +77,15 @@ StoredProjection project_splat(StoredSplat splat) {
     const Lens lens = camera_lens();
     const mat3 directions = lens.rotation * rotation_of(p.unit_quaternion);
     const vec3 scale = exp(computable_log_scale(splat.log_scale));
-    if (LENSES != 0u)
-        p.footprint = project_through_lens(view, directions, directions, scale, float(LOW_PASS));
+    if (ROLLING) {
+        LensImage image;
+        View seen = view;
+        const Readout readout = read_out(seen, image);
+        const mat3 turned = readout_rotation(readout.share) * directions;
+        p.footprint = project_through_lens(seen, image, turned, turned, scale, float(LOW_PASS));
+        p.footprint.readout = readout;
+    } else if (LENSES != 0u)
+        p.footprint = project_through_lens(view, lens_image(view), directions, directions, scale, float(LOW_PASS));
     else
         p.footprint = project_shape(view, lens, directions, directions, scale, float(LOW_PASS));
     const vec3 far = abs(view.offset);

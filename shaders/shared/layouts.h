@@ -22,7 +22,7 @@ EWA_UINT(SPEC_SHARP, 12u);         // 1: some footprint is sharper than LOW_PASS
 EWA_UINT(SPEC_COLOR_FLOATS, 10u);  // a buffer of colours holds 0: 4 bytes a colour; 1: 4 floats
 EWA_UINT(SPEC_NEAREST, 13u);       // spheres that a pixel draws, at least 1
 EWA_UINT(SPEC_PARTS, 14u);         // 1: an instance counts in one part of its tile: see PART_SIZE
-EWA_UINT(SPEC_LENSES, 15u);        // 1: a camera is not a pinhole
+EWA_UINT(SPEC_LENSES, 15u);        // LENSES_*: what a camera is
 EWA_UINT(SPEC_WRAP, 16u);          // 1: the image's left and right border are one line of the scene
 
 // ---- A splat's parameters ----
@@ -223,7 +223,10 @@ EWA_UINT(RANKED_SUBGROUPS, 8u);
 EWA_UINT(RANKED_LANE_KEYS, 16u);
 
 // ---- Lenses, with SPEC_LENSES ----
-EWA_UINT(LENS_BROWN, 0u);  // of tangents; a pinhole has no terms
+EWA_UINT(LENSES_PINHOLE, 0u);
+EWA_UINT(LENSES_ANY, 1u);      // some camera is not a pinhole
+EWA_UINT(LENSES_ROLLING, 2u);  // some camera moves during its readout; lib/readout.glsl has the formulas
+EWA_UINT(LENS_BROWN, 0u);      // of tangents; a pinhole has no terms
 EWA_UINT(LENS_FISHEYE, 1u);
 EWA_UINT(LENS_EQUIRECTANGULAR, 2u);
 EWA_UINT(LENS_ORTHOGRAPHIC, 3u);
@@ -258,6 +261,11 @@ struct CameraBlock {
     float lens_lo[12];
     float lens_limit;  // LENS_BROWN: largest x^2 + y^2 of tangents; LENS_FISHEYE: largest angle (radians)
     uint lens;         // LENS_*
+    // With LENSES_ROLLING, and zeros where the camera is at rest: scene::ReadoutMotion, in camera axes.
+    float readout_turn[3];   // radians
+    float readout_shift[3];  // world units
+    float readout_slope[2];  // d(share of the readout)/d(pixel)
+    float readout_first;
 };
 
 // A view of the operators, whose matrix need not be a rotation. The values are as the caller gave them.

@@ -16,6 +16,7 @@
 #include "ewa/splat_files.h"
 #include "run/option_table.h"
 #include "scene/dataset_files.h"
+#include "scene/readout.h"
 
 namespace ewa::cli {
 namespace {
@@ -64,7 +65,7 @@ int run(const GradArguments& arguments) {
         if (weights.l2 > 0) json["l2"] = result.l2;
         if (weights.ssim > 0) json["ssim"] = result.ssim;
         if (result.weights.alpha > 0) json["alpha"] = result.alpha;
-        if (options.integrator == Integrator::splat && !options.points)
+        if (options.integrator == Integrator::splat && !options.points && !scene::moves(frame.camera))
             json["camera"] = motion_json(result.camera);
         json["frame"] = index;
         json["name"] = frame.name;

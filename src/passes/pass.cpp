@@ -9,7 +9,7 @@
 namespace ewa::shared {
 
 // The scalar block layout packs these structs without padding, and so does C++.
-static_assert(sizeof(CameraBlock) == 4 * (9 + 9 + 3 + 3 + 8 + 4 + 4 + 24 + 2));
+static_assert(sizeof(CameraBlock) == 4 * (9 + 9 + 3 + 3 + 8 + 4 + 4 + 24 + 2 + 9));
 static_assert(offsetof(CameraBlock, size) == 4 * (9 + 9 + 3 + 3 + 8 + 4));
 static_assert(sizeof(Counts) == 52 && offsetof(Counts, l1) == 16);
 static_assert(sizeof(ProjectPush) == 12 && sizeof(SortPush) == 16 && sizeof(ScanPush) == 8);

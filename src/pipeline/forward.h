@@ -78,7 +78,7 @@ struct FramePasses : passes::Recorder {
                        uint32_t first_index) const;
     /// Moves the model by the mean gradient of the views. rates: of one view; batch_rates turns them into those of the step.
     /// bands: lists of each view; list `view * bands + band`. It reads two of the inputs: the SH degree, and
-    /// whether a camera of the step is not a pinhole.
+    /// what the cameras of the step are.
     void update_views(const Model& model, const ViewBuffers& buffers, const Rates& rates,
                       uint32_t bands = 1) const;
 
@@ -86,7 +86,7 @@ struct FramePasses : passes::Recorder {
     gpu::BufferPart camera() const;
     void add_sky() const;
     gpu::SpecConstant degree() const;
-    gpu::SpecConstant lenses() const { return {shared::SPEC_LENSES, inputs.camera.lens ? 1u : 0u}; }
+    gpu::SpecConstant lenses() const { return {shared::SPEC_LENSES, inputs.camera.lenses}; }
     gpu::SpecConstant wrap() const { return {shared::SPEC_WRAP, inputs.camera.wraps ? 1u : 0u}; }
     gpu::SpecConstant kernel() const { return {shared::SPEC_KERNEL, uint32_t(plan.kernel)}; }
     void compare(const gpu::Buffer& image, const shared::LossPush& push, float share) const;

@@ -9,6 +9,7 @@
 
 #include "ewa/error.h"
 #include "scene/native_lens.h"
+#include "scene/readout.h"
 
 namespace ewa::pipeline {
 namespace {
@@ -31,6 +32,7 @@ void check(const Camera& camera) {
             "a camera with a value that is not finite, or a size or focal length not above zero");
     if (!scene::is_native(camera.distortion))
         throw InputError("splats cannot be rendered through this lens; undistort its images");
+    scene::check_readout(camera);
 }
 
 uint32_t lens_of(const Distortion& lens) {
@@ -44,6 +46,17 @@ uint32_t lens_of(const Distortion& lens) {
         default:
             return shared::LENS_BROWN;
     }
+}
+
+void set_readout(const Camera& camera, shared::CameraBlock& block) {
+    if (!scene::moves(camera)) return;
+    const scene::ReadoutMotion motion = scene::readout_motion(camera);
+    for (int i = 0; i < 3; ++i) {
+        block.readout_turn[i] = float(motion.turn[i]);
+        block.readout_shift[i] = float(motion.shift[i]);
+    }
+    for (int i = 0; i < 2; ++i) block.readout_slope[i] = float(motion.slope[i]);
+    block.readout_first = float(motion.first);
 }
 
 template <class Value, class Convert>
@@ -98,6 +111,7 @@ shared::CameraBlock camera_block(const Camera& camera, const passes::KernelConfi
         block.tiles[i] = (uint32_t(size[i]) + tile[i] - 1) / tile[i];
     }
     set_lens_of(camera, block);
+    set_readout(camera, block);
     return block;
 }
 
@@ -114,7 +128,9 @@ CameraUse use_of(const gpu::Buffer& blocks, uint64_t offset, const Camera& camer
             .offset = offset,
             .width = uint32_t(camera.width),
             .height = uint32_t(camera.height),
-            .lens = !camera.distortion.none(),
+            .lenses = scene::moves(camera)        ? shared::LENSES_ROLLING
+                      : !camera.distortion.none() ? shared::LENSES_ANY
+                                                  : shared::LENSES_PINHOLE,
             .wraps = scene::shows_all_around(camera)};
 }
 

@@ -17,7 +17,7 @@ struct CameraUse {
     const gpu::Buffer* buffer = nullptr;  // CameraBlocks
     uint64_t offset = 0;                  // bytes, aligned as the device requires for uniform blocks
     uint32_t width = 0, height = 0;       // px
-    bool lens = false;                    // not a pinhole
+    uint32_t lenses = 0;                  // LENSES_* of layouts.h
     bool wraps = false;                   // the left and right border of the image are one line of the scene
 };
 

@@ -13,6 +13,7 @@
 #include "pipeline/sky.h"
 #include "pipeline/views.h"
 #include "scene/looks.h"
+#include "scene/readout.h"
 
 namespace ewa {
 namespace {
@@ -294,7 +295,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                                 .loss = weights,
                                 .masks = alpha_is_weight && target.channels == 4,
                                 .alpha = cut,
-                                .motion = true});
+                                .motion = !scene::moves(camera)});
     const Model model = upload_model(*device, gaussians, plan.moment_buffers(), false);
     const gpu::Buffer block = upload_camera(*device, camera, cache.config(), model.origin);
     const gpu::Buffer photo = upload_photo(*device, target);

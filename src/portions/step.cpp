@@ -398,7 +398,8 @@ StepSums Step::draw(const StepParts& parts, std::span<const StepView> views) {
     const Views of{views, bands_};
     const size_t ranks = size_t(portions_.ranks().size()), own = size_t(portions_.ranks().rank());
     std::vector<PartLoss> losses(views.size() * bands_);
-    lenses_ = std::ranges::any_of(views, [](const StepView& view) { return view.inputs.camera.lens; });
+    lenses_ = 0;
+    for (const StepView& view : views) lenses_ = std::max(lenses_, view.inputs.camera.lenses);
     seen_.assign(losses.size(), Seen(size_t(portions_.count())));
     // Lists on the device are drawn at once. In host memory those of all parts wait.
     const size_t round = portions_.streamed() ? losses.size() : ranks;
@@ -453,7 +454,7 @@ void Step::upload_sums(const StepParts& parts, size_t portion) {
 void Step::update(const StepParts& parts, const Rates& rates, int sh_degree,
                   const std::function<void(const passes::Recorder&, const Model&)>& more, StepSums& sums) {
     std::array<uint64_t, 2> own{};
-    const FrameInputs inputs{.camera = {.lens = lenses_}, .sh_degree = sh_degree};
+    const FrameInputs inputs{.camera = {.lenses = lenses_}, .sh_degree = sh_degree};
     portions_.visit(Portions::Need::state, [&](int portion, const Model& model) {
         buffers_.list_indices = portions_.take_list_indices();
         if (portions_.streamed()) upload_sums(parts, size_t(portion));

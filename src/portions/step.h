@@ -111,7 +111,7 @@ class Step {
     pipeline::ViewBuffers buffers_;  // of a portion
     gpu::Buffer own_sums_;           // of the part that this rank draws, unless all is in one portion
     std::vector<Seen> seen_;         // by part of a view
-    bool lenses_ = false;            // a camera of the step is not a pinhole
+    uint32_t lenses_ = 0;            // LENSES_*, of the cameras of the step
     Traffic traffic_;
 };
 

@@ -133,6 +133,32 @@ const Bounds& bounds_of(const Camera& c) {
     return known;
 }
 
+/// The derivatives of rows by p, at a depth of z. A tangent that is not free is constant in its own derivative.
+std::array<std::array<glm::dvec3, 3>, 2> tangent_hessian(const Camera& camera, double z, const Second& u,
+                                                         const Second& v, const Rows& rows,
+                                                         glm::dvec2 tangent, glm::bvec2 is_free) {
+    std::array<std::array<glm::dvec3, 3>, 2> out{};
+    for (int i = 0; i < 2; ++i) {
+        const Second& q = i == 0 ? u : v;
+        const double scale = (i == 0 ? camera.fx : camera.fy) / z;
+        const glm::dvec3& j = i == 0 ? rows.x : rows.y;
+        for (int c = 0; c < 3; ++c) {
+            glm::dvec3& by_point = out[size_t(i)][size_t(c)];
+            by_point = {0, 0, -j[c] / z};
+            for (int k = 0; k < 2; ++k) {
+                if (!is_free[k]) continue;
+                const double slope =
+                    c < 2 ? q.hessian[k][c]
+                          : -(q.hessian[k][0] * tangent.x + q.hessian[k][1] * tangent.y + q.gradient[k]);
+                // d(tangent k)/dp = (1, -tangent) / z.
+                by_point[k] += scale * slope / z;
+                by_point.z -= scale * slope * tangent[k] / z;
+            }
+        }
+    }
+    return out;
+}
+
 /// By tangents: d(a, b)/dp, where a clamped tangent is constant in its own derivative.
 void through_tangents(const Camera& camera, const glm::dvec3& p, LensImage& out) {
     const scene::TangentBounds& bounds = bounds_of(camera).tangents;
@@ -152,24 +178,8 @@ void through_tangents(const Camera& camera, const glm::dvec3& p, LensImage& out)
     out.pixel = {camera.fx * exact.u.value + camera.cx, camera.fy * exact.v.value + camera.cy};
     out.exact = rows_of(exact, given);
     out.jacobian = rows_of(plane, tangent);
-    for (int i = 0; i < 2; ++i) {
-        const Second& q = i == 0 ? plane.u : plane.v;
-        const double scale = (i == 0 ? camera.fx : camera.fy) / p.z;
-        const glm::dvec3& j = i == 0 ? out.jacobian.x : out.jacobian.y;
-        for (int c = 0; c < 3; ++c) {
-            glm::dvec3& by_point = out.hessian[size_t(i)][size_t(c)];
-            by_point = {0, 0, -j[c] / p.z};
-            for (int k = 0; k < 2; ++k) {
-                if (!is_free[k]) continue;
-                const double slope =
-                    c < 2 ? q.hessian[k][c]
-                          : -(q.hessian[k][0] * tangent.x + q.hessian[k][1] * tangent.y + q.gradient[k]);
-                // d(tangent k)/dp = (1, -tangent) / z.
-                by_point[k] += scale * slope / p.z;
-                by_point.z -= scale * slope * tangent[k] / p.z;
-            }
-        }
-    }
+    out.hessian = tangent_hessian(camera, p.z, plane.u, plane.v, out.jacobian, tangent, is_free);
+    out.exact_hessian = tangent_hessian(camera, p.z, exact.u, exact.v, out.exact, given, glm::bvec2(true));
 }
 
 }  // namespace
@@ -199,6 +209,7 @@ LensImage lens_image(const Camera& camera, const glm::dvec3& p) {
         for (int c = 0; c < 3; ++c)
             out.hessian[size_t(i)][size_t(c)] =
                 (i == 0 ? camera.fx * plane.u.hessian[c] : camera.fy * plane.v.hessian[c]);
+    out.exact_hessian = out.hessian;
     return out;
 }
 

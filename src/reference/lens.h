@@ -30,6 +30,7 @@ struct LensImage {
     Rows jacobian;        // J
     /// The derivatives of the rows of J by p: hessian[i][j][k] = dJ_ij/dp_k. Not symmetric where a tangent is clamped.
     std::array<std::array<glm::dvec3, 3>, 2> hessian{};
+    std::array<std::array<glm::dvec3, 3>, 2> exact_hessian{};  // of the rows of `exact`
 };
 
 LensImage lens_image(const Camera& camera, const glm::dvec3& point);

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "scene/native_lens.h"
+#include "scene/readout.h"
 #include "shared/constants.h"
 
 namespace ewa::reference {
@@ -130,7 +131,7 @@ void project_shape(const Splat& splat, const Camera& camera, ProjectionSteps& s)
     s.scale = {std::exp(splat.log_scale.x), std::exp(splat.log_scale.y), std::exp(splat.log_scale.z)};
 
     // In glm, vector * matrix is a row vector times a matrix.
-    s.screen = {jacobian.x * camera.rotation, jacobian.y * camera.rotation};
+    s.screen = {jacobian.x * s.camera_rotation, jacobian.y * s.camera_rotation};
     s.m = {(s.screen.x * s.rotation) * s.scale, (s.screen.y * s.rotation) * s.scale};
 }
 
@@ -151,12 +152,26 @@ double kernel_factor(Footprint kernel, const ProjectionSteps& s, double det) {
     return 0;
 }
 
+/// Where the camera sees the mean.
+void see(const glm::dvec3& mean, const Camera& camera, ProjectionSteps& s) {
+    if (scene::moves(camera)) {
+        s.readout = readout_image(camera, mean, s.image);
+        s.camera_rotation = s.readout.camera.rotation;
+        s.offset = mean - s.readout.camera.position();
+        s.view = s.readout.point;
+        return;
+    }
+    s.camera_rotation = camera.rotation;
+    s.view = camera.rotation * s.offset;
+    s.image = lens_image(camera, s.view);
+}
+
 void evaluate_color(const Splat& splat, const Camera& camera, const RenderOptions& options,
                     ProjectionSteps& s) {
     s.sh_degree = std::clamp(options.sh_degree, 0, splat.sh_degree);
     s.parallel = camera.distortion.lens == Lens::orthographic;
     s.direction =
-        s.parallel ? glm::transpose(camera.rotation) * glm::dvec3(0, 0, 1) : glm::normalize(s.offset);
+        s.parallel ? glm::transpose(s.camera_rotation) * glm::dvec3(0, 0, 1) : glm::normalize(s.offset);
     const auto basis = sh_basis(s.sh_degree, s.direction);
     s.raw_color = glm::dvec3(COLOR_OFFSET);
     for (int j = 0; j < sh_coefficients(s.sh_degree); ++j) s.raw_color += basis[j] * splat.sh[j];
@@ -177,8 +192,7 @@ Projected project(const Splat& splat, const Camera& camera, const RenderOptions&
         out.skipped_nonfinite = true;
         return out;
     }
-    s.view = camera.rotation * s.offset;
-    s.image = lens_image(camera, s.view);
+    see(splat.mean, camera, s);
     out.z = s.image.depth;
     if (!s.image.shown) return out;
 
@@ -254,21 +268,27 @@ void shape_backward(const ProjectionSteps& s, const Rows& by_m, Splat& out) {
 }
 
 /// dL/d(view position) through mean2d and through J. by_log: dL/d ln(optical depth) of a density, whose |J| is
-/// |row0 x row1|; else 0.
-glm::dvec3 view_backward(const ProjectionSteps& s, const Camera& camera, const ScreenGradient& g,
-                         const Rows& by_m, double by_log) {
+/// |row0 x row1|; else 0. by_offset: the colour's dL/d(mean - camera position), which counts here for the time of a readout.
+glm::dvec3 view_backward(const ProjectionSteps& s, const ScreenGradient& g, const Rows& by_m, double by_log,
+                         const glm::dvec3& by_offset) {
     const LensImage& image = s.image;
     glm::dvec3 by_view = g.mean2d.x * image.exact.x + g.mean2d.y * image.exact.y;
     // dL/dJ = dL/dM (W R S)^T, row by row.
     const glm::dmat3 wrs =
-        camera.rotation *
+        s.camera_rotation *
         glm::dmat3(s.rotation[0] * s.scale[0], s.rotation[1] * s.scale[1], s.rotation[2] * s.scale[2]);
     Rows by_j{wrs * by_m.x, wrs * by_m.y};
+    // The camera's rotation turns the axes: that moves M as a turn of the rows the other way would.
+    const double by_axes = s.readout.moves
+                               ? glm::dot(s.readout.turn, glm::cross(by_j.x, image.jacobian.x) +
+                                                              glm::cross(by_j.y, image.jacobian.y))
+                               : 0;
     if (by_log != 0) {
         const glm::dvec3 n = glm::cross(image.jacobian.x, image.jacobian.y);
         by_j.x += by_log / glm::dot(n, n) * glm::cross(image.jacobian.y, n);
         by_j.y += by_log / glm::dot(n, n) * glm::cross(n, image.jacobian.x);
     }
+    if (s.readout.moves) return readout_backward(s.readout, {by_j, by_view, by_axes, by_offset});
     for (size_t c = 0; c < 3; ++c)
         by_view += by_j.x[int(c)] * image.hessian[0][c] + by_j.y[int(c)] * image.hessian[1][c];
     return by_view;
@@ -346,10 +366,11 @@ Splat project_backward(const Splat& splat, const Camera& camera, const RenderOpt
     out.opacity_logit = gradient.opacity * s.kernel_factor * by_logit;
     const glm::dvec3 by_direction = color_backward(splat, s, gradient.color, out);
     const double by_log = projected.density ? gradient.opacity * projected.opacity : 0;
-    const glm::dvec3 by_view = view_backward(s, camera, gradient, by_m, by_log);
+    const glm::dvec3 by_offset = direction_backward(s, by_direction);
+    const glm::dvec3 by_view = view_backward(s, gradient, by_m, by_log, by_offset);
     if (projected.density) shadow_backward(s, by_log, out.log_scale);
-    out.mean = glm::transpose(camera.rotation) * by_view + direction_backward(s, by_direction);
-    if (by_motion)
+    out.mean = glm::transpose(s.camera_rotation) * by_view + by_offset;
+    if (by_motion && !s.readout.moves)
         add_motion_gradient(s, camera, gradient, by_m, by_log, by_view, out.mean, by_direction, *by_motion);
     return out;
 }

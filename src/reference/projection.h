@@ -6,7 +6,7 @@
 //   p          = W (mean - camera position)                   view coordinates
 //   mean2d     = (fx p.x / p.z + cx, fy p.y / p.z + cy)       px, not clamped
 //   J          = [fx/z 0 -fx tx/z; 0 fy/z -fy ty/z]           tx = clamp(p.x / z), ty = clamp(p.y / z)
-// Other lenses: mean2d and J are those of reference/lens.h.
+// Other lenses: mean2d and J are those of reference/lens.h. Through a rolling shutter, p, W and J are those of reference/readout.h.
 //   M          = J W R S                                      2 x 3; R: unit quaternion, S: exp(log scale)
 //   [a b; b c] = M M^T + LOW_PASS * I                         px^2
 //   det0       = det(M M^T) = |row0 x row1|^2                 Cauchy-Binet: squared 2 x 2 minors of M
@@ -29,6 +29,7 @@
 #include "ewa/camera_motion.h"
 #include "ewa/render_options.h"
 #include "reference/lens.h"
+#include "reference/readout.h"
 #include "reference/values.h"
 #include "scene/color.h"
 
@@ -70,8 +71,10 @@ struct ProjectionSteps {
     glm::dvec3 offset{0};  // mean - camera position
     glm::dvec3 view{0};    // p
     LensImage image;
-    glm::dvec2 slope{0};          // (tx, ty); of a pinhole, as the next
-    glm::bvec2 slope_free{true};  // the clamp did not move it
+    ReadoutImage readout;
+    glm::dmat3 camera_rotation{1};  // W
+    glm::dvec2 slope{0};            // (tx, ty); of a pinhole, as the next
+    glm::bvec2 slope_free{true};    // the clamp did not move it
     double quaternion_norm = 0;
     std::array<double, 4> unit_quaternion{};
     glm::dmat3 rotation{1};  // R

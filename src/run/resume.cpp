@@ -67,6 +67,12 @@ void add_camera(Hash& hash, const Camera& camera) {
         hash.add(camera.translation[c]);
         for (int r = 0; r < 3; ++r) hash.add(camera.rotation[c][r]);
     }
+    if (!camera.readout) return;
+    hash.add(int(camera.readout->from));
+    for (int c = 0; c < 3; ++c) {
+        hash.add(camera.readout->translation[c]);
+        for (int r = 0; r < 3; ++r) hash.add(camera.readout->rotation[c][r]);
+    }
 }
 
 void add_distortion(Hash& hash, const Distortion& d) {

@@ -84,6 +84,7 @@ Camera along_path(std::span<const Camera> keys, double time) {
     const Camera& to = keys[std::min(index + 1, keys.size() - 1)];
 
     Camera camera = keys.front();
+    camera.readout.reset();
     const double share = double(camera.width) / from.width, share_to = double(camera.width) / to.width;
     camera.fx = std::pow(from.fx * share, 1 - t) * std::pow(to.fx * share_to, t);
     camera.fy = std::pow(from.fy * share, 1 - t) * std::pow(to.fy * share_to, t);

@@ -11,7 +11,7 @@ namespace ewa {
 /// The camera at `time` on a path through at least one key. Key i is at time i; before the first key and
 /// after the last one the camera stays. Positions follow a uniform Catmull-Rom spline (Catmull and Rom 1974),
 /// which is straight at its ends. Rotations follow the shortest great arc. Focal lengths are geometric means,
-/// relative to the width. Size and relative principal point are the first key's.
+/// relative to the width. Size and relative principal point are the first key's, and the shutter is global.
 Camera along_path(std::span<const Camera> keys, double time);
 
 /// The camera, or one of the same view whose image is reduced to this width. Its height keeps the ratio, rounded.

@@ -288,6 +288,7 @@ Camera orbited(const Camera& camera, const glm::dvec3& target, const glm::dvec3&
     const glm::dmat3 turn(glm::rotate(glm::dmat4(1), angle, up));
     const glm::dvec3 position = target + turn * (camera.position() - target);
     Camera result = camera;
+    result.readout.reset();
     result.rotation = camera.rotation * glm::transpose(turn);
     result.translation = -(result.rotation * position);
     return result;

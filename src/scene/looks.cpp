@@ -5,6 +5,7 @@
 
 #include "core/exclusion.h"
 #include "ewa/error.h"
+#include "scene/readout.h"
 
 namespace ewa::scene {
 namespace {
@@ -51,10 +52,13 @@ void check_look(const Look& look) {
 }
 
 void check_lens(const RenderOptions& render, const Camera& camera) {
-    if (camera.distortion.none()) return;
+    if (camera.distortion.none() && !moves(camera)) return;
     const std::string_view option = render.points                            ? "--points"
                                     : render.integrator != Integrator::splat ? "--integrator"
                                                                              : "";
+    if (moves(camera) && (!option.empty() || render.sky))
+        throw InputError(std::string(option.empty() ? "--background sky" : option) +
+                         " draws no images of a rolling shutter");
     if (!option.empty())
         throw InputError(std::string(option) +
                          " draws through pinholes only; take --lens undistort for images of another lens");

@@ -7,6 +7,7 @@
 
 #include "ewa/error.h"
 #include "scene/looks.h"
+#include "scene/readout.h"
 #include "train/appearance_choice.h"
 
 namespace ewa::train {
@@ -49,8 +50,13 @@ std::vector<uint32_t> cameras_of(const Dataset& dataset, const std::vector<int>&
 void check_lenses(const TrainOptions& options, const Dataset& dataset, const std::vector<int>& frames) {
     for (const int index : frames) {
         const Frame& frame = dataset.frames[size_t(index)];
-        if (frame.camera.distortion.none()) continue;
+        const bool moving = scene::moves(frame.camera);
+        if (frame.camera.distortion.none() && !moving) continue;
         scene::check_lens(options.render, frame.camera);
+        if (moving && (options.refine_poses || options.sky))
+            throw InputError(std::string(options.sky ? "--background sky" : "--refine-poses") +
+                             " takes no rolling shutter, and frame \"" + frame.name + "\" has one");
+        if (moving) continue;
         if (options.refine_focal)
             throw InputError("--refine-focal takes pinholes only, and frame \"" + frame.name +
                              "\" has another lens; take --lens undistort");

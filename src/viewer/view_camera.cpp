@@ -10,6 +10,7 @@
 #include <numbers>
 #include <vector>
 
+#include "scene/readout.h"
 #include "scene/statistics.h"
 
 namespace ewa::viewer {
@@ -190,7 +191,7 @@ double camera_size(const Dataset& dataset, double radius) {
 Viewpoint dataset_view(const Gaussians& gaussians, const Dataset& dataset, int frame) {
     const SceneBounds bounds = scene_bounds(gaussians);
     Viewpoint view;
-    view.camera = dataset.frames.at(size_t(frame)).camera;
+    view.camera = scene::at_middle(dataset.frames.at(size_t(frame)).camera);
     view.up = scene::mean_up(dataset);
     view.radius = bounds.radius;
     const glm::dvec3 forward = axis_of(view.camera, 2), position = view.camera.position();

@@ -131,6 +131,35 @@ INSTANTIATE_TEST_SUITE_P(All, Gradient,
                                     std::to_string(c.sh_degree) + "_kernel" + std::to_string(int(c.kernel));
                          });
 
+/// The splats' gradients of the device and of the reference against central differences of the reference's loss.
+void expect_slopes(const Gaussians& gaussians, const Camera& camera, const Image& target,
+                   const RenderOptions& options, const LossGradient& actual,
+                   const reference::ReferenceGradient& cpu) {
+    reference::Values values = gaussians;
+    const auto loss = [&] { return reference::loss_gradient(values, camera, target, options).loss; };
+    const auto check = [&](const char* group_name, std::vector<double>& group,
+                           const std::vector<float>& of_device, const std::vector<double>& claimed) {
+        std::vector<double> slope;
+        for (size_t i = 0; i < group.size(); ++i)
+            slope.push_back(best_central_difference(loss, group[i], claimed[i], 1e-4, 1e-7));
+        GradientTolerance tolerance;
+        tolerance.cosine = 1e-6;
+        tolerance.norm = 5e-4;
+        tolerance.element_relative = 2e-3;
+        tolerance.element_absolute = 2e-4;
+        EXPECT_TRUE(gradients_agree(claimed, slope, tolerance)) << group_name << " of the reference";
+        EXPECT_TRUE(
+            gradients_agree(std::vector<double>(of_device.begin(), of_device.end()), slope, tolerance))
+            << group_name << " of the device";
+    };
+    const Gaussians& g = actual.gradient;
+    check("means", values.means, g.means, cpu.gradient.means);
+    check("quaternions", values.quaternions, g.quaternions, cpu.gradient.quaternions);
+    check("log scales", values.log_scales, g.log_scales, cpu.gradient.log_scales);
+    check("opacities", values.opacity_logits, g.opacity_logits, cpu.gradient.opacity_logits);
+    check("sh", values.sh, g.sh, cpu.gradient.sh);
+}
+
 /// Through each lens: the device's and the reference's gradient against central differences of the reference's loss.
 TEST(GradientThroughALens, IsTheSlopeOfTheReferencesLoss) {
     for (const Footprint kernel : {Footprint::peak, Footprint::antialias, Footprint::density})
@@ -144,29 +173,7 @@ TEST(GradientThroughALens, IsTheSlopeOfTheReferencesLoss) {
             const LossGradient actual = loss_gradient(device(), gaussians, camera, target, options);
             const reference::ReferenceGradient cpu =
                 reference::loss_gradient(gaussians, camera, target, options);
-            reference::Values values = gaussians;
-            const auto loss = [&] { return reference::loss_gradient(values, camera, target, options).loss; };
-            const auto check = [&](const char* group_name, std::vector<double>& group,
-                                   const std::vector<float>& of_device, const std::vector<double>& claimed) {
-                std::vector<double> slope;
-                for (size_t i = 0; i < group.size(); ++i)
-                    slope.push_back(best_central_difference(loss, group[i], claimed[i], 1e-4, 1e-7));
-                GradientTolerance tolerance;
-                tolerance.cosine = 1e-6;
-                tolerance.norm = 5e-4;
-                tolerance.element_relative = 2e-3;
-                tolerance.element_absolute = 2e-4;
-                EXPECT_TRUE(gradients_agree(claimed, slope, tolerance)) << group_name << " of the reference";
-                EXPECT_TRUE(gradients_agree(std::vector<double>(of_device.begin(), of_device.end()), slope,
-                                            tolerance))
-                    << group_name << " of the device";
-            };
-            const Gaussians& g = actual.gradient;
-            check("means", values.means, g.means, cpu.gradient.means);
-            check("quaternions", values.quaternions, g.quaternions, cpu.gradient.quaternions);
-            check("log scales", values.log_scales, g.log_scales, cpu.gradient.log_scales);
-            check("opacities", values.opacity_logits, g.opacity_logits, cpu.gradient.opacity_logits);
-            check("sh", values.sh, g.sh, cpu.gradient.sh);
+            expect_slopes(gaussians, camera, target, options, actual, cpu);
 
             CameraMotion motion;
             const auto moved_loss = [&] {
@@ -188,6 +195,21 @@ TEST(GradientThroughALens, IsTheSlopeOfTheReferencesLoss) {
                 EXPECT_TRUE(gradients_agree(list(of_device), slope, tolerance))
                     << "camera of the device, " << part;
             }
+        }
+}
+
+/// Through rolling shutters.
+TEST(GradientOfARollingShutter, IsTheSlopeOfTheReferencesLoss) {
+    for (const Footprint kernel : {Footprint::peak, Footprint::antialias, Footprint::density})
+        for (const NamedCamera& rolling : rolling_cameras(5300, 25, 17)) {
+            SCOPED_TRACE(rolling.name);
+            const Gaussians gaussians = gaussians_around(5301, 9, rolling.camera, 1);
+            const Image target = random_target(5302, 25, 17);
+            RenderOptions options;
+            options.kernel = kernel;
+            expect_slopes(gaussians, rolling.camera, target, options,
+                          loss_gradient(device(), gaussians, rolling.camera, target, options),
+                          reference::loss_gradient(gaussians, rolling.camera, target, options));
         }
 }
 

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/ext/quaternion_double.hpp>
 #include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
 
@@ -73,6 +75,27 @@ std::vector<NamedCamera> random_lenses(uint64_t seed, int width, int height) {
     Camera& parallel = add("orthographic", {.lens = Lens::orthographic});
     parallel.fx = 0.2 * width;
     parallel.fy = 0.22 * width;
+    return all;
+}
+
+std::vector<NamedCamera> rolling_cameras(uint64_t seed, int width, int height) {
+    const std::vector<NamedCamera> lenses = random_lenses(seed, width, height);
+    std::vector<NamedCamera> all;
+    for (const char* name : {"top", "bottom", "left", "right"}) {
+        all.push_back({name, lenses[0].camera});
+        all.back().camera.distortion = {};
+    }
+    for (const size_t lens : {0, 2, 3}) all.push_back(lenses[lens]);
+    Random random(seed ^ 0x9011ull);
+    for (size_t i = 0; i < all.size(); ++i) {
+        Camera& camera = all[i].camera;
+        const glm::dvec3 axis = any_direction(random), way = any_direction(random);
+        const double angle = random.uniform(0.14, 0.2);
+        Readout end{ReadoutFrom(i % 4), {}, {}};
+        end.rotation = glm::mat3_cast(glm::angleAxis(angle, axis)) * camera.rotation;
+        end.translation = -(end.rotation * (camera.position() + 0.3 * way));
+        camera.readout = end;
+    }
     return all;
 }
 
