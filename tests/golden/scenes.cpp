@@ -11,6 +11,7 @@
 
 #include "ewa/dataset.h"
 #include "scene/native_lens.h"
+#include "scene/readout.h"
 #include "shared/constants.h"
 #include "support/random_scene.h"
 
@@ -258,6 +259,14 @@ GoldenScene still_life() {
     return s;
 }
 
+/// The still life while the camera turns and rolls: straight lines are bent, and the rows below are later.
+GoldenScene rolling_shutter() {
+    GoldenScene s = still_life();
+    s.name = "rolling_shutter";
+    scene::add_readout(s.camera, ReadoutFrom::top, {0.05, 0.1, 0.3}, {0.1, 0, 0});
+    return s;
+}
+
 }  // namespace
 
 GoldenScene sub_pixel_scene(Footprint kernel) {
@@ -299,6 +308,7 @@ std::vector<GoldenScene> golden_scenes() {
         through_lens("native_fisheye_220", {.k1 = 0.02, .k2 = -0.01, .lens = Lens::fisheye}, 220),
         through_lens("native_360", {.lens = Lens::equirectangular}, 0),
         through_lens("native_orthographic", {.lens = Lens::orthographic}, 0),
+        rolling_shutter(),
     };
     for (GoldenScene& scene : scenes)
         if (scene.options.kernel == Footprint::density) scene.name = "density";

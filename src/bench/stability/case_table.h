@@ -60,4 +60,7 @@ struct Table {
 /// Cameras with other lenses than a pinhole.
 void add_lenses(Table& table);
 
+/// Cameras that move while a rolling shutter reads the image.
+void add_readouts(Table& table);
+
 }  // namespace ewa::bench

@@ -298,7 +298,7 @@ std::vector<StabilityCase> stability_cases() {
     Table table;
     for (const auto add : {add_ordinary, add_axis_ratios, add_scales, add_depths, add_far_from_origin,
                            add_opacities, add_stacks, add_images, add_focal_lengths, add_quaternions,
-                           add_colors, add_replaced, add_points, add_rays, add_lenses})
+                           add_colors, add_replaced, add_points, add_rays, add_lenses, add_readouts})
         add(table);
     return std::move(table.cases);
 }

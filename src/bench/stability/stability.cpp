@@ -18,6 +18,7 @@
 #include "ewa/renderer.h"
 #include "reference/rays.h"
 #include "reference/render.h"
+#include "scene/readout.h"
 #include "shared/constants.h"
 
 namespace ewa::bench {
@@ -221,7 +222,7 @@ Expected expected_of(const StabilityCase& one, const Image& target) {
     expected.excluded =
         on_rays ? reference::Rays(one.gaussians, one.camera, one.options).at_threshold(kAtThreshold)
                 : pixels_at_threshold(expected.reference.rendered);
-    expected.moves_camera = !on_rays && !one.options.points;
+    expected.moves_camera = !on_rays && !one.options.points && !scene::moves(one.camera);
     if (expected.moves_camera) expected.least_camera = least_camera_terms(one, expected.reference);
     for (const double v : expected.reference.rendered.blended.color.values)
         expected.scale = std::max(expected.scale, std::abs(v));
