@@ -16,6 +16,14 @@
 
 namespace ewa {
 
+/// The usual pose of a camera is that of the middle of its readout.
+struct RollingShutter {
+    ReadoutFrom from = ReadoutFrom::top;
+    double degrees = 0;  // by which a camera turns during the readout, about an axis of its own; at most 90
+    double percent =
+        0;  // of its distance to the scene's middle, by which it moves in a direction of its own; 0..100
+};
+
 struct SyntheticOptions {
     /// The number of cameras on a dome over the scene. 0: the file's cameras. Empty: the file's cameras if it
     /// has 8 or more, else 48 on a dome.
@@ -34,7 +42,8 @@ struct SyntheticOptions {
     /// the pinhole gives it.
     Distortion lens{};
     double fisheye_degrees =
-        180;             // what a fisheye's image shows along its smaller side: above 0, at most 360
+        180;  // what a fisheye's image shows along its smaller side: above 0, at most 360
+    std::optional<RollingShutter> rolling_shutter;  // of all cameras, pinholes or fisheyes
     bool sky = false;    // images show the sky, and have no alpha; else they are transparent there
     bool force = false;  // replaces the views of another scene or of other options in the folder
 };
@@ -58,7 +67,7 @@ bool is_mesh_scene(const std::filesystem::path& path);
 /// transport.
 /// - images/*.png: 8 bit, sRGB's curve over min(1, radiance * 2^exposure), with alpha where the sky is
 ///   visible, unless SyntheticOptions::sky shows it.
-/// - depth/*.exr: camera z in world units, through another lens than a pinhole the distance; 0 for the sky.
+/// - depth/*.exr: camera z in world units, through another lens than a pinhole or a rolling shutter the distance; 0 for the sky.
 /// - points.ply: initial points.
 /// - appearance.json, with SyntheticOptions::appearance: what was applied to each image.
 /// - `photographs.json` identifies scene and options. A matching folder is continued. Views of another scene or of

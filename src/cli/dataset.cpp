@@ -13,6 +13,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/datasets/dataset_folders.h"
+#include "scene/readout.h"
 
 namespace ewa::cli {
 namespace {
@@ -21,12 +22,32 @@ namespace fs = std::filesystem;
 
 struct DatasetArguments {
     fs::path scene, output;
-    std::string size = "256x256", exposure = "auto", lens;
+    std::string size = "256x256", exposure = "auto", lens, shutter;
     int views = -1;
     SyntheticOptions options;
     DeviceOptions device;
     bool varied = false, quiet = false;
 };
+
+/// From DIRECTION:DEGREES[,PERCENT].
+RollingShutter shutter_of(const std::string& text) {
+    const auto fail = [&](const std::string& what) {
+        return InputError("--rolling-shutter: " + what +
+                          "; expected DIRECTION:DEGREES[,PERCENT], as in top-to-bottom:3,2");
+    };
+    const size_t colon = text.find(':');
+    const auto from = core::find_value(scene::kReadoutWords, text.substr(0, colon));
+    if (!from)
+        throw fail("'" + text.substr(0, colon) +
+                   "' is not top-to-bottom, bottom-to-top, left-to-right or right-to-left");
+    const std::string numbers = colon == std::string::npos ? "" : text.substr(colon + 1);
+    const size_t comma = numbers.find(',');
+    const auto degrees = core::parse_number(numbers.substr(0, comma));
+    const auto percent =
+        comma == std::string::npos ? std::optional(0.0) : core::parse_number(numbers.substr(comma + 1));
+    if (!degrees || !percent) throw fail("'" + numbers + "' is not a number, or two with a comma");
+    return {*from, *degrees, *percent};
+}
 
 int run(const DatasetArguments& arguments) {
     io::check_not_inside_dataset("-o", arguments.output);
@@ -40,6 +61,7 @@ int run(const DatasetArguments& arguments) {
         options.lens = lens.lens;
         options.fisheye_degrees = lens.fisheye_degrees;
     }
+    if (!arguments.shutter.empty()) options.rolling_shutter = shutter_of(arguments.shutter);
     if (arguments.varied) options.appearance = AppearanceModel::ppisp;
     if (arguments.exposure != "auto") {
         options.exposure = core::parse_number(arguments.exposure);
@@ -90,6 +112,12 @@ Action add_dataset(CLI::App& app) {
     app.add_option("--lens", arguments->lens,
                    std::string("The lens of all cameras, in place of a pinhole: ") + kLensForms)
         ->type_name("LENS");
+    app.add_option("--rolling-shutter", arguments->shutter,
+                   "A rolling shutter of all cameras, as DIRECTION:DEGREES[,PERCENT]. The directions are "
+                   "top-to-bottom, "
+                   "bottom-to-top, left-to-right and right-to-left. During the readout each camera turns by "
+                   "DEGREES and moves by PERCENT of its distance to the scene, in directions of its own")
+        ->type_name("SHUTTER");
     app.add_flag("--sky", options.sky, "Show the sky in the images, which else are transparent there");
     app.add_option("--seed", options.seed,
                    "Seed of random numbers. The same seed on the same device gives the same bytes")

@@ -6,6 +6,7 @@
 
 #include "ewa/error.h"
 #include "scene/native_lens.h"
+#include "scene/readout.h"
 
 namespace ewa::pathtracer {
 
@@ -81,17 +82,15 @@ gpu::Buffer PathTracer::view_of(const Camera& camera, double brightest) {
 
 PathTracer::View PathTracer::see(const Camera& camera, double brightest) {
     View view{view_of(camera, brightest), {}, variant_};
-    const bool lens = !camera.distortion.none();
+    const bool lens = !camera.distortion.none() || scene::moves(camera);
     view.variant.push_back({shared::SPEC_LENSES, lens ? 1u : 0u});
     std::vector<float> rays(lens ? 0 : shared::PIXEL_RAY_FLOATS);
-    const glm::dmat3 to_world = glm::transpose(camera.rotation);
     const double limit = scene::lens_limit(camera);
     for (int y = 0; lens && y <= camera.height; ++y)
         for (int x = 0; x <= camera.width; ++x) {
-            const auto ray = scene::ray_of(camera, limit, x, y);
-            const glm::dvec3 origin =
-                (camera.position() + (ray ? to_world * ray->origin : glm::dvec3(0)) - origin_) / unit_;
-            const glm::dvec3 direction = ray ? to_world * ray->direction : glm::dvec3(0);
+            const auto ray = scene::world_ray(camera, limit, x, y);
+            const glm::dvec3 origin = ((ray ? ray->origin : camera.position()) - origin_) / unit_;
+            const glm::dvec3 direction = ray ? ray->direction : glm::dvec3(0);
             for (int i = 0; i < 3; ++i) rays.push_back(float(origin[i]));
             for (int i = 0; i < 3; ++i) rays.push_back(float(direction[i]));
         }

@@ -28,7 +28,7 @@ class PathTracer {
 
     struct Seen {
         Image
-            depth;  // one channel: camera z of the pixel's centre, or through a lens its distance, in world units; 0: nothing
+            depth;  // one channel: camera z of the pixel's centre, or its distance through a lens or a rolling shutter, in world units; 0: nothing
         std::vector<uint32_t> triangles;  // sorted index in PackedScene::order, 0xffffffff: none
     };
     Seen seen(const Camera& camera);

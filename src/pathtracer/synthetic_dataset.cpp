@@ -27,6 +27,7 @@
 #include "scene/camera.h"
 #include "scene/frustum.h"
 #include "scene/native_lens.h"
+#include "scene/readout.h"
 #include "shared/constants.h"
 
 namespace ewa {
@@ -53,15 +54,18 @@ void check(const SyntheticOptions& o) {
     if (!scene::is_native(o.lens)) throw InputError("lens: splats cannot be rendered through it");
     if (!(o.fisheye_degrees > 0 && o.fisheye_degrees <= 360))
         throw InputError("lens: the angle is not in 0 .. 360");
+    if (o.rolling_shutter && !(std::abs(o.rolling_shutter->degrees) <= 90))
+        throw InputError("rolling shutter: a readout turns by at most 90 degrees");
+    if (o.rolling_shutter && !(o.rolling_shutter->percent >= 0 && o.rolling_shutter->percent <= 100))
+        throw InputError("rolling shutter: a readout moves by 0 .. 100 % of the distance");
     if (o.exposure && !(std::abs(*o.exposure) <= 60)) throw InputError("exposure: is not in -60 .. 60 stops");
 }
 
 /// What a position in the image sees at this depth. limit: scene::lens_limit(camera).
 glm::dvec3 point_at(const Camera& camera, double limit, double x, double y, double depth) {
-    if (camera.distortion.none()) return world_point(camera, x, y, depth);
-    const auto ray = scene::ray_of(camera, limit, x, y);
-    if (!ray) return camera.position();
-    return glm::transpose(camera.rotation) * (ray->origin + depth * ray->direction - camera.translation);
+    if (camera.distortion.none() && !scene::moves(camera)) return world_point(camera, x, y, depth);
+    const auto ray = scene::world_ray(camera, limit, x, y);
+    return ray ? ray->origin + depth * ray->direction : camera.position();
 }
 
 std::vector<Camera> pinholes_for(const scene::MeshScene& scene, const SyntheticOptions& o,
@@ -79,12 +83,29 @@ std::vector<Camera> pinholes_for(const scene::MeshScene& scene, const SyntheticO
     return cameras;
 }
 
+/// Each camera turns about an axis of its own and moves along a line of its own.
+void add_readouts(std::vector<Camera>& cameras, const RollingShutter& shutter, uint64_t seed,
+                  const glm::dvec3& middle) {
+    for (size_t i = 0; i < cameras.size(); ++i) {
+        const auto direction = [&](uint32_t kind) {
+            const auto v = core::normal3({uint32_t(i), kind, uint32_t(seed), 0x726f6c6cu});
+            return glm::normalize(glm::dvec3(v[0], v[1], v[2]));
+        };
+        const double distance = glm::length(cameras[i].position() - middle);
+        scene::add_readout(cameras[i], shutter.from, glm::radians(shutter.degrees) * direction(0),
+                           0.01 * shutter.percent * distance * direction(1));
+        scene::check_readout(cameras[i]);
+    }
+}
+
 std::vector<Camera> cameras_for(const scene::MeshScene& scene, const SyntheticOptions& o,
                                 const std::string& name) {
     std::vector<Camera> cameras = pinholes_for(scene, o, name);
-    if (o.lens.none()) return cameras;
     const glm::dvec3 middle = scene::bounds_of(scene).center();
-    for (Camera& camera : cameras) camera = scene::through_lens(camera, o.lens, o.fisheye_degrees, middle);
+    if (!o.lens.none())
+        for (Camera& camera : cameras)
+            camera = scene::through_lens(camera, o.lens, o.fisheye_degrees, middle);
+    if (o.rolling_shutter) add_readouts(cameras, *o.rolling_shutter, o.seed, middle);
     return cameras;
 }
 
@@ -130,6 +151,12 @@ std::string RenderJob::fingerprint() const {
         for (int i = 0; i < 3; ++i) {
             hash.add(camera.translation[i]);
             for (int j = 0; j < 3; ++j) hash.add(camera.rotation[i][j]);
+        }
+        if (!camera.readout) continue;
+        hash.add(int(camera.readout->from));
+        for (int i = 0; i < 3; ++i) {
+            hash.add(camera.readout->translation[i]);
+            for (int j = 0; j < 3; ++j) hash.add(camera.readout->rotation[i][j]);
         }
     }
     hash.add(options.samples);

@@ -11,6 +11,7 @@
 #include "core/random.h"
 #include "scene/color.h"
 #include "scene/native_lens.h"
+#include "scene/readout.h"
 #include "scene/statistics.h"
 
 namespace ewa::pathtracer {
@@ -75,9 +76,9 @@ void show_sky(Image& radiance, const Camera& camera, const scene::Sky& sky) {
     const double limit = scene::lens_limit(camera);
     for (int y = 0; y < radiance.height; ++y)
         for (int x = 0; x < radiance.width; ++x) {
-            const auto ray = scene::ray_of(camera, limit, x + 0.5, y + 0.5);
+            const auto ray = scene::world_ray(camera, limit, x + 0.5, y + 0.5);
             if (!ray) continue;
-            const float up = float((glm::transpose(camera.rotation) * ray->direction).y);
+            const float up = float(ray->direction.y);
             const glm::vec3 color = glm::mix(sky.horizon, up >= 0 ? sky.zenith : sky.ground, std::abs(up));
             float* pixel = radiance.at(x, y);
             for (int c = 0; c < 3; ++c) pixel[c] += (1 - pixel[3]) * color[c];

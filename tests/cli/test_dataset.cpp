@@ -2,8 +2,13 @@
 // ewa dataset, and ewa train on a mesh scene.
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+
 #include "cli/expect.h"
 #include "ewa/dataset.h"
+#include "scene/readout.h"
 
 namespace {
 
@@ -130,6 +135,66 @@ TEST(Dataset, IsRenderedThroughLenses) {
         EXPECT_EQ(
             run_ewa({"dataset", kScenes + "tea_table.gltf", "-o", folder / "no", "--lens", wrong}).status, 2)
             << wrong;
+}
+
+/// Points are where the rays of the readout meet the surfaces, and the middle of the readout is where the camera usually is.
+TEST(Dataset, IsRenderedByARollingShutter) {
+    const Folder folder;
+    const std::vector<std::string> all{"dataset",   kScenes + "tea_table.gltf",
+                                       "--views",   "4",
+                                       "--size",    "96x64",
+                                       "--samples", "1",
+                                       "--points",  "2000"};
+    const auto rendered = [&](const std::string& name, std::vector<std::string> more) {
+        more.insert(more.begin(), all.begin(), all.end());
+        more.insert(more.end(), {"-o", folder / name});
+        const Outcome made = run_ewa(more);
+        EXPECT_EQ(made.status, 0) << made.err;
+        return ewa::load_dataset(folder / name, {});
+    };
+    const ewa::Dataset still = rendered("still", {}),
+                       rolling = rendered("rolling", {"--rolling-shutter", "right-to-left:5,4"});
+    for (size_t i = 0; i < 4; ++i) {
+        const ewa::Camera& camera = rolling.frames[i].camera;
+        ASSERT_TRUE(camera.readout);
+        EXPECT_EQ(camera.readout->from, ewa::ReadoutFrom::right);
+        const ewa::scene::ReadoutMotion motion = ewa::scene::readout_motion(camera);
+        EXPECT_NEAR(glm::length(motion.turn), glm::radians(5.0), 1e-9);
+        EXPECT_GT(glm::length(motion.shift), 0);
+        const ewa::Camera middle = ewa::scene::at_middle(camera);
+        EXPECT_NEAR(glm::length(middle.position() - still.frames[i].camera.position()), 0, 1e-9);
+        EXPECT_NE(read_file(folder / ("rolling/" + rolling.frames[i].name)),
+                  read_file(folder / ("still/" + rolling.frames[i].name)));
+    }
+    int seen = 0, there = 0;
+    const nlohmann::json top = read_json(folder / "still/transforms.json");
+    for (size_t view = 0; view < 4; ++view) {
+        const ewa::Camera& from = still.frames[view].camera;
+        const ewa::Image depth =
+            ewa::load_image(folder / ("still/" + top["frames"][view]["depth_file_path"].get<std::string>()));
+        for (const glm::dvec3& point : rolling.points.positions) {
+            const glm::dvec3 p = from.rotation * point + from.translation;
+            const double x = from.fx * p.x / p.z + from.cx, y = from.fy * p.y / p.z + from.cy;
+            if (!(p.z > 0 && x >= 0 && x < 96 && y >= 0 && y < 64)) continue;
+            const double z = double(*depth.at(int(x), int(y)));
+            if (p.z > 1.03 * z) continue;
+            ++seen;
+            there += std::abs(p.z - z) < 0.03 * z;
+        }
+    }
+    EXPECT_GT(seen, 100);
+    EXPECT_GT(there, 0.94 * seen);
+    for (const char* wrong :
+         {"top-to-bottom", "top-to-bottom:x", "up:3", "top-to-bottom:3,y", "top-to-bottom:91"})
+        EXPECT_EQ(
+            run_ewa({"dataset", kScenes + "tea_table.gltf", "-o", folder / "no", "--rolling-shutter", wrong})
+                .status,
+            2)
+            << wrong;
+    EXPECT_EQ(run_ewa({"dataset", kScenes + "tea_table.gltf", "-o", folder / "no", "--rolling-shutter",
+                       "top-to-bottom:3", "--lens", "equirect"})
+                  .status,
+              2);
 }
 
 TEST(Dataset, GoesOnWhereItWasEnded) {

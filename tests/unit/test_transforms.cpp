@@ -3,9 +3,11 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "core/json.h"
 #include "ewa/dataset.h"
 #include "io/datasets/image_records.h"
 #include "scene/lens.h"
+#include "scene/readout.h"
 #include "support/temp_folder.h"
 
 namespace {
@@ -272,6 +274,47 @@ TEST(Transforms, OtherLensesAreNamed) {
     Scene fisheye;
     fisheye.model.update({{"is_fisheye", true}, {"k5", 0.1}});
     fisheye.refuse({"frame 0", "k5"});
+}
+
+TEST(Transforms, RollingShutters) {
+    Scene scene;
+    json later = kMatrix;
+    later[0][3] = 1.5;
+    json& first = scene.model["frames"][0];
+    first["rolling_shutter"] = "bottom-to-top";
+    scene.refuse({"frame 0", "\"transform_matrix_start\" is missing"});
+    first["transform_matrix_start"] = kMatrix;
+    scene.refuse({"frame 0", "\"transform_matrix_end\" is missing"});
+    first["transform_matrix_end"] = later;
+    first.erase("transform_matrix");
+    const Dataset dataset = scene.load();
+    EXPECT_FALSE(dataset.frames[0].camera.readout);
+    const Camera& camera = dataset.frames[1].camera;
+    ASSERT_TRUE(camera.readout);
+    EXPECT_EQ(camera.readout->from, ReadoutFrom::bottom);
+    EXPECT_NEAR(camera.position().x, 1, 1e-12);
+    const Camera end = scene::at_share(camera, 1);
+    EXPECT_NEAR(end.position().x, 1.5, 1e-12);
+
+    io::TransformsFile file;
+    file.frames.push_back({"images/b.png", "", camera});
+    io::write_transforms(scene.folder / "transforms.json", file);
+    const Camera again = load_dataset(scene.folder.path(), {}).frames[0].camera;
+    ASSERT_TRUE(again.readout);
+    EXPECT_EQ(again.readout->from, ReadoutFrom::bottom);
+    EXPECT_NEAR(again.position().x, 1, 1e-12);
+    EXPECT_NEAR(scene::at_share(again, 1).position().x, 1.5, 1e-12);
+    const json written = core::read_json_file<json>(scene.folder / "transforms.json");
+    EXPECT_NEAR(written["frames"][0]["transform_matrix"][0][3].get<double>(), 1.25, 1e-12);
+
+    first["rolling_shutter"] = "sideways";
+    scene.refuse({"frame 0", "\"rolling_shutter\"", "'sideways'", "top-to-bottom"});
+    first["rolling_shutter"] = "top-to-bottom";
+    first["k1"] = 0.01;
+    EXPECT_FALSE(scene.load().frames[1].camera.distortion.none());
+    scene.write();
+    expect_error<InputError>([&] { load_dataset(scene.folder.path(), {.lens = LensUse::undistort}); },
+                             {"rolling shutter", "undistorted"});
 }
 
 TEST(Transforms, NamesWhatIsWrong) {

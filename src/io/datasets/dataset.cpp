@@ -16,6 +16,7 @@
 #include "scene/camera.h"
 #include "scene/lens.h"
 #include "scene/native_lens.h"
+#include "scene/readout.h"
 
 namespace ewa {
 
@@ -129,6 +130,7 @@ class CameraCache {
     /// A pinhole, or `source` with its lens.
     Camera of(const Camera& source, const Distortion& distortion) {
         if (distortion.none()) return source;
+        if (scene::moves(source)) return moving(source, distortion);
         const auto known = std::find_if(known_.begin(), known_.end(), [&](const Known& k) {
             const Camera& c = k.source;
             return k.distortion == distortion && c.width == source.width && c.height == source.height &&
@@ -145,6 +147,17 @@ class CameraCache {
     }
 
   private:
+    /// The rows of an undistorted image would be read at no one time.
+    Camera moving(const Camera& source, const Distortion& distortion) const {
+        if (use_ == LensUse::undistort || !scene::is_native(distortion))
+            throw InputError(
+                "images of a rolling shutter cannot be undistorted; --lens native takes pinholes, OpenCV's "
+                "perspective model and fisheyes");
+        Camera native = source;
+        native.distortion = distortion;
+        return native;
+    }
+
     Camera chosen(const Camera& source, const Distortion& distortion) const {
         Camera native = source;
         native.distortion = distortion;

@@ -8,6 +8,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/datasets/view_list.h"
+#include "scene/readout.h"
 
 namespace ewa::io {
 
@@ -37,6 +38,10 @@ RefinedUse use_refined_cameras(Dataset& dataset, const std::filesystem::path& pa
         use.aligned = use.aligned || found->second.aligned;
         const Camera& refined = found->second.camera;
         Camera& camera = frame.camera;
+        if (scene::moves(camera))
+            throw InputError(core::one_line(path.string()) +
+                             ": refined cameras have no rolling shutter, and frame \"" + frame.name +
+                             "\" has one");
         camera.rotation = refined.rotation;
         camera.translation = refined.translation;
         camera.fx = refined.fx * (double(camera.width) / refined.width);

@@ -8,6 +8,9 @@
 //   camera_model, is_fisheye       OPENCV_FISHEYE: fisheye with k1 to k4; FULL_OPENCV: k1 to k6
 //   distortion_params              k1 k2 k3 k4 p1 p2; of FISHEYE624 k1 to k6, p2, p1, s1 to s4: in place of keys of their own
 //   transform_matrix               camera to world; camera axes are OpenGL's (x right, y up, z back)
+//   rolling_shutter                top-to-bottom, bottom-to-top, left-to-right or right-to-left: the order of the readout. Then the frame has
+//   transform_matrix_start, _end   the poses when the readout leaves the first border and reaches the last one, as transform_matrix,
+//                                  which is not read
 //   file_path                      relative to the file's folder; may lack .png, .jpg or .jpeg
 //   mask_path                      the image's mask
 //   ply_file_path                  points, at the top of the file
@@ -23,10 +26,12 @@
 #include "core/json.h"
 #include "core/sandboxed_path.h"
 #include "core/text.h"
+#include "core/words.h"
 #include "ewa/error.h"
 #include "io/datasets/image_records.h"
 #include "io/datasets/rotation.h"
 #include "scene/native_lens.h"
+#include "scene/readout.h"
 
 namespace ewa::io {
 
@@ -169,7 +174,9 @@ void add_notes(const json& top, ImageRecords& records) {
         records.notes.emplace_back(
             "fisheye_crop_radius is not used: masks can hide what is outside the circle");
     if (top.contains("rolling_shutter_time"))
-        records.notes.emplace_back("rolling_shutter_time is not used: ewa has no rolling shutter");
+        records.notes.emplace_back(
+            "rolling_shutter_time is not used: rolling_shutter, transform_matrix_start and _end describe a "
+            "readout");
 }
 
 /// The file that the entry names under this key, relative to `folder`. Empty if it names none.
@@ -249,27 +256,40 @@ void read_intrinsics(const Entry& entry, ImageRecord& image) {
     camera.cy = entry.number("cy").value_or(0.5 * camera.height);
 }
 
-void read_pose(const Entry& entry, Camera& camera) {
-    const json* rows = entry.find("transform_matrix");
-    if (!rows) entry.fail("\"transform_matrix\" is missing");
+void read_pose(const Entry& entry, const char* key, Camera& camera) {
+    const json* rows = entry.find(key);
+    const std::string name = std::string("\"") + key + "\"";
+    if (!rows) entry.fail(name + " is missing");
     if (!rows->is_array() || (rows->size() != 3 && rows->size() != 4))
-        entry.fail("\"transform_matrix\" needs 3 or 4 rows");
+        entry.fail(name + " needs 3 or 4 rows");
     glm::dmat3 axes;
     glm::dvec3 center;
     for (int row = 0; row < 3; ++row) {
         const json& values = (*rows)[size_t(row)];
-        if (!values.is_array() || values.size() != 4)
-            entry.fail("a row of \"transform_matrix\" needs 4 numbers");
+        if (!values.is_array() || values.size() != 4) entry.fail("a row of " + name + " needs 4 numbers");
         for (int column = 0; column < 4; ++column) {
             const json& value = values[size_t(column)];
             if (!value.is_number() || !std::isfinite(value.get<double>()))
-                entry.fail("\"transform_matrix\" holds an entry that is not a finite number");
+                entry.fail(name + " holds an entry that is not a finite number");
             (column < 3 ? axes[column][row] : center[row]) = value.get<double>();
         }
     }
     if (const std::string fault = rotation_fault(axes); !fault.empty())
-        entry.fail("\"transform_matrix\" is not a rotation: " + fault);
+        entry.fail(name + " is not a rotation: " + fault);
     set_pose(camera, from_opengl(nearest_rotation(axes)), center);
+}
+
+void read_poses(const Entry& entry, Camera& camera) {
+    const std::string order = entry.text("rolling_shutter");
+    if (order.empty() || order == "global") return read_pose(entry, "transform_matrix", camera);
+    const auto from = core::find_value(scene::kReadoutWords, order);
+    if (!from)
+        entry.fail("\"rolling_shutter\": '" + order.substr(0, kLongestName) +
+                   "' is not top-to-bottom, bottom-to-top, left-to-right, right-to-left or global");
+    read_pose(entry, "transform_matrix_start", camera);
+    Camera end;
+    read_pose(entry, "transform_matrix_end", end);
+    camera.readout = Readout{*from, end.rotation, end.translation};
 }
 
 Json matrix_of(const Camera& camera) {
@@ -307,7 +327,7 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
         find_image(entry, folder, image);
         if (const auto mask = named_file(entry, "mask_path", folder); !mask.empty())
             image.mask = folder / mask;
-        read_pose(entry, image.camera);
+        read_poses(entry, image.camera);
         read_intrinsics(entry, image);
         result.images.push_back(std::move(image));
     }
@@ -346,6 +366,14 @@ Json model_of(const Distortion& d) {
             {"k6", d.k6}};
 }
 
+/// The poses of a rolling shutter. Other programs read that of the middle.
+void add_readout(const Camera& camera, Json& entry) {
+    if (!camera.readout) return;
+    entry["rolling_shutter"] = core::word_for(scene::kReadoutWords, camera.readout->from);
+    entry["transform_matrix_start"] = matrix_of(camera);
+    entry["transform_matrix_end"] = matrix_of(scene::at_share(camera, 1));
+}
+
 }  // namespace
 
 void write_transforms(const std::filesystem::path& path, const TransformsFile& file) {
@@ -359,7 +387,8 @@ void write_transforms(const std::filesystem::path& path, const TransformsFile& f
         Json entry = {{"file_path", frame.image}, {"w", camera.width},
                       {"h", camera.height},       {"fl_x", camera.fx},
                       {"fl_y", camera.fy},        {"cx", camera.cx},
-                      {"cy", camera.cy},          {"transform_matrix", matrix_of(camera)}};
+                      {"cy", camera.cy},          {"transform_matrix", matrix_of(scene::at_middle(camera))}};
+        add_readout(camera, entry);
         if (!frame.depth.empty()) entry["depth_file_path"] = frame.depth;
         top["frames"].push_back(std::move(entry));
     }
