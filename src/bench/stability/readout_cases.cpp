@@ -26,7 +26,8 @@ Gaussians splats_of_rows(const Change& change = {}) {
 void add_readouts(Table& table) {
     const Camera usual = usual_camera();
     const Camera moderate = rolling(usual, ReadoutFrom::top, {0.1, -0.12, 0.2}, {0.2, 0.1, -0.3});
-    table.add("rolling_rows", "a camera that turns by 15 degrees during its readout", splats_of_rows(), moderate);
+    table.add("rolling_rows", "a camera that turns by 15 degrees during its readout", splats_of_rows(),
+              moderate);
     table.add("rolling_columns", "columns from the right", splats_of_rows(),
               rolling(usual, ReadoutFrom::right, {-0.1, 0.1, 0.1}, {0.1, -0.2, 0.1}));
     // Rows that move down by 0.9 of the image's height: near splats keep up with the readout, and are skipped.
@@ -42,15 +43,12 @@ void add_readouts(Table& table) {
                   s.view.y *= factors[i % std::size(factors)];
               }),
               moderate);
-    table.add("rolling_1:1e4", "needles and discs",
-              splats_of_rows([](Sketch& s, uint32_t i) {
+    table.add("rolling_1:1e4", "needles and discs", splats_of_rows([](Sketch& s, uint32_t i) {
                   s.scale = {0.4, i % 2 == 0 ? 4e-5 : 0.4, 4e-5};
               }),
               moderate);
-    table.add("rolling_wide", "splats larger than the image", splats_of_rows([](Sketch& s, uint32_t) {
-                  s.scale *= 20.0;
-              }),
-              moderate);
+    table.add("rolling_wide", "splats larger than the image",
+              splats_of_rows([](Sketch& s, uint32_t) { s.scale *= 20.0; }), moderate);
     Camera fisheye = usual;
     fisheye.distortion = {.k1 = 0.02, .k2 = -0.01, .lens = Lens::fisheye};
     fisheye.fx = fisheye.fy = 25;
@@ -58,8 +56,8 @@ void add_readouts(Table& table) {
               rolling(fisheye, ReadoutFrom::bottom, {0.1, -0.12, 0.2}, {0.2, 0.1, -0.3}));
     Gaussians damaged = splats_of_rows();
     for (size_t i = 0; i < 30; ++i)
-        damaged.means[3 * (2 * i) + i % 3] = i % 2 ? std::numeric_limits<float>::quiet_NaN()
-                                                   : std::numeric_limits<float>::infinity();
+        damaged.means[3 * (2 * i) + i % 3] =
+            i % 2 ? std::numeric_limits<float>::quiet_NaN() : std::numeric_limits<float>::infinity();
     table.add("rolling_value_nan", "every other splat has a mean that is not finite", damaged, moderate);
 }
 
