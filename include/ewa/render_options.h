@@ -33,10 +33,12 @@ struct RenderOptions {
 
 enum class Drawing {
     color,
-    depth,      // Rendering::depth also
-    count,      // Rendering::count also
-    ellipsoids  // each splat as a solid of ELLIPSOID_REACH standard deviations: the nearest one's shaded
-                // colour
+    depth,         // Rendering::depth also
+    count,         // Rendering::count also
+    ellipsoids,    // each splat as a solid of ELLIPSOID_REACH standard deviations: the nearest one's shaded
+                   // colour
+    median_depth,  // Rendering::median_depth in place of the colour; Integrator::splat without `points`
+    normal         // Rendering::normal in place of the colour; likewise
 };
 
 /// What may differ from one image of a scene to the next.

@@ -23,6 +23,13 @@ struct Rendering {
     Image depth;  // one channel, sum of view z * alpha_i * T_i, divided by alpha where alpha > 0; empty
                   // unless asked for
     Image count;  // one channel, splats blended; empty unless asked for
+    // One channel, view z or the distance through a fisheye or 360° lens: where the ray meets the surface of the
+    // splat that takes the transmittance to a half or below; 0 where none does. Empty unless asked for; then
+    // there is no colour.
+    Image median_depth{};
+    // Three channels, world axes: normals of the splats' surfaces towards the eye, blended as colours are, of
+    // length 1; 0 where no splat is. Empty unless asked for; then there is no colour.
+    Image normal{};
 };
 
 class Renderer {
@@ -35,6 +42,7 @@ class Renderer {
 
     /// Throws InputError when the camera's size is not positive or exceeds what the device can address.
     Rendering render(const Camera& camera, bool with_depth = false);
+    Rendering render(const Camera& camera, Drawing drawing);
 
     /// The same with other options than the renderer's. SH degrees above those it was made for stay off.
     Rendering render(const Camera& camera, const DrawOptions& options);

@@ -11,6 +11,7 @@ layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
 const bool WITH_DEPTH = MODE == BLEND_DEPTH;
 const bool WITH_COUNT = MODE == BLEND_COUNT;
+const bool MEDIAN = MODE == BLEND_MEDIAN;
 
 TEXELS(0, records);
 layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
@@ -29,6 +30,13 @@ void meet_ellipsoid(LaneSplat s, uint p, inout float T, inout vec3 color) {
     const float shade = mix(float(ELLIPSOID_RIM), 1.0, sqrt(max(height, 0.0)));
     color = hit ? shade * s.color : color;
     T = hit ? 0.0 : T;
+}
+
+// The splat's depth at the lane's pixel p, where it takes T to the median.
+void meet_median(LaneSplat s, uint p, float before, float after, inout float depth) {
+    const float u = s.u + s.u_step * float(p), v = s.v + s.v_step * float(p);
+    const float z = max(s.z + s.color.x * u + s.color.y * v, float(NEAR_PLANE));
+    depth = before > float(MEDIAN_TRANSMITTANCE) && after <= float(MEDIAN_TRANSMITTANCE) ? z : depth;
 }
 
 void main() {
@@ -64,7 +72,12 @@ void main() {
                 [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
                     bool blended;
                     const float alpha = alpha_of(raw[p]);
+                    const float before = T[p];
                     const float weight = composite(alpha, T[p], blended);
+                    if (MEDIAN) {
+                        meet_median(s, p, before, T[p], depth[p]);
+                        continue;
+                    }
                     color[p] += weight * s.color;
                     if (WITH_DEPTH) depth[p] += weight * s.z;
                     if (WITH_COUNT) count[p] += blended && alpha > 0.0 ? 1.0 : 0.0;
@@ -76,6 +89,12 @@ void main() {
         if (subgroupAll(!open)) break;
         k += SUBGROUP;
     } while (k < end);
+    if (MEDIAN) {
+        [[unroll]] for (uint p = 0; p < PIXELS; ++p) T[p] = abs(T[p]);
+        STORE_COLUMN(planes, PLANE_T, T);
+        STORE_COLUMN(planes, PLANE_MEDIAN, depth);
+        return;
+    }
     const vec3 background = vec3(push.background[0], push.background[1], push.background[2]);
     float red[PIXELS], green[PIXELS], blue[PIXELS], left[PIXELS];
     [[unroll]] for (uint p = 0; p < PIXELS; ++p) {

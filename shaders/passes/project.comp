@@ -3,7 +3,8 @@
 // Projects splats into pixels.
 // One invocation owns splat i. It reads its parameters and the camera, and writes its record, its depth key and the
 // number of tiles that it reaches. A splat that is not visible gets count 0 and the last key.
-// SPEC_MODE: PROJECT_DEBUG shifts the scales and counts the visible splats.
+// SPEC_MODE, bits: PROJECT_DEBUG shifts the scales and counts the visible splats; PROJECT_NORMALS and PROJECT_SLOPES write
+// the splat's surface in place of its colour.
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_CAMERA 1
 #include "lib/prelude.glsl"
@@ -11,11 +12,12 @@
 #include "lib/stored_splat.glsl"
 #include "lib/footprint.glsl"
 #include "lib/subgroup.glsl"
+#include "lib/surface.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
-const bool DEBUG = MODE == PROJECT_DEBUG;
+const bool DEBUG = (MODE & PROJECT_DEBUG) != 0u;
 
 TEXELS(0, params);
 STORED_TEXELS(2, records);
@@ -33,7 +35,9 @@ bool project(uint i) {
     const Projection p = stored.footprint;
     const float z = depth_of_splat(p);
     bool finite_color;
-    const vec3 color = sh_color(i, p2, seen_along(p), finite_color);
+    vec3 color = sh_color(i, p2, seen_along(p), finite_color);
+    if ((MODE & PROJECT_NORMALS) != 0u) color = normal_of(p);
+    if ((MODE & PROJECT_SLOPES) != 0u) color = vec3(depth_slopes(p), 0.0);
 
     float opacity = stored.peak * p.factor;
     // A NaN stays one.

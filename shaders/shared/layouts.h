@@ -88,13 +88,16 @@ struct ImageLayout {
 EWA_UINT(PLANE_R, 0u);
 EWA_UINT(PLANE_G, 1u);
 EWA_UINT(PLANE_B, 2u);
-EWA_UINT(PLANE_T, 3u);      // transmittance that reaches the background
-EWA_UINT(PLANE_DEPTH, 4u);  // sum of z alpha T
-EWA_UINT(PLANE_COUNT, 4u);  // splats blended; an image has depth or count, not both
+EWA_UINT(PLANE_T, 3u);       // transmittance that reaches the background
+EWA_UINT(PLANE_DEPTH, 4u);   // sum of z alpha T
+EWA_UINT(PLANE_COUNT, 4u);   // splats blended; an image has one of these three
+EWA_UINT(PLANE_MEDIAN, 4u);  // depth of the splat that takes T to MEDIAN_TRANSMITTANCE or below; 0: none does
 
 // ---- SPEC_MODE ----
-// project.comp
-EWA_UINT(PROJECT_DEBUG, 1u);  // shifts the scales, and counts the visible splats
+// project.comp, bits
+EWA_UINT(PROJECT_DEBUG, 1u);    // shifts the scales, and counts the visible splats
+EWA_UINT(PROJECT_NORMALS, 2u);  // in place of the colour: the normal in world axes, towards the eye
+EWA_UINT(PROJECT_SLOPES, 4u);   // in place of the colour: d(depth)/du and d(depth)/dv, for BLEND_MEDIAN
 // project_rays.comp
 EWA_UINT(PROJECT_RAYS_DEEP, 1u);  // a splat counts to MARCH_DEPTH_MIN, not to the cut-off
 // emit_instances.comp
@@ -107,6 +110,7 @@ EWA_UINT(BLEND_COLOR, 0u);
 EWA_UINT(BLEND_DEPTH, 1u);       // also writes PLANE_DEPTH
 EWA_UINT(BLEND_COUNT, 2u);       // also writes PLANE_COUNT
 EWA_UINT(BLEND_ELLIPSOIDS, 3u);  // draws the nearest splat as a solid instead of blending
+EWA_UINT(BLEND_MEDIAN, 4u);      // writes PLANE_MEDIAN and PLANE_T alone, of records with PROJECT_SLOPES
 // radix_scatter.comp, bits
 EWA_UINT(SORT_OWN_INDICES, 1u);  // the values are the items' own indices
 EWA_UINT(SORT_DROP_KEYS, 2u);    // last pass: the sorted keys are not needed

@@ -57,14 +57,36 @@ float normalize(Image& image) {
     return largest;
 }
 
+/// From -1 to 1 to what a file of 8 bits holds; no surface is black.
+void encode_normals(Image& normals) {
+    for (size_t i = 0; i < normals.pixels.size(); i += 3) {
+        float* n = &normals.pixels[i];
+        if (n[0] == 0 && n[1] == 0 && n[2] == 0) continue;
+        for (int c = 0; c < 3; ++c) n[c] = 0.5f + 0.5f * n[c];
+    }
+}
+
+/// What to draw for --mode; opacity comes with colours.
+Drawing drawing_of(const RenderArguments& arguments) {
+    if (arguments.mode == "depth") return Drawing::depth;
+    if (arguments.mode == "median-depth") return Drawing::median_depth;
+    if (arguments.mode == "normal") return Drawing::normal;
+    return Drawing::color;
+}
+
 /// The image to save. remark: a fact that the file itself does not hold.
 Image chosen_image(Rendering&& rendering, const RenderArguments& arguments, std::string& remark) {
     const bool exr = arguments.format == "exr";
     if (arguments.mode == "alpha") return std::move(rendering.alpha);
     if (arguments.mode == "color")
         return exr ? with_alpha(rendering.color, rendering.alpha) : std::move(rendering.color);
-    if (!exr) remark = fmt::format("white is depth {:.6g}", normalize(rendering.depth));
-    return std::move(rendering.depth);
+    if (arguments.mode == "normal") {
+        if (!exr) encode_normals(rendering.normal);
+        return std::move(rendering.normal);
+    }
+    Image& depth = arguments.mode == "depth" ? rendering.depth : rendering.median_depth;
+    if (!exr) remark = fmt::format("white is depth {:.6g}", normalize(depth));
+    return std::move(depth);
 }
 
 /// Saves what the camera shows.
@@ -161,8 +183,8 @@ int render_dataset_views(RenderArguments arguments) {
     for (size_t i = 0; i < frames.size(); ++i) {
         if (interrupted()) return kInterruptedStatus;
         const Frame& frame = dataset.frames[frames[i]];
-        Rendering rendering = renderer.render(frame.camera, arguments.mode == "depth");
-        if (!appearances.empty())
+        Rendering rendering = renderer.render(frame.camera, drawing_of(arguments));
+        if (!appearances.empty() && arguments.mode == "color")
             rendering.color = with_appearance(std::move(rendering.color), appearances[i]);
         skipped = std::max(skipped, renderer.skipped_nonfinite());
 
@@ -216,7 +238,7 @@ int write_views(const RenderArguments& arguments, Renderer& renderer, const std:
     make_folder(files[0].parent_path());
     for (size_t i = 0; i < cameras.size(); ++i) {
         if (interrupted()) return kInterruptedStatus;
-        Rendering rendering = renderer.render(cameras[i], arguments.mode == "depth");
+        Rendering rendering = renderer.render(cameras[i], drawing_of(arguments));
         skipped = std::max(skipped, renderer.skipped_nonfinite());
         std::string remark;
         save_view(files[i], cameras[i], chosen_image(std::move(rendering), arguments, remark));
@@ -326,8 +348,9 @@ Action add_render(CLI::App& app) {
         ->transform(one_of({"png", "jpg", "exr"}))
         ->capture_default_str();
     app.add_option("--mode", arguments->mode,
-                   "color, depth (view z; divided by its maximum in a png) or alpha")
-        ->transform(one_of({"color", "depth", "alpha"}))
+                   "color, alpha, depth (mean view z; divided by its maximum in a png), median-depth (of the "
+                   "surface) or normal (of the surface, in world axes; from -1..1 to 0..1 in a png)")
+        ->transform(one_of({"color", "depth", "alpha", "median-depth", "normal"}))
         ->capture_default_str();
     add_draw_options(app, arguments->draw);
     app.add_option(

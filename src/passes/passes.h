@@ -13,7 +13,7 @@ struct ProjectBuffers {
     gpu::BufferPart params, camera, records, depth_keys, tile_counts, counts;
 };
 
-/// Projects every splat into pixels. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (0 or PROJECT_DEBUG), SPEC_LENSES, SPEC_WRAP.
+/// Projects every splat into pixels. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (PROJECT_*), SPEC_LENSES, SPEC_WRAP.
 struct Project : ProjectBuffers {
     static constexpr char shader[] = "project";
 };

@@ -11,8 +11,16 @@ namespace ewa::pipeline {
 namespace {
 
 /// In the order of Drawing.
-constexpr uint32_t kBlendModes[] = {shared::BLEND_COLOR, shared::BLEND_DEPTH, shared::BLEND_COUNT,
-                                    shared::BLEND_ELLIPSOIDS};
+constexpr uint32_t kBlendModes[] = {shared::BLEND_COLOR,      shared::BLEND_DEPTH,  shared::BLEND_COUNT,
+                                    shared::BLEND_ELLIPSOIDS, shared::BLEND_MEDIAN, shared::BLEND_COLOR};
+
+/// What project writes in place of colours.
+uint32_t project_mode(const Plan& plan) {
+    const uint32_t surface = plan.drawing == Drawing::median_depth ? shared::PROJECT_SLOPES
+                             : plan.drawing == Drawing::normal     ? shared::PROJECT_NORMALS
+                                                                   : 0;
+    return surface | (plan.debug ? shared::PROJECT_DEBUG : 0);
+}
 
 /// The buffer of splats in depth order.
 const gpu::Buffer& record_depth_order(const passes::Recorder& on, uint32_t splats,
@@ -149,7 +157,8 @@ void FramePasses::project(const Model& model) const {
     else if (plan.points())
         record(passes::ProjectPoints{buffers}, push, {degree(), debug});
     else
-        record(passes::Project{buffers}, push, {degree(), debug, kernel(), lenses(), wrap()});
+        record(passes::Project{buffers}, push,
+               {degree(), {shared::SPEC_MODE, project_mode(plan)}, kernel(), lenses(), wrap()});
 }
 
 Sorted FramePasses::draw(uint32_t splats) const {

@@ -16,7 +16,7 @@ struct FrameRequest {
     uint32_t width = 0, height = 0;  // px
     uint32_t instances = 0;          // capacity for (splat, tile) pairs
     bool gradients = false;
-    bool fifth_plane = false;  // of the image: depth or count
+    bool fifth_plane = false;  // of the image: depth, count or median depth
     bool masks = false;        // with gradients: some pixels count less
     // With gradients: what is applied before the loss.
     AppearanceModel appearance = AppearanceModel::none;

@@ -34,6 +34,14 @@ void check_integrator(const PlanRequest& request) {
                std::to_string(request.render.samples));
 }
 
+void check_surface(const PlanRequest& request) {
+    if (request.drawing != Drawing::median_depth && request.drawing != Drawing::normal) return;
+    const std::string what = request.drawing == Drawing::normal ? "normals" : "the median depth";
+    if (request.render.points) throw InputError("--points draws no surface, so " + what + " cannot be drawn");
+    if (request.render.integrator != Integrator::splat)
+        throw InputError("only the integrator splat draws " + what);
+}
+
 }  // namespace
 
 uint32_t Plan::evaluated_degree(int wanted) const {
@@ -42,6 +50,7 @@ uint32_t Plan::evaluated_degree(int wanted) const {
 
 Plan plan_for(const PlanRequest& request) {
     check_integrator(request);
+    check_surface(request);
     Plan plan;
     plan.stored_degree = request.scene_degree;
     plan.kernel = request.render.kernel;

@@ -71,8 +71,12 @@ struct Plan {
     bool points() const { return nearest > 0; }
     /// Buffers of moments, which have the size of the parameters. A gradient takes the place of one.
     int moment_buffers() const { return adam && !packed_moments ? 2 : gradients ? 1 : 0; }
-    /// Whether the image has a fifth plane: depth or count.
-    bool fifth_plane() const { return drawing == Drawing::depth || drawing == Drawing::count; }
+    /// Whether the image has a fifth plane: depth, count or median depth.
+    bool fifth_plane() const {
+        return drawing == Drawing::depth || drawing == Drawing::count || drawing == Drawing::median_depth;
+    }
+    /// Whether the surfaces of splats are drawn in place of their colours.
+    bool surface() const { return drawing == Drawing::median_depth || drawing == Drawing::normal; }
     /// Whether splats are integrated along rays.
     bool rays() const { return integrator != Integrator::splat; }
     /// The SH degree that a frame evaluates.

@@ -167,7 +167,10 @@ void Renderer::State::submit(const Camera& camera, const Plan& plan, const Rende
     scene::check_lens(look, camera);
     const gpu::Buffer block = upload_camera(*device, camera, cache.config(), model.origin);
     FrameInputs inputs = inputs_of(block, camera, look);
-    inputs.sky = sky_of(look);
+    if (plan.surface())
+        inputs.background = {};
+    else
+        inputs.sky = sky_of(look);
     const FrameRequest size{.splats = model.splats,
                             .width = inputs.camera.width,
                             .height = inputs.camera.height,
@@ -175,6 +178,8 @@ void Renderer::State::submit(const Camera& camera, const Plan& plan, const Rende
                             .fifth_plane = plan.fifth_plane(),
                             .rays = plan.rays()};
     if (!parts.empty()) {
+        if (plan.surface())
+            throw RunError("a scene that is larger than the device's limit shows no surfaces");
         if (plan.rays())
             throw RunError("a scene that is larger than the device's limit cannot be integrated along rays");
         submit_parts(plan, inputs, size, then);
@@ -208,11 +213,31 @@ const SkyTexels* Renderer::State::sky_of(const RenderOptions& look) {
     return &sky_texels;
 }
 
+/// To length 1; a zero stays.
+void normalize_texels(Image& normals) {
+    for (size_t i = 0; i < normals.pixels.size(); i += 3) {
+        float* n = &normals.pixels[i];
+        const float length = std::hypot(n[0], n[1], n[2]);
+        for (int c = 0; c < 3; ++c) n[c] = length > 0 ? n[c] / length : 0;
+    }
+}
+
 Rendering Renderer::State::draw(const Camera& camera, const Plan& plan, const RenderOptions& look) {
     submit(camera, plan, look, [](const passes::Recorder&) {});
     const ImageReader planes(frame);
-    Rendering result{planes.image(shared::PLANE_R, 3), planes.image(shared::PLANE_T, 1), {}, {}};
+    Rendering result;
+    result.alpha = planes.image(shared::PLANE_T, 1);
     for (float& value : result.alpha.pixels) value = 1.0f - value;
+    if (plan.drawing == Drawing::median_depth) {
+        result.median_depth = planes.image(shared::PLANE_MEDIAN, 1);
+        return result;
+    }
+    if (plan.drawing == Drawing::normal) {
+        result.normal = planes.image(shared::PLANE_R, 3);
+        normalize_texels(result.normal);
+        return result;
+    }
+    result.color = planes.image(shared::PLANE_R, 3);
     if (plan.drawing == Drawing::count) result.count = planes.image(shared::PLANE_COUNT, 1);
     if (plan.drawing == Drawing::depth) {
         result.depth = planes.image(shared::PLANE_DEPTH, 1);
@@ -229,9 +254,13 @@ Renderer::~Renderer() = default;
 Renderer::Renderer(Renderer&&) noexcept = default;
 
 Rendering Renderer::render(const Camera& camera, bool with_depth) {
+    return render(camera, with_depth ? Drawing::depth : Drawing::color);
+}
+
+Rendering Renderer::render(const Camera& camera, Drawing drawing) {
     State& s = *state_;
     PlanRequest request = s.request;
-    request.drawing = with_depth ? Drawing::depth : Drawing::color;
+    request.drawing = drawing;
     return s.draw(camera, plan_for(request), s.options);
 }
 

@@ -79,6 +79,15 @@ TEST(Outputs, ExrKeepsWhatAPngClamps) {
     EXPECT_EQ(exr.at(0, 0)[3], 0.0f);
     const Image depth = picture("depth", {"--format", "exr", "--mode", "depth"});
     EXPECT_NEAR(depth.at(24, 16)[0], std::sqrt(17.0), 0.01);
+    const Image median = picture("median", {"--format", "exr", "--mode", "median-depth"});
+    EXPECT_NEAR(median.at(24, 16)[0], std::sqrt(17.0), 0.02);
+    EXPECT_EQ(median.at(0, 0)[0], 0.0f);
+    const Image normal = picture("normal", {"--format", "exr", "--mode", "normal"});
+    const float* n = normal.at(24, 16);
+    EXPECT_NEAR(std::hypot(n[0], n[1], n[2]), 1, 1e-4);
+    const Image lifted = picture("lifted", {"--mode", "normal"});
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(lifted.at(24, 16)[c], 0.5 + 0.5 * double(n[c]), 0.01);
+    EXPECT_EQ(lifted.at(0, 0)[0], 0.0f);
     const Image alpha = picture("alpha", {"--mode", "alpha"});
     EXPECT_NEAR(alpha.at(24, 16)[0], 1 / (1 + std::exp(-4.0)), 0.01);
     const Image white = picture("white", {"--background", "0.2,0.4,0.6"});

@@ -296,6 +296,8 @@ TEST_F(Views, WrongUse) {
         {{"--size", "9x9", "--cameras", folder / "d"}, "--cameras"},
         {{"--frames", "test", "-o", out}, "--frames needs --cameras"},
         {{"--mode", "depth", "-o", folder / "film.mp4"}, "--mode color"},
+        {{"--mode", "normal", "--points", "-o", out}, "--points"},
+        {{"--mode", "median-depth", "--integrator", "ray", "-o", out}, "integrator splat"},
     };
     for (const auto& [arguments, text] : cases) expect_failure(render(arguments), 2, text);
     std::filesystem::create_symlink(views, folder / "link.png");

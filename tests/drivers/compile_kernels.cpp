@@ -72,8 +72,9 @@ const Values kBits = {1, 2, 3, 4, 5, 6, 7, 8};
 
 void compile_splatting(Compiler& compiler) {
     using namespace shared;
-    compiler.compile<passes::Project>(
-        {{SPEC_SH_DEGREE, kDegrees}, {SPEC_KERNEL, kFootprints}, {SPEC_MODE, {0, PROJECT_DEBUG}}});
+    compiler.compile<passes::Project>({{SPEC_SH_DEGREE, kDegrees},
+                                       {SPEC_KERNEL, kFootprints},
+                                       {SPEC_MODE, {0, PROJECT_DEBUG, PROJECT_NORMALS, PROJECT_SLOPES}}});
     const uint32_t packed = UPDATE_PACKED_MOMENTS;
     compiler.compile<passes::Update>(
         {{SPEC_SH_DEGREE, kDegrees},
@@ -109,8 +110,9 @@ void compile_splatting(Compiler& compiler) {
     compiler.compile<passes::RadixScatterRanked>({{SPEC_RADIX_BITS, kBits}, {SPEC_MODE, scatter_modes}});
     compiler.compile<passes::EmitInstances>({{SPEC_MODE, {0, EMIT_FIRST_INSTANCES}}});
     compiler.compile<passes::TileStarts>();
-    compiler.compile<passes::Blend>({{SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH, BLEND_COUNT, BLEND_ELLIPSOIDS}},
-                                     {SPEC_KERNEL, {KERNEL_PEAK, KERNEL_DENSITY}}});
+    compiler.compile<passes::Blend>(
+        {{SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH, BLEND_COUNT, BLEND_ELLIPSOIDS, BLEND_MEDIAN}},
+         {SPEC_KERNEL, {KERNEL_PEAK, KERNEL_DENSITY}}});
     compiler.compile<passes::BlendBackward>(
         {{SPEC_MODE,
           {0, BLEND_BACKWARD_ABSOLUTE, BLEND_BACKWARD_ALPHA, BLEND_BACKWARD_ABSOLUTE | BLEND_BACKWARD_ALPHA}},

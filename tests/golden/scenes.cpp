@@ -301,6 +301,8 @@ std::vector<GoldenScene> golden_scenes() {
         mode("mode_color", Shown::color, 0.25),
         mode("mode_depth", Shown::depth, 0.1),
         mode("mode_alpha", Shown::alpha, 1),
+        mode("mode_median_depth", Shown::median_depth, 0.1),
+        mode("mode_normal", Shown::normal, 1),
         poisoned(),
         still_life(),
         spheres(),

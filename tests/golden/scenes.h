@@ -12,7 +12,7 @@
 
 namespace ewa::test {
 
-enum class Shown { color, depth, alpha };
+enum class Shown { color, depth, alpha, median_depth, normal };
 
 struct GoldenScene {
     std::string name;

@@ -8,6 +8,7 @@
 #include "golden/devices.h"
 #include "golden/scenes.h"
 #include "reference/render.h"
+#include "reference/surface.h"
 #include "support/temp_folder.h"
 
 namespace ewa::test {
@@ -25,8 +26,18 @@ Image to_image(const reference::Raster& raster, double scale, bool one_minus = f
     return image;
 }
 
+/// From -1 to 1 to what a picture can hold.
+Image lifted(Image normals) {
+    for (float& v : normals.pixels) v = 0.5f + 0.5f * v;
+    return normals;
+}
+
 Image cpu_picture(const GoldenScene& scene) {
     const auto rendered = reference::render(scene.gaussians, scene.camera, scene.options);
+    const auto surfaces = reference::surfaces(scene.gaussians, scene.camera, scene.options);
+    if (scene.shown == Shown::median_depth)
+        return to_image(reference::median_depth(rendered, surfaces), scene.scale);
+    if (scene.shown == Shown::normal) return lifted(to_image(reference::normals(rendered, surfaces), 1));
     if (scene.shown == Shown::alpha) return to_image(rendered.blended.transmittance, scene.scale, true);
     return to_image(scene.shown == Shown::depth ? rendered.blended.depth : rendered.blended.color,
                     scene.scale);
@@ -34,6 +45,9 @@ Image cpu_picture(const GoldenScene& scene) {
 
 Image device_picture(std::shared_ptr<gpu::Device> device, const GoldenScene& scene) {
     Renderer renderer(std::move(device), scene.gaussians, scene.options);
+    if (scene.shown == Shown::normal) return lifted(renderer.render(scene.camera, Drawing::normal).normal);
+    if (scene.shown == Shown::median_depth)
+        return scaled(renderer.render(scene.camera, Drawing::median_depth).median_depth, scene.scale);
     Rendering rendering = renderer.render(scene.camera, scene.shown == Shown::depth);
     return scaled(scene.shown == Shown::depth   ? std::move(rendering.depth)
                   : scene.shown == Shown::alpha ? std::move(rendering.alpha)

@@ -121,7 +121,7 @@ struct Step {
         gpu::Recording recording = r.recording();
         recording.copy(buffers.visible, 0, frame.records, 0, 48ull * listed(view_part));
         const FramePasses on{{recording, r.cache}, plan, frame, drawn};
-        const Sorted sorted = on.draw_list(listed(view_part));
+        const pipeline::Sorted sorted = on.draw_list(listed(view_part));
         on.loss(photos[view_part / bands]);
         on.list_backward(listed(view_part), sorted, buffers.sums, first_indices[view_part]);
         r.executor.run(recording);
@@ -413,7 +413,7 @@ TEST(ViewBatch, AStepOfOneViewHasTheBytesOfTheFusedKernel) {
                 gpu::Recording recording = rig().recording();
                 const FrameInputs inputs = fused.inputs(seen, 0);
                 const FramePasses on{{recording, rig().cache}, fused.plan, fused.frame, inputs};
-                const Sorted sorted = on.forward(fused.model);
+                const pipeline::Sorted sorted = on.forward(fused.model);
                 on.loss(fused.photos[0]);
                 on.backward(fused.model, sorted, rates);
                 rig().executor.run(recording);
