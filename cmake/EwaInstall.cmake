@@ -65,6 +65,10 @@ if(TARGET ewa_openimageio)
     # Beside libewa, and where EWA_MODULES_FROM_PROGRAMS says for the programs.
     install(TARGETS ewa_openimageio LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/ewa)
 endif()
+if(TARGET ewa_meshing)
+    add_dependencies(ewa_library ewa_meshing)
+    install(TARGETS ewa_meshing LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/ewa)
+endif()
 if(TARGET ewa_mpi)
     add_dependencies(ewa_library ewa_mpi)
     # A package of its own, so that ewa's needs no MPI.

@@ -27,5 +27,6 @@ Action add_devices(CLI::App& app);
 Action add_doctor(CLI::App& app);
 Action add_bench(CLI::App& app);
 Action add_compare(CLI::App& app);
+Action add_mesh(CLI::App& app);
 
 }  // namespace ewa::cli

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa compare: the difference of two images, or of two folders of images with the same names. A splat scene
-// on either side is rendered through the cameras of a dataset.
+// on either side is rendered through the cameras of a dataset. Also two meshes.
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -12,6 +12,7 @@
 
 #include "cli/command.h"
 #include "cli/compare_inputs.h"
+#include "cli/compare_meshes.h"
 #include "cli/metric_arguments.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
@@ -19,6 +20,7 @@
 #include "ewa/error.h"
 #include "ewa/image.h"
 #include "io/datasets/dataset_folders.h"
+#include "io/gltf/mesh.h"
 #include "report/pictures.h"
 #include "scene/dataset_files.h"
 
@@ -38,6 +40,7 @@ struct CompareArguments {
     std::optional<double> threshold;  // dB: the least PSNR
     std::optional<double> max_error;  // the largest difference of two values, alpha included
     double heat_scale = 0.25;
+    std::optional<double> distance;  // of meshes
 };
 
 struct Compared {
@@ -261,15 +264,34 @@ int run(const CompareArguments& arguments) {
     return passed ? 0 : kTooFarApart;
 }
 
+/// Whether both sides are meshes. Throws InputError where one side is, or another option than theirs is given.
+bool compares_meshes(const CLI::App& app, const CompareArguments& arguments) {
+    const bool a = io::is_gltf_mesh(arguments.inputs.a), b = io::is_gltf_mesh(arguments.inputs.b);
+    if (a != b)
+        throw InputError(core::one_line((a ? arguments.inputs.a : arguments.inputs.b).string()) +
+                         " is a mesh, and the other side is none");
+    if (!a) {
+        if (arguments.distance) throw InputError("--distance is for two meshes (.gltf, .glb)");
+        return false;
+    }
+    for (const CLI::Option* option : app.get_options())
+        if (option->count() > 0 && !option->get_lnames().empty() && option->get_lnames()[0] != "json" &&
+            option->get_lnames()[0] != "distance")
+            throw InputError("--" + option->get_lnames()[0] +
+                             " is for images; meshes have --distance and --json");
+    return true;
+}
+
 }  // namespace
 
 Action add_compare(CLI::App& app) {
     const auto arguments = std::make_shared<CompareArguments>();
     app.add_option("A", arguments->inputs.a,
-                   "Image, folder of images, splat file, or folder of a training run")
+                   "Image, folder of images, splat file, folder of a training run, or mesh")
         ->required()
         ->type_name("");
-    app.add_option("B", arguments->inputs.b, "What A is compared with: image, folder, splat file or run")
+    app.add_option("B", arguments->inputs.b,
+                   "What A is compared with: image, folder, splat file, run or mesh")
         ->required()
         ->type_name("");
     app.add_option("--threshold", arguments->threshold,
@@ -288,6 +310,12 @@ Action add_compare(CLI::App& app) {
            "--heat-map", arguments->heat_map,
            "Write the error as an image (.png, .exr); for folders: one image per pair into this folder")
         ->type_name("OUT");
+    app.add_option(
+           "--distance", arguments->distance,
+           "Of two meshes (.gltf, .glb), of which B is the true one: points within this distance count "
+           "in the F-score, in the scene's units [0.005 of B's diagonal]")
+        ->transform(in_range(1e-12, 1e12))
+        ->type_name("D");
     app.add_option("--heat-scale", arguments->heat_scale, "Error that the heat map shows brightest")
         ->transform(in_range(1e-9, 1e9))
         ->type_name("E")
@@ -309,6 +337,10 @@ Action add_compare(CLI::App& app) {
         if (std::find(before.begin(), before.end(), option) == before.end()) option->needs(cameras);
     return [&app, arguments] {
         CompareInputs& inputs = arguments->inputs;
+        if (compares_meshes(app, *arguments)) {
+            compare_meshes({inputs.a, inputs.b, arguments->json, arguments->distance});
+            return 0;
+        }
         if (!inputs.cameras.empty()) inputs.cameras = dataset_input(inputs.cameras);
         resolve_runs(app, inputs);
         return run(*arguments);

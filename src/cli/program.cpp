@@ -91,6 +91,7 @@ int run_arguments(int argc, char** argv) {
         {"dataset", "Renders a mesh scene (glTF) into a dataset to train on", add_dataset},
         {"cameras", "Finds the cameras of photos or of a video, with COLMAP", add_cameras},
         {"bench", "Measures the speed of each pass, and its error against the CPU reference", add_bench},
+        {"mesh", "Makes a mesh of the surfaces in a splat scene", add_mesh},
         {"compare", "Compares two images, folders of images, or splat scenes", add_compare},
     };
     for (Command& command : commands) {

@@ -76,7 +76,8 @@ void use_options_of(const live::Run& run, CLI::App& app) {
                            ": sky.json is missing; the splats are drawn over black");
             continue;  // DrawArguments::load finds it
         }
-        if (name == std::string_view("nearest") && app.count("--points") == 0) continue;
+        const CLI::Option* const points = app.get_option_no_throw("--points");
+        if (name == std::string_view("nearest") && (!points || points->count() == 0)) continue;
         apply_config_value(app, name, *value, config);
     }
 }

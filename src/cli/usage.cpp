@@ -27,10 +27,11 @@ const std::map<std::string, std::string>& subjects() {
                      "bake-sky",     "views",       "size",         "look-at",   "up",        "orbit",
                      "film-seconds", "matching",    "scene-splats", "visible",   "view-time"});
         add("Quality", {"quality", "antialias", "integrator", "samples", "runs", "training-steps"});
-        add("Output", {"output",     "format",  "mode",        "json",        "svg",       "heat-map",
-                       "heat-scale", "serve",   "accuracy",    "spz-version", "check",     "ranks",
-                       "quiet",      "verbose", "results",     "compare",     "threshold", "max-error",
-                       "resume",     "force",   "allow-empty", "protocol"});
+        add("Output",
+            {"output",   "format",   "mode",        "json",      "svg",    "heat-map", "heat-scale",
+             "serve",    "accuracy", "spz-version", "check",     "ranks",  "quiet",    "verbose",
+             "results",  "compare",  "threshold",   "max-error", "resume", "force",    "allow-empty",
+             "protocol", "voxel",    "triangles",   "distance"});
         for (const train::RunOption& option : train::run_options())
             if (!option.subject.empty()) made[option.name] = option.subject;
         return made;

@@ -85,6 +85,8 @@ const std::map<std::string, std::string> kOwners = {{"image.h", "src/image"},
 const std::vector<std::pair<std::string, Modules>> kLibraries = {
     {"OpenImageIO/", {"src/openimageio"}},
     {"mpi.h", {"src/mpi"}},
+    {"openvdb/", {"src/meshing"}},
+    {"meshoptimizer", {"src/meshing"}},
     {"png.h", {"src/image"}},
     {"jpeglib.h", {"src/image"}},
     {"jerror.h", {"src/image"}},

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+// ewa mesh: the surfaces of a splat scene as a mesh, from the depth that the cameras of its run see.
+#include <spdlog/fmt/fmt.h>
+#include <unistd.h>
+#include <CLI/CLI.hpp>
+
+#include <memory>
+#include <numbers>
+#include <optional>
+
+#include "cli/arguments.h"
+#include "cli/command.h"
+#include "cli/interrupt.h"
+#include "cli/output.h"
+#include "cli/run_inputs.h"
+#include "core/text.h"
+#include "core/typing.h"
+#include "ewa/error.h"
+#include "ewa/renderer.h"
+#include "io/datasets/dataset_folders.h"
+#include "io/datasets/refined_cameras.h"
+#include "mesh/colors.h"
+#include "mesh/depth_cache.h"
+#include "mesh/fusion.h"
+#include "mesh/mesh_files.h"
+#include "mesh/meshing.h"
+#include "mesh/parts.h"
+#include "scene/dataset_files.h"
+#include "scene/framing.h"
+
+namespace ewa::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct MeshArguments {
+    fs::path splats, cameras, output;
+    double voxel = 0;   // 0: not given
+    int triangles = 0;  // 0: not given
+    int downscale = 1, max_width = 0;
+    DeviceOptions device;
+    bool quiet = false;
+};
+
+constexpr int kOwnViews = 64, kOwnViewSide = 512;
+/// A part that is smaller than this was seen within the truncation alone.
+constexpr double kLeastPart = 4 * mesh::kTruncation;  // voxels
+
+/// Around the scene from all directions, for splats whose cameras are not known.
+std::vector<Camera> own_cameras(const Gaussians& gaussians) {
+    const scene::Framing framing = scene::frame_scene(gaussians, kOwnViewSide, kOwnViewSide);
+    const double distance = glm::length(framing.camera.position() - framing.target);
+    std::vector<Camera> cameras;
+    for (int i = 0; i < kOwnViews; ++i) {  // on Fibonacci's spiral
+        const double z = 1 - (2 * i + 1.0) / kOwnViews, turn = i * std::numbers::pi * (3 - std::sqrt(5.0));
+        const glm::dvec3 to(std::sqrt(1 - z * z) * std::cos(turn), std::sqrt(1 - z * z) * std::sin(turn), z);
+        cameras.push_back(scene::look_at(framing.target + distance * to, framing.target, framing.up,
+                                         kOwnViewSide, kOwnViewSide));
+    }
+    return cameras;
+}
+
+std::vector<Camera> cameras_of(const Dataset& dataset) {
+    std::vector<Camera> cameras;
+    for (const Frame& frame : dataset.frames) {
+        if (!frame.camera.distortion.none())
+            throw InputError("ewa mesh takes pinholes, and " + core::one_line(frame.name) +
+                             " cannot be undistorted to one");
+        cameras.push_back(frame.camera);
+    }
+    return cameras;
+}
+
+/// The cameras of --cameras or of the run, refined as the run refined them. Empty without both.
+std::optional<Dataset> dataset_of_mesh(const MeshArguments& arguments, const std::optional<live::Run>& run) {
+    fs::path path = arguments.cameras;
+    if (path.empty() && run) path = dataset_of(*run);
+    if (path.empty()) return std::nullopt;
+    Dataset dataset = load_cameras_as_trained(
+        dataset_input(path),
+        {.downscale = arguments.downscale, .max_width = arguments.max_width, .lens = LensUse::undistort});
+    const fs::path refined = arguments.cameras.empty() ? refined_cameras_of(*run) : fs::path();
+    if (!refined.empty()) io::use_refined_cameras(dataset, refined);
+    return dataset;
+}
+
+void check_output(const MeshArguments& arguments, const std::optional<Dataset>& dataset) {
+    mesh::check_mesh_name(arguments.output);
+    io::check_not_inside_dataset("-o", fs::absolute(arguments.output).parent_path());
+    std::vector<NamedFile> read{{"SPLATS", arguments.splats}, {"--cameras", arguments.cameras}};
+    if (dataset) {
+        const std::vector<NamedFile> more = scene::files_of(*dataset, "the dataset");
+        read.insert(read.end(), more.begin(), more.end());
+    }
+    check_command_outputs({{"the mesh", arguments.output}}, read);
+}
+
+/// Half of the machine's memory.
+uint64_t memory_for_volume() {
+    return uint64_t(sysconf(_SC_PHYS_PAGES)) * uint64_t(sysconf(_SC_PAGESIZE)) / 2;
+}
+
+void print(const scene::TriangleMesh& made, double voxel, const MeshArguments& arguments,
+           Progress& progress) {
+    const mesh::Topology topology = mesh::topology_of(made);
+    const std::string border =
+        topology.watertight()
+            ? "watertight"
+            : fmt::format("not watertight: {} at the border{}", core::counted(topology.border_edges, "edge"),
+                          topology.crowded_edges > 0
+                              ? fmt::format(", {} of more than two triangles", topology.crowded_edges)
+                              : "");
+    progress.note(fmt::format("{}: {} in {}, voxels of {:.4g}, {}", core::one_line(arguments.output.string()),
+                              core::counted(made.triangles.size(), "triangle"),
+                              core::counted(topology.parts, "part"), voxel, border));
+}
+
+int make_mesh(const MeshArguments& arguments, const std::optional<live::Run>& run) {
+    RenderOptions options;
+    const DrawArguments draw;
+    const Gaussians gaussians = draw.load(arguments.splats, options);
+    const std::optional<Dataset> dataset = dataset_of_mesh(arguments, run);
+    check_output(arguments, dataset);
+    const std::vector<Camera> cameras = dataset ? cameras_of(*dataset) : own_cameras(gaussians);
+    mesh::meshing();  // says at once that it is missing
+
+    Renderer renderer(open_device(arguments.device), gaussians, options);
+    const InterruptWatch watch;
+    Progress progress("meshed", int(3 * cameras.size()), "views", arguments.quiet);
+    const auto done = [&](size_t steps) {
+        if (interrupted()) throw Interrupted();
+        progress.update(int(steps));
+    };
+    mesh::DepthCache cache(cameras.size(), [&](size_t i) {
+        return renderer.render(cameras[i], Drawing::median_depth).median_depth;
+    });
+    const mesh::DepthOfView depth = [&](size_t i) -> const Image& { return cache.at(i); };
+    mesh::Fused fused =
+        mesh::fuse(cameras, depth, {.voxel = arguments.voxel, .most_bytes = memory_for_volume()}, done);
+    scene::TriangleMesh& made = fused.mesh;
+    mesh::drop_small_parts(made, kLeastPart * fused.voxel);
+    if (made.triangles.empty())
+        throw InputError(
+            fmt::format("no surface is as large as {:g} voxels of {:.3g}; take a smaller --voxel", kLeastPart,
+                        fused.voxel));
+    if (arguments.triangles > 0) mesh::simplify(made, size_t(arguments.triangles));
+    mesh::set_normals(made);
+    mesh::set_colors(
+        made, cameras, depth, [&](size_t i) { return renderer.render(cameras[i]).color; },
+        mesh::kTruncation * fused.voxel, [&](size_t views) { done(2 * cameras.size() + views); });
+    make_folder(arguments.output.parent_path());
+    mesh::save_mesh(arguments.output, made);
+    print(made, fused.voxel, arguments, progress);
+    return 0;
+}
+
+int run(CLI::App& app, MeshArguments& arguments) {
+    SplatInput input = splat_input(arguments.splats);
+    arguments.splats = input.file;
+    if (!input.run) input.run = live::run_of_splats(arguments.splats);
+    if (input.run && input.run->flag("points"))
+        throw InputError(core::one_line(arguments.splats.string()) +
+                         " holds the spheres of --points, which have no surfaces");
+    if (input.run) use_options_of(*input.run, app);
+    return make_mesh(arguments, input.run);
+}
+
+}  // namespace
+
+Action add_mesh(CLI::App& app) {
+    const auto arguments = std::make_shared<MeshArguments>();
+    add_splats(app, arguments->splats);
+    app.add_option("-o,--output", arguments->output, "The mesh (.ply, .obj, .glb)")
+        ->required()
+        ->type_name("OUT");
+    app.add_option("--cameras", arguments->cameras,
+                   "Dataset whose cameras see the surfaces [that of the run; without a run, cameras all "
+                   "around the splats]")
+        ->type_name("DATASET");
+    app.add_option("--voxel", arguments->voxel,
+                   "Distance of the mesh's vertices, in the scene's units [two pixels on the surfaces]")
+        ->transform(in_range(1e-12, 1e12))
+        ->type_name("SIZE");
+    app.add_option("--triangles", arguments->triangles,
+                   "At most this many triangles, where the surface needs no more to hang together [all]")
+        ->transform(in_range(4, 1000000000))
+        ->type_name("N");
+    add_size_options(app, arguments->downscale, arguments->max_width);
+    add_device_options(app, arguments->device);
+    add_quiet_option(app, arguments->quiet);
+    return [&app, arguments] { return run(app, *arguments); };
+}
+
+}  // namespace ewa::cli

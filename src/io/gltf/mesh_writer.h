@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// A mesh as a binary glTF 2.0.
+#pragma once
+#include <filesystem>
+
+#include "scene/triangle_mesh.h"
+
+namespace ewa::io {
+
+/// Positions, normals, and colours in linear light; the material is unlit (KHR_materials_unlit), because the colours hold the light of the
+/// scene. The node's translation is mesh.origin. The same mesh gives the same bytes. Throws InputError above 4 GiB, RunError (disk).
+void write_glb_mesh(const std::filesystem::path& path, const scene::TriangleMesh& mesh);
+
+}  // namespace ewa::io

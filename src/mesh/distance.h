@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far two surfaces are apart.
+#pragma once
+#include <array>
+#include <cstddef>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "pathtracer/hierarchy.h"
+#include "scene/mesh_scene.h"
+#include "scene/triangle_mesh.h"
+
+namespace ewa::mesh {
+
+/// Triangles in which the nearest point to any other is found.
+class Surface {
+  public:
+    /// At least one of the scene's triangles has an area.
+    explicit Surface(const scene::MeshScene& scene);
+
+    struct Nearest {
+        double distance = 0;  // world units
+        size_t triangle = 0;
+        glm::dvec3 normal{0};  // of the triangle, of length 1
+    };
+    Nearest nearest(const glm::dvec3& point) const;
+
+    struct Point {
+        glm::dvec3 position{0}, normal{0};
+    };
+    /// Point i of `count` points that are spread evenly over the area. seed, i and count decide where it is.
+    Point sample(size_t i, size_t count, uint32_t seed) const;
+
+    double area() const { return areas_.empty() ? 0 : areas_.back(); }
+    double diagonal() const;  // of the box around all triangles
+
+  private:
+    std::vector<std::array<glm::dvec3, 3>> triangles_;  // those with an area
+    std::vector<double> areas_;                         // summed up to and including each
+    pathtracer::Hierarchy hierarchy_;
+};
+
+struct SurfaceDifference {
+    double accuracy = 0;      // mean distance of points of A from B
+    double completeness = 0;  // mean distance of points of B from A
+    double chamfer() const { return (accuracy + completeness) / 2; }
+    double threshold = 0;
+    double precision = 0;  // share of A's points within the threshold
+    double recall = 0;     // share of B's points within the threshold
+    double f_score() const {
+        return precision + recall > 0 ? 2 * precision * recall / (precision + recall) : 0;
+    }
+    double normal_error = 0;  // degrees: mean angle of A's normals to those of B, without their signs
+};
+
+/// points: on each surface.
+SurfaceDifference difference(const Surface& a, const Surface& b, double threshold, size_t points = 100000);
+
+/// The triangles as a mesh whose vertices at equal places are one, for its topology.
+scene::TriangleMesh joined(const scene::MeshScene& scene);
+
+}  // namespace ewa::mesh

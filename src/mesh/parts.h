@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// The parts of a mesh, its border, and what is left of it without small parts or with fewer triangles.
+#pragma once
+#include <cstddef>
+
+#include "scene/triangle_mesh.h"
+
+namespace ewa::mesh {
+
+struct Topology {
+    size_t parts = 0;          // connected by shared vertices
+    size_t border_edges = 0;   // of one triangle
+    size_t crowded_edges = 0;  // of more than two
+    /// Whether the surface has an inside: every edge is that of two triangles.
+    bool watertight() const { return border_edges == 0 && crowded_edges == 0; }
+};
+Topology topology_of(const scene::TriangleMesh& mesh);
+
+/// Drops parts whose box has a diagonal below `least`, triangles with two equal corners, and vertices without triangles.
+/// Returns the number of dropped parts.
+size_t drop_small_parts(scene::TriangleMesh& mesh, double least);
+
+/// At most `most` triangles, as far as the topology allows it. Throws RunError where the module is not here.
+void simplify(scene::TriangleMesh& mesh, size_t most);
+
+/// Fills mesh.normals with means over the triangles at a vertex, weighted by their area.
+void set_normals(scene::TriangleMesh& mesh);
+
+}  // namespace ewa::mesh
