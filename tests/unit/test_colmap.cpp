@@ -366,6 +366,9 @@ TEST(ColmapWriter, WhatIsWrittenIsReadBack) {
     }
     EXPECT_EQ(read.points.positions, points.positions);
     EXPECT_EQ(read.points.colors, points.colors);
+    // The camera with the fewest parameters, alone.
+    io::write_colmap(folder / "one", {images.back()}, {});
+    EXPECT_EQ(io::read_colmap(folder / "one", folder / "images").images.size(), 1u);
 }
 
 TEST(Dataset, MissingImages) {

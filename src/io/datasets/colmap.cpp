@@ -174,7 +174,7 @@ void ColmapBuilder::add_image(const std::array<double, 7>& pose, uint32_t camera
 
 constexpr size_t kMaxName = 4096;
 // Bytes of the shortest entry of each list, and of each item that an entry counts.
-constexpr uint64_t kCameraBytes = 4 + 4 + 8 + 8 + 3 * 8, kImageBytes = 4 + 7 * 8 + 4 + 1 + 8;
+constexpr uint64_t kCameraBytes = 4 + 4 + 8 + 8 + 2 * 8, kImageBytes = 4 + 7 * 8 + 4 + 1 + 8;
 constexpr uint64_t kPointBytes = 8 + 3 * 8 + 3 + 8 + 8, kObservationBytes = 3 * 8, kTrackBytes = 2 * 4;
 
 uint64_t read_count(core::FileReader& reader, uint64_t bytes_each, const char* what) {

@@ -66,7 +66,7 @@ std::optional<std::filesystem::path> find_colmap_model(const std::filesystem::pa
 
 /// Reads the model in a folder. Image names are relative to `images`. As in COLMAP, .bin is preferred.
 /// Without points in the model, they are those of fused.ply beside the images, if it is there. World and cameras are as in the file: COLMAP's axes are
-/// OpenCV's. Every lens model of COLMAP is supported except EQUIRECTANGULAR, which is no perspective image.
+/// OpenCV's. Every lens model of COLMAP is supported.
 /// Throws InputError that names the file and the byte (.bin) or line (.txt).
 ImageRecords read_colmap(const std::filesystem::path& model, const std::filesystem::path& images);
 
