@@ -27,6 +27,7 @@
 #include "mesh/parts.h"
 #include "scene/dataset_files.h"
 #include "scene/framing.h"
+#include "scene/readout.h"
 
 namespace ewa::cli {
 namespace {
@@ -66,6 +67,9 @@ std::vector<Camera> cameras_of(const Dataset& dataset) {
         if (!frame.camera.distortion.none())
             throw InputError("ewa mesh takes pinholes, and " + core::one_line(frame.name) +
                              " cannot be undistorted to one");
+        if (scene::moves(frame.camera))
+            throw InputError("ewa mesh takes cameras at rest, and " + core::one_line(frame.name) +
+                             " has a rolling shutter");
         cameras.push_back(frame.camera);
     }
     return cameras;
