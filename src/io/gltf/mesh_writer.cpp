@@ -103,7 +103,7 @@ void write_glb_mesh(const std::filesystem::path& path, const scene::TriangleMesh
     const uint64_t total = 12 + 8 + text.size() + 8 + layout.bytes;
     if (total > std::numeric_limits<uint32_t>::max())
         throw InputError(path.string() + ": a .glb is limited to 4 GiB, and this one would have " +
-                         std::to_string(total) + " bytes; write a .ply, or take --triangles");
+                         std::to_string(total) + " bytes; write a .ply, or fewer triangles");
     core::AtomicFile file(path);
     const uint32_t head[5] = {kGlbMagic, 2, uint32_t(total), uint32_t(text.size()), kGlbJson};
     file.write(head, sizeof(head));
