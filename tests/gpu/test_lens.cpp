@@ -16,31 +16,12 @@
 #include "pipeline/frame_inputs.h"
 #include "reference/render.h"
 #include "support/gradient_check.h"
+#include "support/image_difference.h"
 #include "support/random_lens.h"
 #include "support/random_scene.h"
 
 namespace ewa::test {
 namespace {
-
-/// The largest difference, but for `skipped` pixels in which a contribution may stand on the other side of ALPHA_MIN.
-double largest_difference(const Image& image, const reference::Raster& expected, size_t skipped) {
-    std::vector<double> worst;
-    for (size_t i = 0; i < image.pixels.size(); i += 3) {
-        double largest = 0;
-        for (size_t c = i; c < i + 3; ++c)
-            largest = std::max(largest, std::abs(double(image.pixels[c]) - expected.values[c]));
-        worst.push_back(largest);
-    }
-    std::ranges::sort(worst);
-    return worst[worst.size() - 1 - skipped];
-}
-
-double largest_difference(const Image& a, const Image& b) {
-    double worst = 0;
-    for (size_t i = 0; i < a.pixels.size(); ++i)
-        worst = std::max(worst, std::abs(double(a.pixels[i]) - double(b.pixels[i])));
-    return worst;
-}
 
 TEST(Lens, ImagesAreTheReferences) {
     for (const uint64_t seed : {6100, 6200})

@@ -11,31 +11,12 @@
 #include "reference/render.h"
 #include "scene/readout.h"
 #include "support/gradient_check.h"
+#include "support/image_difference.h"
 #include "support/random_lens.h"
 #include "support/random_scene.h"
 
 namespace ewa::test {
 namespace {
-
-/// The largest difference, but for `skipped` pixels in which a contribution may stand on the other side of ALPHA_MIN.
-double worst_pixel(const Image& image, const reference::Raster& expected, size_t skipped) {
-    std::vector<double> worst;
-    for (size_t i = 0; i < image.pixels.size(); i += 3) {
-        double largest = 0;
-        for (size_t c = i; c < i + 3; ++c)
-            largest = std::max(largest, std::abs(double(image.pixels[c]) - expected.values[c]));
-        worst.push_back(largest);
-    }
-    std::ranges::sort(worst);
-    return worst[worst.size() - 1 - skipped];
-}
-
-double worst_value(const Image& a, const Image& b) {
-    double worst = 0;
-    for (size_t i = 0; i < a.pixels.size(); ++i)
-        worst = std::max(worst, std::abs(double(a.pixels[i]) - double(b.pixels[i])));
-    return worst;
-}
 
 /// Of the usual kernel; tests/gradient has the others.
 TEST(Readout, ImagesAreTheReferences) {
@@ -50,7 +31,7 @@ TEST(Readout, ImagesAreTheReferences) {
         size_t visible = 0;
         for (const auto& splat : expected.projected) visible += splat.visible;
         EXPECT_GT(visible, 60u);
-        EXPECT_LT(worst_pixel(actual.color, expected.blended.color, 2), 2e-5);
+        EXPECT_LT(largest_difference(actual.color, expected.blended.color, 2), 2e-5);
         EXPECT_EQ(renderer.skipped_nonfinite(), 0u);
     }
 }
@@ -82,12 +63,12 @@ TEST(Readout, OfACameraAtRestIsThePinholesImage) {
     const Gaussians gaussians = random_gaussians(7301, 400, SplatKind::mixed, pinhole, 1);
     Renderer renderer(device(), gaussians, {});
     const Image expected = renderer.render(pinhole).color;
-    EXPECT_EQ(worst_value(renderer.render(still).color, expected), 0);
+    EXPECT_EQ(largest_difference(renderer.render(still).color, expected), 0);
     // This takes the kernels of a rolling shutter.
     still.readout->translation.x += 1e-12;
-    EXPECT_LT(worst_value(renderer.render(still).color, expected), 1e-5);
+    EXPECT_LT(largest_difference(renderer.render(still).color, expected), 1e-5);
     still.readout->translation.x += 0.2;
-    EXPECT_GT(worst_value(renderer.render(still).color, expected), 0.05);
+    EXPECT_GT(largest_difference(renderer.render(still).color, expected), 0.05);
 }
 
 /// Each row or column shows what the camera sees at its time. Splats of a few pixels bend a little across their rows, which a

@@ -93,6 +93,17 @@ inline const Synthetic& small_capture() {
     return *made;
 }
 
+/// Gives the frame the image that its changed camera has of the truth.
+inline void draw_truth(const Synthetic& out, Frame& frame) {
+    frame.pinhole = frame.source = frame.camera;
+    frame.image_path = out.folder / frame.image_path.filename().string();
+    const auto render = reference::render(out.truth, frame.camera, {});
+    Image picture(frame.camera.width, frame.camera.height, 3);
+    for (size_t i = 0; i < picture.pixels.size(); ++i)
+        picture.pixels[i] = float(render.blended.color.values[i]);
+    save_image(frame.image_path, picture);
+}
+
 /// Cameras at the places of small_capture's, and their images through a lens.
 inline void put_lens(Synthetic& out, const Distortion& lens) {
     out.truth = small_capture().truth;
@@ -103,13 +114,7 @@ inline void put_lens(Synthetic& out, const Distortion& lens) {
             frame.camera.width = 96;
             scene::set_equirectangular(frame.camera);
         }
-        frame.pinhole = frame.source = frame.camera;
-        frame.image_path = out.folder / frame.image_path.filename().string();
-        const auto render = reference::render(out.truth, frame.camera, {});
-        Image picture(frame.camera.width, frame.camera.height, 3);
-        for (size_t i = 0; i < picture.pixels.size(); ++i)
-            picture.pixels[i] = float(render.blended.color.values[i]);
-        save_image(frame.image_path, picture);
+        draw_truth(out, frame);
     }
 }
 

@@ -22,13 +22,7 @@ void put_readouts(Synthetic& out) {
     for (Frame& frame : out.dataset.frames) {
         const glm::dvec3 way = glm::normalize(glm::dvec3(random.normal(), random.normal(), random.normal()));
         scene::add_readout(frame.camera, ReadoutFrom::top, 0.14 * way, glm::dvec3(0.2, 0.1, 0));
-        frame.pinhole = frame.source = frame.camera;
-        frame.image_path = out.folder / frame.image_path.filename().string();
-        const auto render = reference::render(out.truth, frame.camera, {});
-        Image picture(frame.camera.width, frame.camera.height, 3);
-        for (size_t i = 0; i < picture.pixels.size(); ++i)
-            picture.pixels[i] = float(render.blended.color.values[i]);
-        save_image(frame.image_path, picture);
+        draw_truth(out, frame);
     }
 }
 
