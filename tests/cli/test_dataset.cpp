@@ -83,6 +83,30 @@ TEST(Dataset, SkyIsVisibleOrTransparent) {
     EXPECT_EQ(run_ewa(visible).status, 2) << "images of other options are not replaced";
 }
 
+/// Points lie on the surfaces that pinholes see: every `step`th view of a dataset in this folder.
+void expect_points_on_surfaces(const ewa::PointCloud& points, const ewa::Dataset& pinholes,
+                               const std::string& folder, size_t step) {
+    int seen = 0, there = 0;
+    const nlohmann::json top = read_json(folder + "/transforms.json");
+    for (size_t view = 0; view < pinholes.frames.size(); view += step) {
+        const ewa::Camera& from = pinholes.frames[view].camera;
+        const ewa::Image depth =
+            ewa::load_image(folder + "/" + top["frames"][view]["depth_file_path"].get<std::string>());
+        for (const glm::dvec3& point : points.positions) {
+            const glm::dvec3 p = from.rotation * point + from.translation;
+            const double x = from.fx * p.x / p.z + from.cx, y = from.fy * p.y / p.z + from.cy;
+            if (!(p.z > 0 && x >= 0 && x < from.width && y >= 0 && y < from.height)) continue;
+            const double z = double(*depth.at(int(x), int(y)));
+            // Behind another surface a point says nothing; in front of all, it would be in the air.
+            if (p.z > 1.03 * z) continue;
+            ++seen;
+            there += std::abs(p.z - z) < 0.03 * z;
+        }
+    }
+    EXPECT_GT(seen, 100);
+    EXPECT_GT(there, 0.94 * seen);
+}
+
 /// Points are where the rays of the lens meet the surfaces: on those that pinholes see from the same places.
 TEST(Dataset, IsRenderedThroughLenses) {
     const Folder folder;
@@ -109,25 +133,7 @@ TEST(Dataset, IsRenderedThroughLenses) {
         EXPECT_EQ(camera.distortion.lens, lens);
         EXPECT_FALSE(camera.distortion.none());
         EXPECT_EQ(camera.position(), pinholes.frames[0].camera.position());
-        int seen = 0, there = 0;
-        for (size_t view = 0; view < pinholes.frames.size(); view += 8) {
-            const ewa::Camera& from = pinholes.frames[view].camera;
-            const nlohmann::json top = read_json(folder / "pinhole/transforms.json");
-            const ewa::Image depth = ewa::load_image(
-                folder / ("pinhole/" + top["frames"][view]["depth_file_path"].get<std::string>()));
-            for (const glm::dvec3& point : dataset.points.positions) {
-                const glm::dvec3 p = from.rotation * point + from.translation;
-                const double x = from.fx * p.x / p.z + from.cx, y = from.fy * p.y / p.z + from.cy;
-                if (!(p.z > 0 && x >= 0 && x < 96 && y >= 0 && y < 48)) continue;
-                const double z = double(*depth.at(int(x), int(y)));
-                // Behind another surface a point says nothing; in front of all, it would be in the air.
-                if (p.z > 1.03 * z) continue;
-                ++seen;
-                there += std::abs(p.z - z) < 0.03 * z;
-            }
-        }
-        EXPECT_GT(seen, 100);
-        EXPECT_GT(there, 0.94 * seen);
+        expect_points_on_surfaces(dataset.points, pinholes, folder / "pinhole", 8);
     }
     const Outcome info = run_ewa({"info", folder / "equirect"});
     EXPECT_NE(info.out.find("rendered through 360 degrees"), std::string::npos) << info.out;
@@ -166,24 +172,7 @@ TEST(Dataset, IsRenderedByARollingShutter) {
         EXPECT_NE(read_file(folder / ("rolling/" + rolling.frames[i].name)),
                   read_file(folder / ("still/" + rolling.frames[i].name)));
     }
-    int seen = 0, there = 0;
-    const nlohmann::json top = read_json(folder / "still/transforms.json");
-    for (size_t view = 0; view < 4; ++view) {
-        const ewa::Camera& from = still.frames[view].camera;
-        const ewa::Image depth =
-            ewa::load_image(folder / ("still/" + top["frames"][view]["depth_file_path"].get<std::string>()));
-        for (const glm::dvec3& point : rolling.points.positions) {
-            const glm::dvec3 p = from.rotation * point + from.translation;
-            const double x = from.fx * p.x / p.z + from.cx, y = from.fy * p.y / p.z + from.cy;
-            if (!(p.z > 0 && x >= 0 && x < 96 && y >= 0 && y < 64)) continue;
-            const double z = double(*depth.at(int(x), int(y)));
-            if (p.z > 1.03 * z) continue;
-            ++seen;
-            there += std::abs(p.z - z) < 0.03 * z;
-        }
-    }
-    EXPECT_GT(seen, 100);
-    EXPECT_GT(there, 0.94 * seen);
+    expect_points_on_surfaces(rolling.points, still, folder / "still", 1);
     for (const char* wrong :
          {"top-to-bottom", "top-to-bottom:x", "up:3", "top-to-bottom:3,y", "top-to-bottom:91"})
         EXPECT_EQ(
