@@ -145,6 +145,11 @@ bool may_be_automatic(const RunOption& row) {
     return row.value.starts_with("auto|");
 }
 
+std::string spelled_in_python(std::string name) {
+    std::ranges::replace(name, '-', '_');
+    return name;
+}
+
 std::string joined(const std::vector<std::string>& parts, const char* quote) {
     std::string text;
     for (const std::string& part : parts) text += (text.empty() ? "" : ", ") + (quote + part) + quote;
@@ -171,6 +176,9 @@ void set_row(RunOptions& options, const RunOption& row, nb::handle value) {
 }
 
 [[noreturn]] void unknown_option(const std::string& name) {
+    for (const RunOption& row : train::run_options())
+        if (row.flag && row.python.empty() && spelled_in_python(row.name) == name)
+            throw nb::type_error(("Trainer has no option " + name + "; ewa train has it").c_str());
     std::vector<std::string> known;
     for (const Special& special : kSpecials) known.emplace_back(special.name);
     for (const RunOption& row : rows()) known.push_back(row.python);

@@ -206,6 +206,8 @@ def test_the_cap_is_chosen_and_kept(still_life, tmp_path):
     "options, error, message",
     [
         ({"stepz": 3}, TypeError, "Trainer has no option stepz; did you mean steps?"),
+        ({"robust": True}, TypeError, "Trainer has no option robust; ewa train has it"),
+        ({"skip_blurred": True}, TypeError, "Trainer has no option skip_blurred; ewa train has it"),
         ({"steps": 0}, ewa.InputError, "steps=0: '0' is not a whole number from 1 to "),
         ({"steps": 1.5}, ewa.InputError, "steps=1.5: '1.5' is not a whole number"),
         ({"steps": "many"}, TypeError, "steps='many' is of the wrong type"),
