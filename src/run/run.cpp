@@ -238,9 +238,10 @@ void Run::restore(Trainer& trainer) {
         observer_.on_note(remark);
     }
     std::vector<MetricsLine>& metrics = progress_.metrics;
+    train::TimesAt times;
     try {
         metrics = report::parse_metrics(reader.checkpoint().metrics);
-        const train::TimesAt times = restored_times();
+        times = restored_times();
         reader.set_seconds(times.seconds);
         progress_.seconds_before += times.wall_seconds;
         saves_.continue_from(times);
@@ -251,10 +252,9 @@ void Run::restore(Trainer& trainer) {
     const StepReport& last = progress_.last = reader.head().report;
     report_.earlier_steps = last.step;
     const int steps = options().train.steps, before = earlier_->steps;
-    // The checkpoint of a finished run lacks the line of its last evaluation.
+    // The checkpoint of a finished run lacks the line of its last evaluation, and the time that this took.
     if (steps > before && last.step == before)
-        if (const auto line = folder_.logged(last.step))
-            if (metrics.empty() || metrics.back().step < line->step) metrics.push_back(*line);
+        if (const auto line = folder_.logged(last.step)) progress_.take_later(*line, times.wall_seconds);
     observer_.on_note(
         fmt::format("resumed after step {} of {}{}", last.step, steps,
                     steps == before ? "" : fmt::format(", before which the run had --steps {}", before)));

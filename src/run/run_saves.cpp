@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run/run_saves.h"
 
+#include <algorithm>
+
 #include "core/atomic_file.h"
 #include "report/summary.h"
 #include "run/disk_room.h"
@@ -12,6 +14,12 @@ using Json = nlohmann::ordered_json;
 
 double RunProgress::wall_seconds() const {
     return seconds_before + std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+void RunProgress::take_later(const MetricsLine& line, double checkpoint_seconds) {
+    if (!metrics.empty() && metrics.back().step >= line.step) return;
+    metrics.push_back(line);
+    seconds_before += std::max(0.0, line.wall_seconds - checkpoint_seconds);  // 0 where the line has no time
 }
 
 void RunSaves::continue_from(const TimesAt& checkpoint) {

@@ -22,6 +22,8 @@ struct RunProgress {
     std::vector<MetricsLine> metrics;
 
     double wall_seconds() const;
+    /// Takes a line that came after the checkpoint, and the time since then, unless the metrics have its step.
+    void take_later(const MetricsLine& line, double checkpoint_seconds);
 };
 
 /// Saves what a trainer has reached. All of its functions throw RunError.

@@ -287,6 +287,18 @@ TEST_F(ResumeEdges, TimesGoOn) {
     ends(0, 0, false);
 }
 
+/// The last evaluation of a finished run comes after its checkpoint.
+TEST_F(ResumeEdges, TheTimeOfTheLastEvaluationCounts) {
+    const Names options{"--steps", "20", "--strategy", "none", "--resume"};
+    expect_success(train("o", options));
+    const std::string metrics = folder / "o/metrics.jsonl";
+    std::string text = read_file(metrics);
+    const size_t wall = text.rfind("wall_seconds\":") + 14;
+    write_file(metrics, text.replace(wall, text.find(',', wall) - wall, "1000"));
+    expect_success(train("o", {"--steps", "21", "--strategy", "none", "--resume"}));
+    EXPECT_GT(read_json(folder / "o/summary.json")["wall_seconds"], 1000);
+}
+
 /// Before there was times.json, the checkpoint had the times.
 TEST_F(ResumeEdges, AnEarlierCheckpointHasItsTimes) {
     const Names options{"--steps", "40", "--strategy", "none", "--resume"};
