@@ -13,9 +13,10 @@ enum class Footprint { peak = 0, antialias = 1, density = 2 };
 
 /// How the splats along a ray become one colour.
 enum class Integrator {
-    splat,  // footprints on the image, in the order of the splats' centres
-    ray,    // each splat's integral along the ray, in the order of its middle on the ray
-    march   // the volume of all splats, in intervals along the ray
+    splat,    // footprints on the image, in the order of the splats' centres
+    ray,      // each splat's integral along the ray, in the order of its middle on the ray
+    march,    // the volume of all splats, in intervals along the ray
+    fast_ray  // each splat's integral along the ray, in the order of the splats' centres
 };
 
 inline constexpr int kMostSamples = 4096, kMostNearest = 1000;

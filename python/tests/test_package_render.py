@@ -105,7 +105,7 @@ def test_what_is_no_lens_is_refused():
     with pytest.raises((TypeError, ValueError), match="Ks"):
         ewa.render(make_splats(), viewmat, None, width, height)
     with pytest.raises(ValueError, match="pinholes only"):
-        ewa.render(make_splats(), viewmat, k, width, height, camera_model="fisheye", integrator="ray")
+        ewa.render(make_splats(), viewmat, k, width, height, camera_model="fisheye", integrator="march")
 
 
 def test_renders_are_those_of_the_command_line(tmp_path, program, still_life):
@@ -161,6 +161,7 @@ def test_kernels_points_and_integrators_are_those_of_the_command_line(tmp_path, 
         {"points": True, "nearest": 1},
         {"points": True},
         {"integrator": "ray"},
+        {"integrator": "fast-ray", "antialias": True},
         {"integrator": "march", "samples": 2},
         {"integrator": "march", "kernel": "density"},
     ):
@@ -192,11 +193,11 @@ def test_densities_can_be_rendered_as_opacities():
     [
         ({"kernel": "box"}, "kernel: 'box' is not one of peak, antialias, density"),
         ({"kernel": "peak", "antialias": True}, "antialias= and kernel= exclude each other"),
-        ({"integrator": "marsh"}, "integrator: 'marsh' is not one of splat, ray, march; did you mean march?"),
+        ({"integrator": "marsh"}, "integrator: 'marsh' is not one of splat, ray, fast-ray, march; did you mean march?"),
         ({"samples": 4}, 'samples= is an option of integrator="march"'),
         ({"integrator": "march", "samples": 0}, "samples is not from 1 to 4096"),
         ({"integrator": "march", "samples": 5000}, "samples is not from 1 to 4096"),
-        ({"integrator": "ray", "antialias": True}, 'integrator="ray" and kernel="antialias" exclude each other'),
+        ({"integrator": "march", "antialias": True}, 'integrator="march" and kernel="antialias" exclude each other'),
         ({"nearest": 3}, "nearest= is an option of points="),
         ({"points": True, "nearest": 0}, "nearest is not from 1 to 1000"),
         ({"points": True, "kernel": "density"}, 'points= and kernel="density" exclude each other'),

@@ -51,4 +51,20 @@ vec3 lens_ray(vec2 q) {
     if (camera.lens == LENS_ORTHOGRAPHIC) return vec3(0.0, 0.0, 1.0);
     return brown_ray(q);
 }
+
+// The inverse, in floats: where the lens shows a point in camera coordinates, in units of the focal length.
+vec2 lens_position(vec3 p, out bool shown) {
+    shown = true;
+    if (camera.lens == LENS_FISHEYE) {
+        const float r = length(p.xy), angle = atan(r, p.z), w = angle * angle;
+        const float k1 = camera.lens_hi[LENS_K1], k2 = camera.lens_hi[LENS_K2], k3 = camera.lens_hi[LENS_K3], k4 = camera.lens_hi[LENS_K4];
+        shown = angle <= camera.lens_limit;
+        return (r > 0.0 ? angle / r : 0.0) * (1.0 + w * (k1 + w * (k2 + w * (k3 + w * k4)))) * p.xy;
+    }
+    if (camera.lens == LENS_EQUIRECTANGULAR) return vec2(atan(p.x, p.z), atan(p.y, length(p.xz)));
+    if (camera.lens == LENS_ORTHOGRAPHIC) return p.xy;
+    const vec2 t = p.xy / p.z;
+    shown = p.z > 0.0 && dot(t, t) <= camera.lens_limit;
+    return brown_bend(t);
+}
 #endif

@@ -7,8 +7,16 @@
 
 vec4 subgroup_sum(vec4 v) { return vec4(subgroup_sum(v.x), subgroup_sum(v.y), subgroup_sum(v.z), subgroup_sum(v.w)); }
 
+// The sums of a slot, in its order.
+struct RayTerms {
+    vec4 first, second, third;
+    float blue;
+};
+
+RayTerms no_ray_terms() { return RayTerms(vec4(0.0), vec4(0.0), vec4(0.0), 0.0); }
+
 // g, s1, s2: G, S1 and S2 of this lane's ray. counts: whether it has any.
-void add_to_slot(RaySplat r, Meeting m, bool counts, float g, float s1, float s2, vec3 color) {
+void add_ray_terms(inout RayTerms sum, RaySplat r, Meeting m, bool counts, float g, float s1, float s2, vec3 color) {
     const vec3 x = counts ? (1.4142135623730951 / m.s) * vec3(m.h * m.u, m.h * m.v, -r.bend.z * m.q) : vec3(0.0);
     const vec3 b = counts ? vec3(r.bend.z * m.u, r.bend.z * m.v, m.h) / m.root : vec3(0.0);
     g = counts ? g : 0.0;
@@ -18,16 +26,37 @@ void add_to_slot(RaySplat r, Meeting m, bool counts, float g, float s1, float s2
     const vec3 diagonal = -g * x * x + 2.0 * s1 * b * x + along * b * b;
     const vec3 beside = -g * x.yxx * x.zzy + s1 * (b.yxx * x.zzy + x.yxx * b.zzy) + along * b.yxx * b.zzy;  // 23, 13, 12
     const vec3 v = -g * x + s1 * b;
-    const vec4 own0 = subgroup_sum(vec4(diagonal, beside.z)), own1 = subgroup_sum(vec4(beside.y, beside.x, v.xy));
-    const vec4 own2 = subgroup_sum(vec4(v.z, g, color.rg));
-    const float own3 = subgroup_sum(color.b);
+    sum.first += vec4(diagonal, beside.z);
+    sum.second += vec4(beside.y, beside.x, v.xy);
+    sum.third += vec4(v.z, g, color.rg);
+    sum.blue += color.b;
+}
+
+// Over the lanes.
+RayTerms summed(RayTerms own) {
+    return RayTerms(subgroup_sum(own.first), subgroup_sum(own.second), subgroup_sum(own.third), subgroup_sum(own.blue));
+}
+
+void write_ray_slot(uint instance, RayTerms all) {
+    const uint at = RAY_SLOT_TEXELS * instance;
+    slots[at] = all.first;
+    slots[at + 1u] = all.second;
+    slots[at + 2u] = all.third;
+    slots[at + 3u].x = all.blue;
+}
+
+// Adds what all lanes have for one splat.
+void add_to_slot(RaySplat r, Meeting m, bool counts, float g, float s1, float s2, vec3 color) {
+    RayTerms own = no_ray_terms();
+    add_ray_terms(own, r, m, counts, g, s1, s2, color);
+    const RayTerms all = summed(own);
     // Without loops: their turns would count (rays.glsl).
     if (LANE == r.at % SUBGROUP) {
         const uint at = RAY_SLOT_TEXELS * r.at;
-        slots[at] += own0;
-        slots[at + 1u] += own1;
-        slots[at + 2u] += own2;
-        slots[at + 3u].x += own3;
+        slots[at] += all.first;
+        slots[at + 1u] += all.second;
+        slots[at + 2u] += all.third;
+        slots[at + 3u].x += all.blue;
     }
 }
 

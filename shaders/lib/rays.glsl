@@ -7,7 +7,8 @@
 // footprint without a low-pass, q = u^2 + v^2, h = 1 + g . (pixel - mean), rho = sqrt(2) / |a| and s = rho^2 q + h^2:
 //   b = |b at the mean| (rho u, rho v, h)         middle, the point of the ray closest to the mean: t = z h / s
 //   x, that point: sqrt(2) / s (h u, h v, -rho q)  power: -x.x / 2 = -q / s
-// In these terms nothing cancels. The affine footprint is the case s = 1.
+// In these terms nothing cancels. The affine footprint is the case s = 1. Under SPEC_LENSES each splat has a pinhole of its own
+// (ray_shape.glsl), and "pixel" is the ray's position in its image, the tangents.
 //
 // Gradient. With G = dL/d(ln depth), and S1, S2 by the borders of marching (0 without), each splat needs sums over its rays of
 //   W = -G x x^T + S1 (b x^T + x b^T) + (S2 - share G) b b^T,   V = -G x + S1 b,   b of length 1
@@ -17,13 +18,15 @@
 #ifndef EWA_LIB_RAYS
 #define EWA_LIB_RAYS
 #include "lib/camera.glsl"
+#include "lib/lens_ray.glsl"
 
 const float NEVER = 3.402823466e38;
 
 struct RaySplat {
     uint at;             // its instance
-    vec4 mean, shape, bend;
-    vec4 color;          // and z
+    vec4 mean;           // of a lens: the unit direction to the mean and its frame_factor
+    vec4 shape, bend;
+    vec4 color;          // and z in the image's camera
     float along;         // |b| at the mean: sqrt(2) / (rho z)
 };
 
@@ -37,12 +40,19 @@ struct Meeting {
 struct Ray {
     vec2 pixel;    // centre
     float norm;  // of the direction
+    vec3 direction;  // under SPEC_LENSES, of unit length; 0 where the lens shows nothing
+    float depth;     // of a point at distance 1
 };
 
 Ray ray_through(vec2 pixel) {
     const vec2 tangent = (pixel - vec2(camera.center_hi[0], camera.center_hi[1])) / vec2(camera.focal_hi[0], camera.focal_hi[1]);
-    return Ray(pixel, sqrt(1.0 + dot(tangent, tangent)));
+    if (LENSES == 0u) return Ray(pixel, sqrt(1.0 + dot(tangent, tangent)), vec3(0.0), 1.0);
+    const vec3 seen = lens_ray(tangent);
+    const vec3 direction = seen == vec3(0.0) ? seen : normalize(seen);
+    return Ray(pixel, 1.0, direction, camera.lens == LENS_BROWN ? direction.z : 1.0);
 }
+
+bool sees(Ray ray) { return LENSES == 0u || ray.direction != vec3(0.0); }
 
 // The lane's pixel in a strip of the tile, and the strip's first row of pixel centres.
 uvec2 strip_pixel(uint tile, uint strip) {
@@ -82,18 +92,31 @@ void report_turns() {
     if (turns > TURNS_MOST && LANE == 0u) atomicAdd(counts.unfinished, 1u);
 }
 
+// Where a ray's direction is in the image of a splat's own camera, and the inverse of its component towards the mean.
+// frame_rows in ray_shape.glsl has the frame.
+vec3 lens_meeting(vec4 mean, vec3 d) {
+    const float w = mean.w * (mean.x * d.x + mean.y * d.y) - d.z, s = mean.z >= 0.0 ? 1.0 : -1.0;
+    const float ahead = dot(mean.xyz, d);
+    const float inverse = 1.0 / (abs(ahead) < 1e-6 ? 1e-6 : ahead);
+    return vec3(d.x + s * mean.x * w, s * d.y + mean.y * w, 1.0) * inverse;
+}
+
 Meeting meet(RaySplat r, Ray ray) {
     Meeting m;
-    EXACT const float dx = (ray.pixel.x - r.mean.x) - r.mean.z;
-    EXACT const float dy = (ray.pixel.y - r.mean.y) - r.mean.w;
+    vec3 at = vec3(0.0, 0.0, 1.0);
+    if (LENSES != 0u) at = lens_meeting(r.mean, ray.direction);
+    EXACT const float dx = LENSES != 0u ? at.x : (ray.pixel.x - r.mean.x) - r.mean.z;
+    EXACT const float dy = LENSES != 0u ? at.y : (ray.pixel.y - r.mean.y) - r.mean.w;
+    const float norm = LENSES != 0u ? abs(at.z) : ray.norm;
     EXACT const float u = r.shape.x * (dx - r.shape.y * dy), v = r.shape.z * dy;
     EXACT const float q = min(u * u + v * v, 1e36);
     EXACT const float h = clamp(1.0 + (r.bend.x * dx + r.bend.y * dy), -1e18, 1e18);
     EXACT const float s = r.bend.z * r.bend.z * q + h * h;
     EXACT const float root = sqrt(s);
     EXACT const float inverse = 1.0 / s, power = -(q * inverse);
-    EXACT const float depth = (KERNEL == KERNEL_DENSITY ? r.shape.w * ray.norm * (root * inverse) : r.shape.w) * exp(power);
-    EXACT const float middle = r.color.w * (h * inverse);
+    EXACT const float depth = (KERNEL == KERNEL_DENSITY ? r.shape.w * norm * (root * inverse) : r.shape.w) * exp(power);
+    EXACT float middle = r.color.w * (h * inverse);
+    if (LENSES != 0u) middle *= at.z * ray.depth;
     m.u = u;
     m.v = v;
     m.q = q;

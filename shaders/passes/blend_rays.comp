@@ -50,8 +50,9 @@ void main() {
     if (tile >= push.tiles[0] * push.tiles[1]) return;
     const uvec2 p = strip_pixel(tile, gl_WorkGroupID.z);
     const bool inside = p.x < push.image.size[0] && p.y < push.image.size[1];
-    T = inside ? 1.0 : -1.0;
-    walk_rays(tile, gl_WorkGroupID.z, ray_through(vec2(p) + 0.5));
+    const Ray ray = ray_through(vec2(p) + 0.5);
+    T = inside && sees(ray) ? 1.0 : -1.0;
+    walk_rays(tile, gl_WorkGroupID.z, ray);
     report_turns();
     if (inside) {
         const uint at = p.y * push.image.stride + p.x;

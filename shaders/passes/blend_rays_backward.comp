@@ -66,10 +66,10 @@ void main() {
     const uvec2 p = strip_pixel(tile, strip);
     const bool inside = p.x < push.image.size[0] && p.y < push.image.size[1];
     const uint at = min(p.y, push.image.size[1] - 1u) * push.image.stride + min(p.x, push.image.size[0] - 1u);
-    T = inside ? 1.0 : -1.0;
+    own_ray = ray_through(vec2(p) + 0.5);
+    T = inside && sees(own_ray) ? 1.0 : -1.0;
     gradient = gradient_of(at);
     rest = dot(gradient, color_of(at));
-    own_ray = ray_through(vec2(p) + 0.5);
     walk_rays(tile, strip, own_ray);
     report_turns();
 }

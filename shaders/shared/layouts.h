@@ -99,7 +99,8 @@ EWA_UINT(PROJECT_DEBUG, 1u);    // shifts the scales, and counts the visible spl
 EWA_UINT(PROJECT_NORMALS, 2u);  // in place of the colour: the normal in world axes, towards the eye
 EWA_UINT(PROJECT_SLOPES, 4u);   // in place of the colour: d(depth)/du and d(depth)/dv, for BLEND_MEDIAN
 // project_rays.comp
-EWA_UINT(PROJECT_RAYS_DEEP, 1u);  // a splat counts to MARCH_DEPTH_MIN, not to the cut-off
+EWA_UINT(PROJECT_RAYS_DEEP, 1u);     // a splat counts to MARCH_DEPTH_MIN, not to the cut-off
+EWA_UINT(PROJECT_RAYS_BY_MEAN, 2u);  // the key is the depth of the mean
 // emit_instances.comp
 EWA_UINT(EMIT_FIRST_INSTANCES, 1u);  // also writes where each splat's instances begin
 // scan_blocks.comp

@@ -124,7 +124,7 @@ Gaussians DrawArguments::load(const fs::path& splats, RenderOptions& options) co
         core::warn(core::one_line(splats.string()) + ": " + core::one_line(remark));
     if (!names_kernel() && !options.points) {
         if (scene.gaussians.density) options.kernel = Footprint::density;
-        if (scene.antialiased && options.integrator == Integrator::splat)
+        if (scene.antialiased && options.integrator != Integrator::march)
             options.kernel = Footprint::antialias;
     }
     const fs::path sky = splats.parent_path() / report::kSkyFile;
@@ -163,10 +163,10 @@ void add_draw_options(CLI::App& app, DrawArguments& arguments) {
         ->transform(in_range(0, kMaxShDegree))
         ->type_name("0..3")
         ->capture_default_str();
-    app.add_option(
-           "--integrator", arguments.integrator,
-           "How splats become a colour: splat blends footprints, ray orders splats on each ray, march "
-           "integrates the volume")
+    app.add_option("--integrator", arguments.integrator,
+                   "How splats become a colour: splat blends footprints; fast-ray evaluates each splat on "
+                   "each ray, in "
+                   "the order of splat; ray orders them on each ray; march integrates the volume")
         ->transform(one_of(core::words_of(scene::kIntegratorWords)))
         ->capture_default_str();
     app.add_option("--samples", arguments.samples, "Intervals of a ray, with --integrator march (64)")

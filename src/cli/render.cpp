@@ -298,7 +298,7 @@ int run(CLI::App& app, RenderArguments& arguments) {
          {"--frames", "--test-every", "--downscale", "--max-width", "--exposures", "--appearance-of"})
         if (app.count(option) > 0) of_frames = option;
     if (arguments.mode == "depth" && arguments.draw.integrator == "march")
-        throw InputError("--mode depth: the integrator march draws no depth; splat and ray do");
+        throw InputError("--mode depth: the integrator march draws no depth; the others do");
     SplatInput input = splat_input(arguments.splats);
     arguments.splats = input.file;
     if (input.run) use_options_of(*input.run, app);

@@ -65,8 +65,8 @@ fs::path dataset_input(const fs::path& path) {
 
 void use_options_of(const live::Run& run, CLI::App& app) {
     const fs::path config = run.folder / "config.json";
-    for (const char* name : {"points", "nearest", "kernel", "background", "loss", "downscale", "max-width",
-                             "masks", "lens", "test-every"}) {
+    for (const char* name : {"points", "nearest", "integrator", "kernel", "background", "loss", "downscale",
+                             "max-width", "masks", "lens", "test-every"}) {
         const auto value = run.config.find(name);
         if (value == run.config.end() || *value == false) continue;
         if (*value == "random") continue;  // evaluated over black

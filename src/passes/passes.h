@@ -18,8 +18,8 @@ struct Project : ProjectBuffers {
     static constexpr char shader[] = "project";
 };
 
-/// Prepares splats for rays. rays: how a ray meets each. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (0 or
-/// PROJECT_RAYS_DEEP).
+/// Prepares splats for rays. rays: how a ray meets each. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (0,
+/// PROJECT_RAYS_DEEP or PROJECT_RAYS_BY_MEAN), SPEC_LENSES, SPEC_WRAP.
 struct ProjectRays : ProjectBuffers {
     static constexpr char shader[] = "project_rays";
     gpu::BufferPart rays;
@@ -36,6 +36,11 @@ struct UpdateBuffers {
 struct Update : UpdateBuffers {
     static constexpr char shader[] = "update";
     gpu::BufferPart motion_sums;
+};
+
+/// Gradient of ProjectRays. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (UPDATE_* bits), SPEC_LENSES.
+struct UpdateRays : UpdateBuffers {
+    static constexpr char shader[] = "update_rays";
 };
 
 // A batch of views. Each view has a list of the splats that reach a tile of it.
@@ -266,9 +271,15 @@ struct AlongRays : BlendBuffers {
     gpu::BufferPart rays, camera, counts;
 };
 
-/// Blends the splats of every ray in their order along it. Variant: SPEC_KERNEL, SPEC_MODE (BLEND_COLOR, BLEND_DEPTH).
+/// Blends the splats of every ray in their order along it. Variant: SPEC_KERNEL, SPEC_MODE (BLEND_COLOR, BLEND_DEPTH), SPEC_LENSES.
 struct BlendRays : AlongRays {
     static constexpr char shader[] = "blend_rays";
+};
+
+/// Blends the splats of every ray in the order of the tile's list. Variant: as of BlendRays.
+struct BlendFastRays : AlongRays {
+    static constexpr char shader[] = "blend_fast_rays";
+    using Work = PerTile;
 };
 
 /// Marches along every ray, in intervals. Variant: SPEC_KERNEL, SPEC_MODE (intervals evaluated together).
@@ -283,22 +294,20 @@ struct AlongRaysBackward : BlendBackwardBuffers {
     gpu::BufferPart rays, camera, counts;
 };
 
-/// Gradient of BlendRays. Variant: SPEC_KERNEL.
+/// Gradient of BlendRays. Variant: SPEC_KERNEL, SPEC_LENSES.
 struct BlendRaysBackward : AlongRaysBackward {
     static constexpr char shader[] = "blend_rays_backward";
+};
+
+/// Gradient of BlendFastRays. Variant: SPEC_KERNEL, SPEC_LENSES. The slots are zero before.
+struct BlendFastRaysBackward : AlongRaysBackward {
+    static constexpr char shader[] = "blend_fast_rays_backward";
+    using Work = PerTile;
 };
 
 /// Gradient of MarchRays. Variant: as of MarchRays.
 struct MarchRaysBackward : AlongRaysBackward {
     static constexpr char shader[] = "march_rays_backward";
-};
-
-/// Adds the slots of each splat, and writes the gradient of its parameters. Variant: SPEC_SH_DEGREE, SPEC_KERNEL.
-struct GatherRays {
-    static constexpr char shader[] = "gather_rays";
-    using Work = PerElement<&shared::UpdatePush::splats>;
-    gpu::BufferPart params, camera, records, slots, tile_counts, first_instances, counts, sorted_indices,
-        gradients;
 };
 
 /// Makes records of arrays of 2D Gaussians, 4 channels of their features at a time, with depth keys and tile counts. Adds

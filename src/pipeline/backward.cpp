@@ -243,6 +243,13 @@ void FramePasses::integrate_backward(const Sorted& sorted, const passes::Constan
                {.blend = blend, .samples = inputs.samples, .strip = strip}, variant);
 }
 
+/// The same in the order of the tile's list.
+void FramePasses::fast_rays_backward(const Sorted& sorted) const {
+    recording.fill(frame.slots, 0, 0, frame.sizes.slots);
+    record(passes::BlendFastRaysBackward{{blend_buffers(frame, sorted), frame.rays, camera(), frame.counts}},
+           blend_push(cache.config(), frame, inputs.background), {kernel(), lenses()});
+}
+
 /// Gradients of blending, which are left in frame.slots.
 void FramePasses::blend_backward(const Sorted& sorted) const {
     const passes::BlendBackwardBuffers buffers = blend_buffers(frame, sorted);
@@ -252,7 +259,9 @@ void FramePasses::blend_backward(const Sorted& sorted) const {
                                      (plan.loss.alpha > 0 ? shared::BLEND_BACKWARD_ALPHA : 0)};
     const uint32_t group = march_group(inputs.samples, 8);
     if (plan.integrator == Integrator::ray)
-        integrate_backward<passes::BlendRaysBackward>(sorted, {kernel()});
+        integrate_backward<passes::BlendRaysBackward>(sorted, {kernel(), lenses()});
+    else if (plan.integrator == Integrator::fast_ray)
+        fast_rays_backward(sorted);
     else if (plan.integrator == Integrator::march)
         integrate_backward<passes::MarchRaysBackward>(sorted, {kernel(), {shared::SPEC_MODE, group}});
     else if (plan.points())
@@ -265,17 +274,6 @@ void FramePasses::backward(const Model& model, const Sorted& sorted, const Rates
                            const MotionUse* motion) const {
     blend_backward(sorted);
     const shared::UpdatePush push = update_push(model, frame, rates);
-    if (plan.rays())
-        return record(passes::GatherRays{.params = model.params,
-                                         .camera = camera(),
-                                         .records = frame.records,
-                                         .slots = frame.slots,
-                                         .tile_counts = frame.tile_counts,
-                                         .first_instances = frame.first_instances,
-                                         .counts = frame.counts,
-                                         .sorted_indices = *sorted.indices,
-                                         .gradients = model.moments1},
-                      push, {degree(), kernel()});
     const gpu::Buffer& moments2 = model.second_moments();
     // Packed moments and a gradient alone have no buffer of second moments, and a gradient no statistics. The kernel
     // does not use those bindings, but they need a buffer.
@@ -295,6 +293,7 @@ void FramePasses::backward(const Model& model, const Sorted& sorted, const Rates
                                         .sorted_indices = *sorted.indices};
     const gpu::SpecConstant mode{shared::SPEC_MODE, update_mode(plan)};
     if (plan.points()) return record(passes::UpdatePoints{buffers}, push, {degree(), mode});
+    if (plan.rays()) return record(passes::UpdateRays{buffers}, push, {degree(), mode, kernel(), lenses()});
     record(passes::Update{buffers, plan.motion ? frame.motion_sums : frame.partials}, push,
            {degree(), mode, kernel(), lenses()});
     if (plan.motion) record_motion_sums(*this, frame);

@@ -150,10 +150,12 @@ void FramePasses::project(const Model& model) const {
                                    .planes = model.planes(),
                                    .log_scale_shift = plan.rays() ? 0 : plan.log_scale_shift};
     const gpu::SpecConstant debug{shared::SPEC_MODE, plan.debug ? shared::PROJECT_DEBUG : 0};
-    const bool deep = plan.integrator == Integrator::march;
+    const uint32_t rays = plan.integrator == Integrator::march      ? shared::PROJECT_RAYS_DEEP
+                          : plan.integrator == Integrator::fast_ray ? shared::PROJECT_RAYS_BY_MEAN
+                                                                    : 0;
     if (plan.rays())
         record(passes::ProjectRays{buffers, frame.rays}, push,
-               {degree(), kernel(), {shared::SPEC_MODE, deep ? shared::PROJECT_RAYS_DEEP : 0}});
+               {degree(), kernel(), {shared::SPEC_MODE, rays}, lenses(), wrap()});
     else if (plan.points())
         record(passes::ProjectPoints{buffers}, push, {degree(), debug});
     else
@@ -174,7 +176,9 @@ Sorted FramePasses::draw(uint32_t splats) const {
         const shared::RayPush rays{.blend = push, .samples = inputs.samples, .strip = 0};
         const uint32_t group = march_group(inputs.samples, cache.config().texel_buffers ? 16 : 8);
         if (plan.integrator == Integrator::ray)
-            record(passes::BlendRays{along}, rays, {kernel(), mode});
+            record(passes::BlendRays{along}, rays, {kernel(), mode, lenses()});
+        else if (plan.integrator == Integrator::fast_ray)
+            record(passes::BlendFastRays{along}, push, {kernel(), mode, lenses()});
         else
             record(passes::MarchRays{along}, rays, {kernel(), {shared::SPEC_MODE, group}});
     } else if (plan.points()) {

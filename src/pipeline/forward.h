@@ -99,6 +99,7 @@ struct FramePasses : passes::Recorder {
     void blend_backward(const Sorted& sorted) const;
     template <class Backward>
     void integrate_backward(const Sorted& sorted, const passes::Constants& variant) const;
+    void fast_rays_backward(const Sorted& sorted) const;
 };
 
 /// The part between projection and blending: depth order, instances, tile order, tile starts. It reads frame's records,

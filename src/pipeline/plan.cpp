@@ -16,16 +16,17 @@ namespace {
 void check_integrator(const PlanRequest& request) {
     const Integrator integrator = request.render.integrator;
     if (integrator == Integrator::splat) return;
-    const std::string name = integrator == Integrator::ray ? "ray" : "march";
+    const std::string name = core::word_for(scene::kIntegratorWords, integrator);
     const auto refuse = [&](const std::string& why) {
         throw InputError("the integrator " + name + " " + why);
     };
     scene::check_look({.render = request.render});
-    if (request.purpose == Purpose::training) refuse("cannot train; splat can");
+    if (integrator == Integrator::march && request.purpose == Purpose::training)
+        refuse("cannot train; the others do");
     if (request.drawing == Drawing::count || request.drawing == Drawing::ellipsoids)
         refuse("draws neither counts nor ellipsoids; splat does");
     if (integrator == Integrator::march && request.drawing == Drawing::depth)
-        refuse("draws no depth; splat and ray do");
+        refuse("draws no depth; the others do");
     if (request.debug && request.splat_scale != 1)
         refuse("draws splats at their own scale; splat draws others");
     if (integrator == Integrator::march &&

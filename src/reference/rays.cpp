@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 #include <numbers>
 
+#include "scene/native_lens.h"
 #include "shared/constants.h"
 
 namespace ewa::reference {
@@ -48,7 +49,13 @@ RenderOptions with_peak(RenderOptions options) {
 
 Rays::Rays(const Values& values, const Camera& camera, const RenderOptions& options,
            const Smoothing& smoothing, const Rays* fixed)
-    : values_(values), camera_(camera), options_(options), smoothing_(smoothing), fixed_(fixed) {
+    : values_(values),
+      camera_(camera),
+      options_(options),
+      smoothing_(smoothing),
+      fixed_(fixed),
+      by_distance_(scene::ordered_by_distance(camera.distortion.lens)),
+      lens_limit_(scene::lens_limit(camera)) {
     const RenderOptions peak = with_peak(options);
     for (size_t i = 0; i < values.size(); ++i) {
         const Splat splat = read_splat(values, i);
@@ -57,26 +64,48 @@ Rays::Rays(const Values& values, const Camera& camera, const RenderOptions& opti
         if (!projected_.back().visible) continue;
         Member m;
         m.splat = uint32_t(i);
-        m.whitener = glm::transpose(steps.rotation);
-        for (int k = 0; k < 3; ++k)
-            for (int j = 0; j < 3; ++j) m.whitener[j][k] /= steps.scale[k];  // row k over scale k
-        m.a = m.whitener * -steps.offset;
         m.scale = steps.scale;
-        m.color = projected_.back().color;
         m.full_depth = softplus(splat.opacity_logit);
         if (options.kernel == Footprint::density)
             m.full_depth *= mean_shadow(m.scale) / (m.scale.x * m.scale.y * m.scale.z);
         else
             m.full_depth = std::min(m.full_depth, -std::log1p(-shared::ALPHA_MAX));
+        if (options.kernel == Footprint::antialias) widen(m, splat, steps.rotation, steps.offset);
+        m.whitener = glm::transpose(steps.rotation);
+        for (int k = 0; k < 3; ++k)
+            for (int j = 0; j < 3; ++j) m.whitener[j][k] /= m.scale[k];  // row k over scale k
+        m.a = m.whitener * -steps.offset;
+        m.color = projected_.back().color;
         members_.push_back(m);
     }
 }
 
-std::vector<Rays::Met> Rays::met(int x, int y, double least) const {
+void Rays::widen(Member& m, const Splat& splat, const glm::dmat3& axes, const glm::dvec3& mean) const {
+    Widening& w = m.widening;
+    w.own = m.scale;
+    w.mean = glm::transpose(axes) * mean;
+    w.depth = by_distance_ ? glm::length(mean) : (camera_.rotation * mean).z;
+    w.deeper = by_distance_ ? mean / w.depth : glm::row(camera_.rotation, 2);
+    w.squared = shared::LOW_PASS * w.depth * w.depth / (camera_.fx * camera_.fy);
+    const auto shadow = [&](const glm::dvec3& s) { return s.x * s.y * s.z * glm::length(w.mean / s); };
+    for (int k = 0; k < 3; ++k) m.scale[k] = std::sqrt(w.own[k] * w.own[k] + w.squared);
+    const double opacity = 1 / (1 + std::exp(-splat.opacity_logit));
+    w.opacity = std::min(opacity, shared::ALPHA_MAX) * shadow(w.own) / shadow(m.scale);
+    m.full_depth = -std::log1p(-w.opacity);
+}
+
+std::optional<glm::dvec3> Rays::view_of(int x, int y) const {
     const glm::dvec2 pixel = pixel_centre(x, y);
-    const glm::dvec3 view((pixel.x - camera_.cx) / camera_.fx, (pixel.y - camera_.cy) / camera_.fy, 1);
-    const glm::dvec3 direction = glm::transpose(camera_.rotation) * view;
+    const auto ray = scene::ray_of(camera_, lens_limit_, pixel.x, pixel.y);
+    if (!ray) return std::nullopt;
+    return by_distance_ ? ray->direction : ray->direction / ray->direction.z;
+}
+
+std::vector<Rays::Met> Rays::met(int x, int y, double least) const {
     std::vector<Met> line;
+    const auto seen = view_of(x, y);
+    if (!seen) return line;
+    const glm::dvec3 view = *seen, direction = glm::transpose(camera_.rotation) * view;
     for (size_t i = 0; i < members_.size(); ++i) {
         const Member& m = members_[i];
         const glm::dvec3 b = m.whitener * direction, normal = glm::cross(m.a, b);
@@ -98,8 +127,11 @@ std::vector<Rays::Met> Rays::met(int x, int y, double least) const {
 std::vector<Rays::Met> Rays::met_in_order(int x, int y) const {
     std::vector<Met> line = met(x, y, -std::log1p(-alpha_floor(smoothing_)));
     std::erase_if(line, [](const Met& m) { return !(m.middle > shared::NEAR_PLANE); });
-    std::stable_sort(line.begin(), line.end(),
-                     [](const Met& p, const Met& q) { return p.middle < q.middle; });
+    const bool by_mean = options_.integrator == Integrator::fast_ray;
+    std::stable_sort(line.begin(), line.end(), [&](const Met& p, const Met& q) {
+        if (by_mean) return projected_[members_[p.member].splat].z < projected_[members_[q.member].splat].z;
+        return p.middle < q.middle;
+    });
     return line;
 }
 
@@ -182,7 +214,7 @@ Blended Rays::blended() const {
         for (int x = 0; x < camera_.width; ++x) {
             glm::dvec3 color(0);
             double left = 1, depth = 0;
-            if (options_.integrator == Integrator::ray)
+            if (options_.integrator != Integrator::march)
                 left = walk(x, y, [&](const Met& m, const Alpha& alpha, double transmittance) {
                     color += alpha.value * transmittance * members_[m.member].color;
                     depth += alpha.value * transmittance * m.middle;
@@ -269,11 +301,35 @@ void Rays::march_gradient(int x, int y, const glm::dvec3& up, std::vector<Sums>&
     }
 }
 
+void Rays::narrow(const Member& m, const glm::dmat3& axes, double by_opacity, Splat& gradient,
+                  glm::dvec3& torque) const {
+    const Widening& w = m.widening;
+    const glm::dvec3 shares = w.mean * w.mean / (w.own * w.own),
+                     wider = w.mean * w.mean / (m.scale * m.scale);
+    const double all = shares.x + shares.y + shares.z, all_wider = wider.x + wider.y + wider.z;
+    glm::dvec3 turned(0);
+    double by_width = 0;
+    for (int k = 0; k < 3; ++k) {
+        const double by_wider = gradient.log_scale[k] + by_opacity * (wider[k] / all_wider - 1);
+        const double narrower = w.own[k] * w.own[k] / (m.scale[k] * m.scale[k]);
+        gradient.log_scale[k] = narrower * by_wider + by_opacity * (1 - shares[k] / all);
+        by_width += (1 - narrower) * by_wider;
+        turned[k] = by_opacity * w.mean[k] *
+                    (1 / (w.own[k] * w.own[k] * all) - 1 / (m.scale[k] * m.scale[k] * all_wider));
+    }
+    torque += glm::cross(turned, w.mean);
+    gradient.mean += axes * turned + by_width / w.depth * w.deeper;
+}
+
 Splat Rays::splat_gradient(const Member& m, const Sums& sums) const {
     const Splat splat = read_splat(values_, m.splat);
     ScreenGradient by_color;
     by_color.color = sums.color;
     Splat out = project_backward(splat, camera_, with_peak(options_), by_color);
+    const double norm = robust_norm(splat.quaternion);
+    std::array<double, 4> q = splat.quaternion;
+    for (double& each : q) each /= norm;
+    const glm::dmat3 axes = rotation_matrix(q);
     out.mean += -glm::transpose(m.whitener) * sums.v;
     glm::dvec3 torque(0);
     const glm::dvec3& s = m.scale;
@@ -285,7 +341,11 @@ Splat Rays::splat_gradient(const Member& m, const Sums& sums) const {
     const double sigmoid = 1 / (1 + std::exp(-splat.opacity_logit));
     const double depth = softplus(splat.opacity_logit);
     out.opacity_logit = sums.depth * sigmoid / depth;
-    if (options_.kernel == Footprint::density) {
+    if (options_.kernel == Footprint::antialias) {
+        const double peak = m.widening.opacity, by_opacity = sums.depth * peak / (1 - peak) / m.full_depth;
+        narrow(m, axes, by_opacity, out, torque);
+        out.opacity_logit = sigmoid > shared::ALPHA_MAX ? 0 : by_opacity * (1 - sigmoid);
+    } else if (options_.kernel == Footprint::density) {
         const glm::dvec3 areas(s.y * s.y * s.z * s.z, s.z * s.z * s.x * s.x, s.x * s.x * s.y * s.y);
         const double all = areas.x + areas.y + areas.z;
         for (int k = 0; k < 3; ++k) out.log_scale[k] += sums.depth * ((all - areas[k]) / all - 1);
@@ -293,9 +353,6 @@ Splat Rays::splat_gradient(const Member& m, const Sums& sums) const {
         out.opacity_logit = 0;
     }
     // A rotation by small angles w about the splat's own axes is q (1, w / 2).
-    const double norm = robust_norm(splat.quaternion);
-    std::array<double, 4> q = splat.quaternion;
-    for (double& each : q) each /= norm;
     const glm::dvec3 vector(q[1], q[2], q[3]);
     const glm::dvec3 turned = q[0] * torque + glm::cross(vector, torque);
     out.quaternion = {-2 * glm::dot(vector, torque) / norm, 2 * turned.x / norm, 2 * turned.y / norm,
@@ -308,7 +365,7 @@ Values Rays::gradient(const Raster& image_gradient) const {
     for (int y = 0; y < camera_.height; ++y)
         for (int x = 0; x < camera_.width; ++x) {
             const double* up = image_gradient.at(x, y);
-            if (options_.integrator == Integrator::ray)
+            if (options_.integrator != Integrator::march)
                 ray_gradient(x, y, {up[0], up[1], up[2]}, sums);
             else
                 march_gradient(x, y, {up[0], up[1], up[2]}, sums);
@@ -321,7 +378,7 @@ Values Rays::gradient(const Raster& image_gradient) const {
 
 std::vector<uint8_t> Rays::at_threshold(double relative) const {
     std::vector<uint8_t> at(size_t(camera_.width) * size_t(camera_.height));
-    if (options_.integrator != Integrator::ray) return at;
+    if (options_.integrator == Integrator::march) return at;
     // A middle is one quotient: float32 is nearer to it than to an alpha.
     constexpr double kOrderShare = 0.05;
     const auto near = [&](double value, double threshold) {
@@ -339,8 +396,10 @@ std::vector<uint8_t> Rays::at_threshold(double relative) const {
                 const double raw = -std::expm1(-m.depth);
                 const double next = transmittance * (1 - std::min(raw, shared::ALPHA_MAX));
                 const bool exact = stops(next) && raw > shared::ALPHA_MAX;
-                hangs = hangs || std::abs(m.middle - middle) <= kOrderShare * relative * middle ||
-                        near(raw, shared::ALPHA_MAX) || (!exact && near(next, shared::TRANSMITTANCE_STOP));
+                const bool order = options_.integrator == Integrator::ray &&
+                                   std::abs(m.middle - middle) <= kOrderShare * relative * middle;
+                hangs = hangs || order || near(raw, shared::ALPHA_MAX) ||
+                        (!exact && near(next, shared::TRANSMITTANCE_STOP));
                 if (stops(next)) break;
                 transmittance = next;
                 middle = m.middle;

@@ -1,8 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// Integration along each pixel's ray: Integrator::ray and Integrator::march, with their gradients. volume.h defines what a
-// splat is along a ray; here v is the ray's direction with v.z = 1 in camera coordinates, and t is the view depth.
+// Integration along each pixel's ray: Integrator::ray, fast_ray and march, with their gradients. volume.h defines what a
+// splat is along a ray. Here t is the view depth: v is the ray's direction in camera coordinates with v.z = 1, or of length 1
+// where the lens orders splats by their distance.
 //
-// ray: splats are ordered by their middles on the ray. alpha = min(ALPHA_MAX, 1 - exp(-depth)), with the cut-off and the stop
+// With Footprint::antialias every splat is widened as by splatting's low-pass, and absorbs as much as before. With t0 the view depth
+// of the mean m (from the eye) and f = sqrt(fx fy):
+//   s'_k^2 = s_k^2 + w^2,  w^2 = LOW_PASS (t0 / f)^2,  c = A(s) / A(s'),  A(s) = s1 s2 s3 |S^-1 R^T m|
+//   depth  = -ln(1 - c opacity)            of the ray through the mean
+// c is the share of the wider splat's shadow. Mip-Splatting (Yu et al. 2024) scales opacity by the same share, on the image.
+// With p = R^T m, Q = sum (p_k / s_k)^2, and G the gradient by ln(c opacity), the splat's own scales, rotation and mean get
+//   dL/d(ln s_k) = (s_k / s'_k)^2 D_k + G (1 - (p_k / s_k)^2 / Q),  D_k = dL/d(ln s'_k) + G ((p_k / s'_k)^2 / Q' - 1)
+//   dL/d(ln w) = sum (w / s'_k)^2 D_k,  torque e x p,  dL/dm = R e,  e_k = G p_k (1 / (s_k^2 Q) - 1 / (s'_k^2 Q'))
+//
+// ray, fast_ray: splats are ordered by their middles on the ray, or by the view depths of their means. alpha = min(ALPHA_MAX, 1 - exp(-depth)), with the cut-off and the stop
 // of splatting. A middle in front of NEAR_PLANE does not count.
 // march: the optical depth d_ij of splat i in interval j of the ray, in closed form. All splats are mixed in an interval:
 //   C = sum_j T_j (1 - exp(-d_j)) / d_j sum_i c_i d_ij + T background,  d_j = sum_i d_ij,  T_j = exp(-d_0 - ... - d_{j-1})
@@ -14,6 +24,7 @@
 //   dL/d(mean) = -M^T V,  dL/d(ln s_k) = -W_kk,  torque about axis k = (s_j / s_i - s_i / s_j) W_ij,  (i, j, k) cyclic
 // x is the ray's point closest to the mean, whitened: W = dL/dM M^-1, V = dL/da.
 #pragma once
+#include <optional>
 #include <vector>
 
 #include "ewa/camera.h"
@@ -41,13 +52,22 @@ class Rays {
     std::vector<uint8_t> at_threshold(double relative) const;
 
   private:
+    struct Widening {
+        glm::dvec3 own{0};     // scales, before
+        glm::dvec3 mean{0};    // p: from the eye, along the splat's axes
+        glm::dvec3 deeper{0};  // d(t0)/d(mean), in world coordinates
+        double depth = 0;      // t0
+        double squared = 0;    // w^2
+        double opacity = 0;    // c opacity
+    };
     struct Member {
         uint32_t splat = 0;
         glm::dvec3 a{0};         // from the mean to the eye, whitened
         glm::dmat3 whitener{0};  // S^-1 R^T
         double full_depth = 0;   // of a density: times |b| / |v|
-        glm::dvec3 scale{0};
+        glm::dvec3 scale{0};     // with Footprint::antialias of the wider splat
         glm::dvec3 color{0};
+        Widening widening;  // with Footprint::antialias
     };
     /// A splat on one ray.
     struct Met {
@@ -73,12 +93,20 @@ class Rays {
     void ray_gradient(int x, int y, const glm::dvec3& up, std::vector<Sums>& sums) const;
     void march_gradient(int x, int y, const glm::dvec3& up, std::vector<Sums>& sums) const;
     Splat splat_gradient(const Member& member, const Sums& sums) const;
+    void widen(Member& member, const Splat& splat, const glm::dmat3& axes, const glm::dvec3& mean) const;
+    /// From the gradient of the wider splat to that of the splat. by_opacity: dL/d(ln(c opacity)).
+    void narrow(const Member& member, const glm::dmat3& axes, double by_opacity, Splat& gradient,
+                glm::dvec3& torque) const;
+    /// v, and nothing where the lens shows nothing.
+    std::optional<glm::dvec3> view_of(int x, int y) const;
 
     Values values_;
     Camera camera_;
     RenderOptions options_;
     Smoothing smoothing_;
     const Rays* fixed_;
+    bool by_distance_;   // of the lens
+    double lens_limit_;  // of the lens
     std::vector<Projected> projected_;
     std::vector<Member> members_;
 };

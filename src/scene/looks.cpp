@@ -26,7 +26,6 @@ bool points(const Look& look) {
 }
 
 constexpr std::string_view kNoFootprint = "a sphere has no footprint";
-constexpr std::string_view kNoAntialias = "there are no footprints to antialias; --kernel peak has none";
 constexpr std::array kRows{
     Row{"--antialias", [](const Look& look) { return look.antialias; }, Relation::excludes, "--kernel",
         [](const Look& look) { return look.kernel; }, "--antialias is the kernel antialias"},
@@ -37,10 +36,8 @@ constexpr std::array kRows{
     Row{"--points", points, Relation::excludes, "--integrator",
         [](const Look& look) { return look.render.integrator != Integrator::splat; },
         "spheres are blended on the image"},
-    Row{"--integrator ray", integrated_by<Integrator::ray>, Relation::excludes, "--kernel antialias",
-        drawn_with<Footprint::antialias>, kNoAntialias},
     Row{"--integrator march", integrated_by<Integrator::march>, Relation::excludes, "--kernel antialias",
-        drawn_with<Footprint::antialias>, kNoAntialias},
+        drawn_with<Footprint::antialias>, "the others antialias"},
     Row{"--nearest", [](const Look& look) { return look.nearest; }, Relation::needs, "--points", points},
     Row{"--samples", [](const Look& look) { return look.samples; }, Relation::needs, "--integrator march",
         integrated_by<Integrator::march>}};
@@ -59,7 +56,9 @@ void check_lens(const RenderOptions& render, const Camera& camera) {
     if (moves(camera) && (!option.empty() || render.sky))
         throw InputError(std::string(option.empty() ? "--background sky" : option) +
                          " draws no images of a rolling shutter");
-    if (!option.empty())
+    const bool shot = render.integrator != Integrator::splat && render.integrator != Integrator::march &&
+                      camera.distortion.lens != Lens::orthographic;
+    if (!option.empty() && !shot)
         throw InputError(std::string(option) +
                          " draws through pinholes only; take --lens undistort for images of another lens");
 }

@@ -11,8 +11,10 @@ inline const core::Words<Footprint> kKernelWords{{"peak", Footprint::peak},
                                                  {"antialias", Footprint::antialias},
                                                  {"density", Footprint::density},
                                                  {"ewa", Footprint::density}};
-inline const core::Words<Integrator> kIntegratorWords{
-    {"splat", Integrator::splat}, {"ray", Integrator::ray}, {"march", Integrator::march}};
+inline const core::Words<Integrator> kIntegratorWords{{"splat", Integrator::splat},
+                                                      {"ray", Integrator::ray},
+                                                      {"fast-ray", Integrator::fast_ray},
+                                                      {"march", Integrator::march}};
 inline const core::Words<MaskUse> kMaskWords{{"auto", MaskUse::automatic},
                                              {"ignore", MaskUse::ignore},
                                              {"cut", MaskUse::cut},

@@ -137,14 +137,27 @@ void compile_points(Compiler& compiler) {
 
 void compile_rays(Compiler& compiler) {
     using namespace shared;
-    const Values kernels = {KERNEL_PEAK, KERNEL_DENSITY}, chunks = {1, 2, 4, 8};
-    compiler.compile<passes::ProjectRays>(
-        {{SPEC_SH_DEGREE, kDegrees}, {SPEC_KERNEL, kernels}, {SPEC_MODE, {0, PROJECT_RAYS_DEEP}}});
-    compiler.compile<passes::BlendRays>({{SPEC_KERNEL, kernels}, {SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH}}});
+    const Values kernels = {KERNEL_PEAK, KERNEL_DENSITY}, chunks = {1, 2, 4, 8}, lenses = {0, 1};
+    const Values all_kernels = {KERNEL_PEAK, KERNEL_ANTIALIAS, KERNEL_DENSITY};
+    compiler.compile<passes::ProjectRays>({{SPEC_SH_DEGREE, kDegrees},
+                                           {SPEC_KERNEL, all_kernels},
+                                           {SPEC_MODE, {0, PROJECT_RAYS_DEEP, PROJECT_RAYS_BY_MEAN}},
+                                           {SPEC_LENSES, lenses}});
+    compiler.compile<passes::BlendRays>(
+        {{SPEC_KERNEL, kernels}, {SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH}}, {SPEC_LENSES, lenses}});
+    compiler.compile<passes::BlendFastRays>(
+        {{SPEC_KERNEL, kernels}, {SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH}}, {SPEC_LENSES, lenses}});
+    compiler.compile<passes::BlendFastRaysBackward>({{SPEC_KERNEL, kernels}, {SPEC_LENSES, lenses}});
     compiler.compile<passes::MarchRays>({{SPEC_KERNEL, kernels}, {SPEC_MODE, chunks}});
-    compiler.compile<passes::BlendRaysBackward>({{SPEC_KERNEL, kernels}});
+    compiler.compile<passes::BlendRaysBackward>({{SPEC_KERNEL, kernels}, {SPEC_LENSES, lenses}});
     compiler.compile<passes::MarchRaysBackward>({{SPEC_KERNEL, kernels}, {SPEC_MODE, chunks}});
-    compiler.compile<passes::GatherRays>({{SPEC_SH_DEGREE, kDegrees}, {SPEC_KERNEL, kernels}});
+    const uint32_t packed = UPDATE_PACKED_MOMENTS, statistics = UPDATE_STATISTICS;
+    compiler.compile<passes::UpdateRays>({{SPEC_SH_DEGREE, kDegrees},
+                                          {SPEC_KERNEL, all_kernels},
+                                          {SPEC_MODE,
+                                           {UPDATE_GRADIENT_ONLY, 0, statistics, UPDATE_REGULARISED, packed,
+                                            packed | statistics, packed | UPDATE_REGULARISED}},
+                                          {SPEC_LENSES, lenses}});
 }
 
 void compile_training(Compiler& compiler) {

@@ -13,6 +13,7 @@
 #include "reference/rays.h"
 #include "reference/volume.h"
 #include "support/gradient_check.h"
+#include "support/random_lens.h"
 
 namespace ewa::test {
 namespace {
@@ -34,8 +35,10 @@ void PrintTo(const RayCase& c, std::ostream* out) {
 std::string ray_case_name(const testing::TestParamInfo<RayCase>& info) {
     const RayCase& c = info.param;
     return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) +
-           (c.integrator == Integrator::ray ? "_ray" : "_march" + std::to_string(c.samples)) + "_kernel" +
-           std::to_string(int(c.kernel)) + "_seed" + std::to_string(c.seed);
+           (c.integrator == Integrator::ray        ? "_ray"
+            : c.integrator == Integrator::fast_ray ? "_fast_ray"
+                                                   : "_march" + std::to_string(c.samples)) +
+           "_kernel" + std::to_string(int(c.kernel)) + "_seed" + std::to_string(c.seed);
 }
 
 class RayChain : public testing::TestWithParam<RayCase>, protected ChainScene {
@@ -54,7 +57,7 @@ class RayChain : public testing::TestWithParam<RayCase>, protected ChainScene {
 };
 
 TEST_P(RayChain, PictureMatchesTheReference) {
-    const bool depth = options.integrator == Integrator::ray;
+    const bool depth = options.integrator != Integrator::march;
     Renderer renderer(device(), gaussians, options);
     const Rendering rendering = renderer.render(camera, depth);
     const reference::Rendered cpu = reference::render(gaussians, camera, options);
@@ -96,11 +99,18 @@ std::vector<RayCase> ray_cases() {
                 all.push_back({kind, 150, 45, 37, int(seed % 4), integrator, samples, kernel, seed});
                 ++seed;
             }
+    for (const SplatKind kind :
+         {SplatKind::ordinary, SplatKind::needles, SplatKind::sub_pixel, SplatKind::mixed})
+        for (const auto& [integrator, kernel] : {std::pair(Integrator::ray, Footprint::antialias),
+                                                 std::pair(Integrator::fast_ray, Footprint::antialias),
+                                                 std::pair(Integrator::fast_ray, Footprint::density)})
+            all.push_back({kind, 150, 45, 37, int(seed % 4), integrator, 0, kernel, seed++});
     for (const int samples : {1, 3})
         all.push_back(
             {SplatKind::mixed, 100, 33, 21, 1, Integrator::march, samples, Footprint::peak, seed++});
     // More splats on a ray than a lane holds.
-    all.push_back({SplatKind::ordinary, 1500, 24, 20, 0, Integrator::ray, 0, Footprint::peak, seed++});
+    for (const Integrator integrator : {Integrator::ray, Integrator::fast_ray})
+        all.push_back({SplatKind::ordinary, 1500, 24, 20, 0, integrator, 0, Footprint::peak, seed++});
     // More than a strip lists.
     all.push_back({SplatKind::ordinary, 3000, 16, 12, 0, Integrator::march, 4, Footprint::peak, seed + 2});
     for (const size_t splats : {size_t(0), size_t(1)})
@@ -271,7 +281,7 @@ TEST(RayChainScenes, GradientsRepeat) {
     const Camera camera = random_camera(41, 40, 30);
     const Gaussians gaussians = random_gaussians(42, 300, SplatKind::mixed, camera, 2);
     const Image target = random_target(43, 40, 30);
-    for (const Integrator integrator : {Integrator::ray, Integrator::march}) {
+    for (const Integrator integrator : {Integrator::ray, Integrator::fast_ray, Integrator::march}) {
         const RenderOptions options{.integrator = integrator, .samples = 12};
         const Gaussians a = loss_gradient(device(), gaussians, camera, target, options).gradient;
         const Gaussians b = loss_gradient(device(), gaussians, camera, target, options).gradient;
@@ -285,7 +295,7 @@ TEST(RayChainScenes, WhatCannotBeDrawnIsRefused) {
     const Camera camera = random_camera(51, 16, 16);
     const Gaussians gaussians = random_gaussians(52, 5, SplatKind::ordinary, camera, 0);
     const RenderOptions ray{.integrator = Integrator::ray}, march{.integrator = Integrator::march};
-    RenderOptions antialiased = ray, many = march;
+    RenderOptions antialiased = march, many = march;
     antialiased.kernel = Footprint::antialias;
     many.samples = kMostSamples + 1;
     EXPECT_THROW(Renderer(device(), gaussians, antialiased), InputError);
@@ -298,6 +308,67 @@ TEST(RayChainScenes, WhatCannotBeDrawnIsRefused) {
                  InputError);
 }
 
+/// All but parallel rays, which do not meet in the eye.
+std::vector<NamedCamera> cameras_of_rays(uint64_t seed, int width, int height) {
+    std::vector<NamedCamera> all = random_lenses(seed, width, height);
+    std::erase_if(all, [](const NamedCamera& c) { return c.camera.distortion.lens == Lens::orthographic; });
+    return all;
+}
+
+class RayChainThroughALens : public testing::TestWithParam<Integrator> {};
+
+TEST_P(RayChainThroughALens, ImagesAreTheReferences) {
+    const Integrator integrator = GetParam();
+    for (const Footprint kernel : {Footprint::peak, Footprint::antialias, Footprint::density})
+        for (const auto& [name, camera] : cameras_of_rays(6100, 97, 61)) {
+            SCOPED_TRACE(name);
+            const Gaussians gaussians = gaussians_around(6101, 300, camera, 2);
+            const RenderOptions options{
+                .background = {0.1f, 0.3f, 0.2f}, .kernel = kernel, .integrator = integrator};
+            Renderer renderer(device(), gaussians, options);
+            const Rendering actual = renderer.render(camera, true);
+            const reference::Rendered expected = reference::render(gaussians, camera, options);
+            const auto excluded = reference::Rays(gaussians, camera, options).at_threshold(4e-4);
+            EXPECT_LT(std::count(excluded.begin(), excluded.end(), 1), 0.5 * double(excluded.size()));
+            EXPECT_LT(image_errors(actual.color, expected.blended.color, 2e-5, excluded).worst, 2e-5);
+            const double deepest =
+                *std::max_element(expected.blended.depth.values.begin(), expected.blended.depth.values.end());
+            EXPECT_LT(image_errors(actual.depth, expected.blended.depth, 1e-3 * deepest, excluded).worst,
+                      1e-3 * deepest);
+            EXPECT_EQ(renderer.skipped_nonfinite(), 0u);
+        }
+}
+
+TEST_P(RayChainThroughALens, GradientsAreTheReferences) {
+    for (const Footprint kernel : {Footprint::peak, Footprint::antialias, Footprint::density})
+        for (const auto& [name, camera] : cameras_of_rays(6600, 41, 29)) {
+            SCOPED_TRACE(name);
+            const Gaussians gaussians = gaussians_around(6601, 60, camera, 1);
+            const Image target = random_target(6602, 41, 29);
+            const RenderOptions options{.kernel = kernel, .integrator = GetParam()};
+            const LossGradient actual = loss_gradient(device(), gaussians, camera, target, options);
+            const auto expected = reference::loss_gradient(gaussians, camera, target, options);
+            EXPECT_TRUE(splat_gradients_agree(actual.gradient, expected.gradient, {1e-6, 1e-3, 1e-2, 2e-4}));
+        }
+}
+
+/// Large splats around the eye, the seam and the poles: no tile misses one.
+TEST_P(RayChainThroughALens, LargeSplatsAreEverywhereThatTheyShow) {
+    for (const auto& [name, camera] : cameras_of_rays(6800, 80, 48)) {
+        SCOPED_TRACE(name);
+        Gaussians gaussians = gaussians_around(6801, 60, camera, 0);
+        for (float& scale : gaussians.log_scales) scale += 1.5f;
+        for (float& logit : gaussians.opacity_logits) logit -= 1;
+        const RenderOptions options{.integrator = GetParam()};
+        const Image actual = Renderer(device(), gaussians, options).render(camera).color;
+        const auto expected = reference::render(gaussians, camera, options);
+        const auto excluded = reference::Rays(gaussians, camera, options).at_threshold(4e-4);
+        EXPECT_LT(image_errors(actual, expected.blended.color, 2e-5, excluded).worst, 2e-5);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, RayChainThroughALens, testing::Values(Integrator::ray, Integrator::fast_ray),
+                         [](const auto& each) { return each.param == Integrator::ray ? "ray" : "fast_ray"; });
 INSTANTIATE_TEST_SUITE_P(All, RayChain, testing::ValuesIn(ray_cases()), ray_case_name);
 
 }  // namespace

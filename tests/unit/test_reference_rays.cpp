@@ -11,6 +11,7 @@
 #include "reference/render.h"
 #include "reference/volume.h"
 #include "support/gradient_check.h"
+#include "support/random_lens.h"
 #include "support/random_scene.h"
 
 namespace ewa::reference {
@@ -62,6 +63,50 @@ TEST(ReferenceRays, GradientsAreDifferences) {
             check_gradient(ray_scene(3, test::SplatKind::ordinary, 8, integrator, kernel));
             check_gradient(ray_scene(5, test::SplatKind::off_screen_and_close, 8, integrator, kernel));
         }
+}
+
+TEST(ReferenceRays, GradientsOfWidenedSplatsAreDifferences) {
+    for (const test::SplatKind kind : {test::SplatKind::ordinary, test::SplatKind::sub_pixel})
+        for (const Integrator integrator : {Integrator::ray, Integrator::fast_ray})
+            check_gradient(ray_scene(7, kind, 8, integrator, Footprint::antialias));
+}
+
+/// Parallel rays begin beside the camera's position: they are not shot.
+TEST(ReferenceRays, GradientsThroughLensesAreDifferences) {
+    for (const Footprint kernel : {Footprint::peak, Footprint::antialias})
+        for (const auto& [name, camera] : test::random_lenses(6900, 19, 15)) {
+            if (camera.distortion.lens == Lens::orthographic) continue;
+            SCOPED_TRACE(name);
+            RayScene scene;
+            scene.camera = camera;
+            scene.values = test::gaussians_around(6901, 8, camera, 1);
+            scene.target = test::random_target(6902, 19, 15);
+            scene.options = {.kernel = kernel, .integrator = Integrator::ray};
+            check_gradient(std::move(scene));
+        }
+}
+
+/// A widened splat absorbs as much as before: over the plane, and where it is seen through.
+TEST(ReferenceRays, WidenedSplatsAbsorbAsMuch) {
+    Camera camera;
+    camera.width = camera.height = 41;
+    camera.fx = camera.fy = 60;
+    camera.cx = camera.cy = 20.5;
+    Values one;
+    one.means = {0, 0, 4};
+    one.quaternions = {0.9, 0.2, -0.3, 0.1};
+    one.log_scales = {std::log(0.06), std::log(0.1), std::log(0.08)};
+    one.opacity_logits = {-2};
+    one.sh = {1, 1, 1};
+    const auto absorbed = [&](Footprint kernel) {
+        const Blended image =
+            Rays(one, camera, {.kernel = kernel, .integrator = Integrator::ray}, {AlphaCut::none, false})
+                .blended();
+        double sum = 0;
+        for (const double left : image.transmittance.values) sum += 1 - left;
+        return sum;
+    };
+    EXPECT_NEAR(absorbed(Footprint::antialias) / absorbed(Footprint::peak), 1, 0.03);
 }
 
 /// The root mean square error of a march over some pixels.
