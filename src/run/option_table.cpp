@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run/option_table.h"
 
-#include <spdlog/fmt/fmt.h>
-
 #include <algorithm>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -15,6 +13,7 @@
 #include "ewa/metrics.h"
 #include "run/advanced_options.h"
 #include "run/blurred_images.h"
+#include "run/look_options.h"
 #include "run/loss_option.h"
 #include "run/option_rows.h"
 #include "run/region_option.h"
@@ -155,24 +154,6 @@ RunOption device_memory_option() {
     return option;
 }
 
-RunOption points_option() {
-    RunOption option =
-        flag("points",
-             "Splats are spheres, as PyTorch3D draws points: a pixel blends the nearest ones that "
-             "cover it. Opacities and rotations are not used",
-             [](RunOptions& o) -> bool& { return o.train.render.points; });
-    option.before = "false";
-    return option;
-}
-
-RunOption nearest_option() {
-    RunOption option = number<int>(
-        "nearest", "K", "With --points: spheres that a pixel blends", kDecides,
-        [](RunOptions& o) -> int& { return o.train.render.nearest; }, 1, kMostNearest);
-    option.before = "8";
-    return option;
-}
-
 RunOption batch_option() {
     RunOption option = number<int>(
         "batch", "B",
@@ -235,28 +216,6 @@ RunOption inria_option() {
              "INRIA's trainer does: SIBR's viewers open it",
              [](RunOptions& o) -> bool& { return o.inria; });
     option.decides_result = false;
-    return option;
-}
-
-RunOption background_option() {
-    RunOption option{
-        "background", "COLOUR",
-        "Colour behind the splats: r,g,b in 0..1, a name such as white, #rrggbb, random (a new one each "
-        "step), or sky (light from far away that is learned, by direction)",
-        kDecides};
-    option.get = [](const RunOptions& options) {
-        const auto& [r, g, b] = options.train.render.background;
-        if (options.train.sky) return std::string("sky");
-        return options.train.random_background ? "random" : fmt::format("{},{},{}", r, g, b);
-    };
-    option.set = [](RunOptions& options, const std::string& text) {
-        const bool random = text == "random", sky = text == "sky";
-        const auto colour = random || sky ? std::optional(std::array<float, 3>{}) : core::parse_colour(text);
-        if (!colour) throw InputError(core::not_a_colour(text));
-        options.train.random_background = random;
-        options.train.sky = sky;
-        options.train.render.background = *colour;
-    };
     return option;
 }
 
@@ -424,6 +383,7 @@ std::vector<Row> rows() {
              [](RunOptions& o) -> Footprint& { return o.train.render.kernel; }, scene::kKernelWords)},
         {"Quality", "points", points_option()},
         {"Quality", "nearest", nearest_option()},
+        {"Quality", "integrator", integrator_option()},
         {"Output", "",
          number<int>(
              "eval-every", "N", "Evaluate the held-out views every N steps. 0: only at the end",

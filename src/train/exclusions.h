@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a training cannot do where its splats or its views are divided, and what it cannot do with points. Errors print these
+// What a training cannot do where its splats or its views are divided, and what it cannot do with points or rays. Errors print these
 // rows, and docs/scale.md shows those of a division. src/scene/looks.cpp has the rows of renders, src/run/run_input.cpp those of
 // whole runs.
 #pragma once
@@ -29,6 +29,10 @@ inline constexpr std::array kExclusions{
               [](const TrainOptions& options) { return options.render.points; },
               {true, true, true, true},
               "spheres are listed and moved within the one picture that shows them"},
+    Exclusion{"--integrator",
+              [](const TrainOptions& options) { return options.render.integrator != Integrator::splat; },
+              {true, true, true, true},
+              "how rays meet a splat is gathered within the one picture that shows it"},
     Exclusion{"--refine-poses",
               [](const TrainOptions& options) { return options.refine_poses; },
               {true, true, true, true},
@@ -63,6 +67,24 @@ inline constexpr std::array kPointExclusions{
     core::Exclusion<TrainOptions>{"--points", has_points, core::Relation::excludes, "--refine-poses",
                                   [](const TrainOptions& options) { return options.refine_poses; },
                                   "spheres have no gradient by the camera"}};
+
+inline bool shoots_rays(const TrainOptions& options) {
+    return options.render.integrator != Integrator::splat;
+}
+
+inline constexpr std::array kRayExclusions{
+    core::Exclusion<TrainOptions>{"--integrator", shoots_rays, core::Relation::excludes, "--refine-poses",
+                                  [](const TrainOptions& options) { return options.refine_poses; },
+                                  "rays have no gradient by the camera"},
+    core::Exclusion<TrainOptions>{"--integrator", shoots_rays, core::Relation::excludes, "--background sky",
+                                  [](const TrainOptions& options) { return options.sky; },
+                                  "rays have no gradient by the transmittance"},
+    core::Exclusion<TrainOptions>{"--integrator", shoots_rays, core::Relation::excludes, "--absgrad",
+                                  [](const TrainOptions& options) { return options.absolute_gradients; },
+                                  "rays have no gradient of single pixels"},
+    core::Exclusion<TrainOptions>{"--integrator", shoots_rays, core::Relation::excludes, "--final-splats",
+                                  [](const TrainOptions& options) { return options.final_splats > 0; },
+                                  "rays count no weights at a pixel"}};
 
 inline constexpr std::array kSkyExclusions{core::Exclusion<TrainOptions>{
     "--background sky", [](const TrainOptions& options) { return options.sky; }, core::Relation::excludes,

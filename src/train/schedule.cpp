@@ -85,6 +85,7 @@ void check_training(const TrainOptions& options, int ranks) {
     check_exclusions(options, ranks);
     scene::check_look({.render = options.render});
     core::check_exclusions(kPointExclusions, options);
+    core::check_exclusions(kRayExclusions, options);
     core::check_exclusions(kSkyExclusions, options);
     if (options.exposure && options.appearance != AppearanceModel::none &&
         options.appearance != AppearanceModel::automatic && options.appearance != AppearanceModel::affine)

@@ -83,6 +83,7 @@ FrameRequest Training::request_of(const CameraUse& camera) const {
             .appearance = plan_.appearance,
             .overlaid = true,
             .motion = plan_.motion,
+            .rays = plan_.rays(),
             .loss = plan_.loss};
 }
 
@@ -146,6 +147,7 @@ void Training::finish_oldest() {
         }
         return;
     }
+    check_rays_finished(counts);
     in_flight_.pop_front();
     log_.add({.loss = loss_of(plan_.loss, counts),
               .psnr = -10 * std::log10(double(counts.squared) / weight),

@@ -384,6 +384,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                              {"bands", "2"},
                                              {"points", "true"},
                                              {"nearest", "3"},
+                                             {"integrator", "ray"},
                                              {"refine-poses", "true"},
                                              {"refine-focal", "true"},
                                              {"eval-every", "6"},
