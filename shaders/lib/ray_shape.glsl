@@ -52,8 +52,10 @@ RayCamera ray_camera(View view) {
 struct Widening {
     vec3 log_scale;     // ln s'
     vec3 narrower;      // (s / s')^2
+    vec3 share;         // (w / s')^2, so that both add up to 1
     vec3 along;         // p over eye.z
-    vec3 own, wider;    // 1 / (s_k^2 Q), and of the wider splat, with that p
+    vec3 own;           // 1 / (s_k^2 Q), with that p
+    float rest;         // Q' / Q = sum (p_k / s'_k)^2 / Q
     float log_share;    // ln c
 };
 
@@ -81,13 +83,14 @@ Widening widening_of(RayCamera eye, mat3 directions, vec3 log_scale) {
     // ln s - ln s'
     const vec3 less = -0.5 * (max(more, vec3(0.0)) + log(1.0 + exp(-abs(more))));
     w.log_scale = log_scale - less;
-    w.narrower = exp(2.0 * less);
+    w.narrower = 1.0 / (1.0 + exp(more));
+    w.share = 1.0 / (1.0 + exp(-more));
     w.along = eye.to_mean * directions;
     // In units of the least scale.
     const vec3 sharp = exp(least_of(log_scale) - log_scale), wide = exp(least_of(w.log_scale) - w.log_scale);
     const float length_sharp = robust_length(w.along * sharp), length_wide = robust_length(w.along * wide);
     w.own = (sharp / length_sharp) * (sharp / length_sharp);
-    w.wider = (wide / length_wide) * (wide / length_wide);
+    w.rest = dot(w.along * w.along * w.own, w.narrower);
     // The least scale of the three cancels against the units.
     w.log_share = less.x + less.y + less.z - least_of(less) + log(length_sharp / length_wide);
     return w;

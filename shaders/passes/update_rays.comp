@@ -52,11 +52,16 @@ void sum_ray_slots(uint first, uint count, out vec4 sum[RAY_SLOT_TEXELS]) {
 // From the gradient of the wider splat to that of the splat: src/reference/rays.h has the formulas. by_opacity: dL/d(ln(c opacity)).
 // by_mean: in the axes of r.eye.
 void narrow(RayShape r, Widening w, float by_opacity, inout vec3 by_log_scale, inout vec3 torque, inout vec3 by_mean) {
-    const vec3 squares = w.along * w.along;
-    const vec3 by_wider = by_log_scale + by_opacity * (squares * w.wider - 1.0);
-    by_log_scale = w.narrower * by_wider + by_opacity * (1.0 - squares * w.own);
-    const float by_width = dot(1.0 - w.narrower, by_wider);
-    const vec3 turned = by_opacity * w.along * (w.own - w.wider);
+    // What the formulas subtract nearly cancels for a splat that is far wider than a pixel. Then they are written by the share of the
+    // pixel in each width, and by the mean of these, 1 - rest.
+    const vec3 of_shadow = w.along * w.along * w.own;
+    const float mean_share = dot(of_shadow, w.share);
+    const vec3 by_wider = by_log_scale + by_opacity * (of_shadow * w.narrower / w.rest - 1.0);
+    const bool wide = w.rest > 0.5;
+    const vec3 by_shadow = wide ? mean_share - w.share * (1.0 + w.narrower) : w.narrower * w.narrower - w.rest;
+    by_log_scale = w.narrower * by_log_scale + by_opacity * (w.share + of_shadow * by_shadow / w.rest);
+    const float by_width = dot(w.share, by_wider);
+    const vec3 turned = by_opacity * w.along * w.own * (wide ? w.share - mean_share : w.rest - w.narrower) / w.rest;
     torque += cross(turned, w.along);
     by_mean += r.directions * turned / r.eye.z + by_width / r.eye.depth * r.eye.deeper;
 }

@@ -112,12 +112,13 @@ TEST(BenchProgram, StabilityIsMeasuredAndWritten) {
     const Ended ended =
         run(kProgram + " --stability --cases ordinary,value_nan --training-steps 3 --json " + json);
     ASSERT_EQ(ended.status, 0) << ended.output;
-    EXPECT_NE(ended.output.find("14 scenes. Each is rendered"), std::string::npos) << ended.output;
-    EXPECT_NE(ended.output.find("all 22 results are within their bounds\n"), std::string::npos)
+    EXPECT_NE(ended.output.find("16 scenes. Each is rendered"), std::string::npos) << ended.output;
+    EXPECT_NE(ended.output.find("all 24 results are within their bounds\n"), std::string::npos)
         << ended.output;
     const nlohmann::json results = read_json(json);
-    // Three kernels and the one of NaNs, and the same of points, rays, marches, a lens and a rolling shutter.
-    ASSERT_EQ(results.at("cases").size(), 14u);
+    // Three kernels and the one of NaNs, and the same of points, rays, marches, a lens, rays through it and a
+    // rolling shutter; and one of widened splats along rays.
+    ASSERT_EQ(results.at("cases").size(), 16u);
     for (const auto& one : results.at("cases")) {
         const std::string name = one.at("name");
         EXPECT_EQ(one.at("good"), true) << one;

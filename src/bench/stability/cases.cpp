@@ -283,6 +283,16 @@ void add_rays(Table& table) {
     Gaussians damaged = usual_scene(usual_camera(), 60, 1);
     for (size_t i = 0; i < 20; ++i) stored_value(damaged, 2 * i, i) = std::numeric_limits<float>::quiet_NaN();
     add("value_nan", "every other splat has a value that is not a number", damaged);
+    const auto widened = [&](const char* name, const char* what, Gaussians gaussians) {
+        table.add(std::string("fast_ray_") + name, what, std::move(gaussians), usual_camera(),
+                  Footprint::antialias);
+        table.cases.back().options.integrator = Integrator::fast_ray;
+    };
+    widened("ordinary_antialias", "splats along rays, widened by a pixel",
+            usual_scene(usual_camera(), 60, 3));
+    widened("scale_1e-06_antialias", "scales times this: all of the width is the pixel's", scaled(1e-6));
+    widened("scale_1e+02_antialias", "scales times this: the camera is inside", scaled(1e2));
+    widened("needles_antialias", "scales of 1 : 1e4", thin_splats(0.15, 1e4));
     // Splats in one place have no order on a ray, but a march mixes them.
     table.add("march_coinciding", "splats in one place",
               usual_scene(usual_camera(), 20, 1, [](Sketch& s, uint32_t) {

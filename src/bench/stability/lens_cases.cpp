@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 #include <limits>
 #include <numbers>
+#include <string>
+#include <string_view>
 
 #include "bench/stability/case_table.h"
 #include "scene/native_lens.h"
@@ -133,6 +136,19 @@ void add_lenses(Table& table) {
         damaged.means[3 * (2 * i) + i % 3] = bad;
     }
     table.add("lens_360_value_nan", "every other splat has a mean that is not finite", damaged, whole);
+    // The same along rays.
+    for (const std::string_view name :
+         {"brown", "brown_fold", "fisheye_220", "fisheye_near", "360", "360_seam", "360_poles",
+          "fisheye_1:1e4", "360_1:1e4", "360_value_nan"}) {
+        StabilityCase along = *std::find_if(
+            table.cases.begin(), table.cases.end(),
+            [&](const StabilityCase& each) { return each.name == "lens_" + std::string(name); });
+        along.name = "ray_" + along.name;
+        // Those near the eye have few distances: equal ones have no order.
+        along.options.integrator = name == "fisheye_near" ? Integrator::ray : Integrator::fast_ray;
+        along.options.kernel = Footprint::antialias;
+        table.cases.push_back(std::move(along));
+    }
 }
 
 }  // namespace ewa::bench
