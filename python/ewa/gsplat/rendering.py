@@ -2,7 +2,6 @@
 """rasterization: splats and cameras to images, with the meta data that strategies read."""
 
 import math
-from enum import IntEnum
 from typing import Any, Literal
 
 import torch
@@ -15,6 +14,7 @@ from ._autograd import Blend, Images, attach_absgrad, needs_gradient, project_op
 from ._geometry import camera_offsets, upper_triangle
 from ._harmonics import evaluate
 from ._projection import cameras_of, lens_of, project
+from ._rolling import RollingShutterType, check_rolling, order_of, project_rolling
 from ._tiles import isect_offset_encode, isect_tiles
 
 _COLOR_MODES = {"RGB", "RGB+D", "RGB+ED", "RGB-d", "RGB-Ed"}
@@ -131,6 +131,9 @@ def rasterization(
     [..., C, 2] and thin_prism_coeffs [..., C, 4] bend a pinhole as OpenCV's model does, and
     radial_coeffs [..., C, 4] a fisheye. They get no gradient.
 
+    rolling_shutter: a RollingShutterType, with which a pinhole reads its first row from viewmats and
+    its last one from viewmats_rs [..., C, 4, 4]. It needs packed=False.
+
     Returns images [..., C, H, W, X], alphas [..., C, H, W, 1] and meta. The entries isect_ids,
     flatten_ids, isect_offsets and tiles_per_gauss of meta are computed when they are first read.
     """
@@ -139,14 +142,12 @@ def rasterization(
         global_z_order,
         return_normals,
         render_mode,
-        rolling_shutter,
         with_ut=with_ut,
         with_eval3d=with_eval3d,
         rays=rays,
         ftheta_coeffs=ftheta_coeffs,
         lidar_coeffs=lidar_coeffs,
         external_distortion_coeffs=external_distortion_coeffs,
-        viewmats_rs=viewmats_rs,
         ut_params=ut_params,
         renderer_config=renderer_config,
     )
@@ -167,6 +168,14 @@ def rasterization(
         extra_signals_sh_degree = integer(
             "extra_signals_sh_degree", extra_signals_sh_degree, 0, operators.MAX_SH_DEGREE
         )
+    order = order_of(rolling_shutter, viewmats_rs)
+    coefficients = dict(
+        radial_coeffs=radial_coeffs,
+        tangential_coeffs=tangential_coeffs,
+        thin_prism_coeffs=thin_prism_coeffs,
+    )
+    if order is not None:
+        check_rolling(camera_model, packed, coefficients)
     scene = _Scene(means, quats, scales, covars, opacities, viewmats, Ks)
     options = project_options(
         width,
@@ -176,15 +185,14 @@ def rasterization(
         far_plane,
         radius_clip,
         rasterize_mode == "antialiased",
-        lens_of(
-            camera_model,
-            scene.dims,
-            radial_coeffs=radial_coeffs,
-            tangential_coeffs=tangential_coeffs,
-            thin_prism_coeffs=thin_prism_coeffs,
-        ),
+        lens_of(camera_model, scene.dims, **coefficients),
     )
-    prints = project(scene.tensors, options, packed, sparse_grad)
+    if order is None:
+        prints = project(scene.tensors, options, packed, sparse_grad)
+    else:
+        prints, scene.seen_along = project_rolling(
+            scene.tensors, viewmats_rs, order, options, width, height
+        )
     ids, (radii, means2d, depths, conics, factors) = (
         (prints[:4], prints[4:]) if packed else ((None,) * 4, prints)
     )
@@ -233,7 +241,6 @@ def _refuse(
     global_z_order,
     return_normals,
     render_mode,
-    rolling_shutter,
     renderer_config,
     **others,
 ):
@@ -257,18 +264,6 @@ def _refuse(
         raise unavailable("return_normals=True")
     if render_mode in _HIT_MODES:
         raise unavailable(f"render_mode {render_mode!r} (hit distance)")
-    if rolling_shutter is not None and int(rolling_shutter) != RollingShutterType.GLOBAL:
-        raise unavailable("rolling_shutter")
-
-
-class RollingShutterType(IntEnum):
-    """gsplat's names; GLOBAL alone is available."""
-
-    ROLLING_TOP_TO_BOTTOM = 0
-    ROLLING_LEFT_TO_RIGHT = 1
-    ROLLING_BOTTOM_TO_TOP = 2
-    ROLLING_RIGHT_TO_LEFT = 3
-    GLOBAL = 4
 
 
 class _Scene:
@@ -302,6 +297,7 @@ class _Scene:
         known = self.opacities.detach()
         self.tensors = (means, quats, scales, covars, self.viewmats, known, Ks)
         self._places = None
+        self.seen_along = None  # directions through a rolling shutter
 
     def rows(self, ids):
         """The range of footprints of each image."""
@@ -336,6 +332,8 @@ class _Scene:
 
     def directions(self, ids):
         """From each camera to each footprint's splat."""
+        if self.seen_along is not None:
+            return self.seen_along
         offsets = camera_offsets(self.viewmats)
         if ids[0] is None:
             return self.means.unsqueeze(-3) + offsets.unsqueeze(-2)
