@@ -72,8 +72,8 @@ struct LossGradient {
     double l2 = 0, ssim = 0, alpha = 0;  // 0 if their weight is 0
     LossWeights weights;                 // that apply to this view: that of alpha is not automatic
     Gaussians gradient;                  // dL/d(stored value) in place of each stored value
-    /// dL/d(each value of the camera's motion), for no motion. Zero with `points`, ray, march and a rolling shutter. By log_focal, the bounds of the
-    /// Jacobian's tangents move with a pinhole, and stay with another lens.
+    /// dL/d(each value of the camera's motion), for no motion. Zero with `points`, ray and march. By log_focal, the bounds of the
+    /// Jacobian's tangents move with a pinhole, and stay with another lens; it is zero where the camera moves during its readout.
     CameraMotion camera;
     uint32_t skipped_nonfinite = 0;
 };

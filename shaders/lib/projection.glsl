@@ -18,7 +18,7 @@ struct LensImage {
 
 // When a rolling shutter sees a splat: readout.glsl fills it.
 struct Readout {
-    float share;  // of the readout
+    float time;   // of the splat's row
     vec3 motion;  // v: of the point in camera coordinates (world units a readout)
     vec3 row;     // r: d(share of the pixel)/d(point); 0 where the share is cut off
     float gain;   // k

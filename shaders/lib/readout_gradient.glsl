@@ -5,10 +5,10 @@
 #define EWA_LIB_READOUT_GRADIENT
 
 // dL/d(mean in camera coordinates) at the time of its row. by_log: as in lens_point_gradient. by_offset: the colour's, by the mean
-// in the world. It counts here through the time alone.
-vec3 readout_point_gradient(FootprintGradient f, Projection p, float by_log, vec3 by_offset) {
+// in the world. It counts here through the time alone. by_v: dL/d(the point's motion).
+vec3 readout_point_gradient(FootprintGradient f, Projection p, float by_log, vec3 by_offset, out vec3 by_v) {
     const Readout o = p.readout;
-    const vec3 turn = readout_turn(), shift = readout_shift_at(o.share), r = o.row, v = o.motion;
+    const vec3 turn = readout_turn(), shift = readout_shift_at(o.time), r = o.row, v = o.motion;
     vec3 v0, v1;
     lens_row_gradients(f, p, by_log, v0, v1);
     // The rows before they are sheared: j' = j + k (j . v) r, and k (j . v) = j' . v.
@@ -17,7 +17,7 @@ vec3 readout_point_gradient(FootprintGradient f, Projection p, float by_log, vec
     const vec2 across = vec2(dot(v0, r), dot(v1, r));
     const float by_gain = dot(along, across);
     const vec3 by_r = along.x * v0 + along.y * v1 + o.gain * by_gain * v;
-    const vec3 by_v = o.gain * (across.x * jx + across.y * jy + by_gain * r);
+    by_v = o.gain * (across.x * jx + across.y * jy + by_gain * r);
     const vec2 rate = o.row == vec3(0.0) ? vec2(0.0)
                                          : vec2(camera.readout_slope[0] * camera.focal_hi[0], camera.readout_slope[1] * camera.focal_hi[1]);
     const vec3 point = point_of(p.view);

@@ -12,6 +12,7 @@ struct SplatGradient {
     vec3 log_scale;
     vec3 view;     // dL/d(mean in camera coordinates), without the part that passes through the colour
     vec3 torque;   // dL/d(rotation about the splat's own axes, radians)
+    vec3 motion;   // dL/d(motion during the readout, of the point in camera coordinates)
 };
 
 // 1 - opacity has no digits left where the opacity is close to 1.
@@ -28,7 +29,8 @@ SplatGradient splat_gradient(FootprintGradient f, StoredProjection stored, Store
     const Projection p = stored.footprint;
     SplatGradient result;
     const vec3 by_offset = along_gradient(p, direction, direction_gradient);
-    result.view = ROLLING        ? readout_point_gradient(f, p, g, by_offset)
+    result.motion = vec3(0.0);
+    result.view = ROLLING        ? readout_point_gradient(f, p, g, by_offset, result.motion)
                   : LENSES != 0u ? lens_point_gradient(f, p, g)
                                  : view_point_gradient(f, p);
     const mat3 to_world = transpose(seen_rotation(p));

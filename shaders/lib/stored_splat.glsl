@@ -54,7 +54,7 @@ float depth_of_splat(Projection p) { return LENSES != 0u ? p.image.depth : p.vie
 
 // The camera's rotation when it sees the splat.
 mat3 seen_rotation(Projection p) {
-    return ROLLING ? readout_rotation(p.readout.share) * camera_rotation() : camera_rotation();
+    return ROLLING ? readout_rotation(p.readout.time) * camera_rotation() : camera_rotation();
 }
 
 // The direction in which the camera sees the splat.
@@ -81,7 +81,7 @@ StoredProjection project_splat(StoredSplat splat) {
         LensImage image;
         View seen = view;
         const Readout readout = read_out(seen, image);
-        const mat3 turned = readout_rotation(readout.share) * directions;
+        const mat3 turned = readout_rotation(readout.time) * directions;
         p.footprint = project_through_lens(seen, image, turned, turned, scale, float(LOW_PASS));
         p.footprint.readout = readout;
     } else if (LENSES != 0u)

@@ -1,6 +1,6 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// One Adam step of one training camera's motion.
+// One Adam step of one training camera's motion, or of what is learned of its readout.
 // One workgroup of one subgroup does all of it. It reads the partial sums of the gradient and adds them in a fixed
 // order. Adam's step, in the coordinates of the camera's basis, updates the motion and its moments.
 // A weak pull towards no motion keeps all cameras together from drifting with the splats. An update that is not finite is
@@ -21,7 +21,7 @@ layout(push_constant, scalar) uniform Push { MotionUpdatePush push; };
 
 float sum_of_row(uint row) {
     float sum = 0.0;
-    for (uint b = LANE; b < push.blocks; b += SUBGROUP) sum += sums[row * push.blocks + b];
+    for (uint b = LANE; b < push.blocks; b += SUBGROUP) sum += sums[(push.first_row + row) * push.blocks + b];
     return subgroup_sum(sum);
 }
 
@@ -30,13 +30,16 @@ void main() {
     float gradient[MOTION_VALUES];
     [[unroll]] for (uint i = 0; i < MOTION_VALUES; ++i) gradient[i] = sum_of_row(i);
     if (LANE != 0u) return;
-    const uint at = MOTION_FLOATS * push.photo, basis = MOTION_BASIS_FLOATS * push.photo;
+    const uint at = MOTION_FLOATS * push.motion, basis = MOTION_BASIS_FLOATS * push.motion;
     const vec3 turn = vec3(motions[at], motions[at + 1u], motions[at + 2u]);
-    const vec3 by_turn = turn_gradient(turn, vec3(gradient[0], gradient[1], gradient[2]));
-    const vec3 by_shift = shift_gradient(turn, vec3(gradient[4], gradient[5], gradient[6]));
-    [[unroll]] for (uint k = 0; k < 3; ++k) {
-        gradient[k] = by_turn[k];
-        gradient[4 + k] = by_shift[k];
+    // The sums of a pose are relative to the moved camera.
+    if (push.first_row == 0u) {
+        const vec3 by_turn = turn_gradient(turn, vec3(gradient[0], gradient[1], gradient[2]));
+        const vec3 by_shift = shift_gradient(turn, vec3(gradient[4], gradient[5], gradient[6]));
+        [[unroll]] for (uint k = 0; k < 3; ++k) {
+            gradient[k] = by_turn[k];
+            gradient[4 + k] = by_shift[k];
+        }
     }
     [[unroll]] for (uint i = 0; i < MOTION_VALUES; ++i)
         gradient[i] += (i < 4u ? push.pull : push.shift_pull) * motions[at + i];

@@ -15,10 +15,21 @@ layout(set = 0, binding = 1, scalar) readonly buffer Motions { vec4 motions[]; }
 layout(set = 0, binding = 2, scalar) writeonly buffer Moved { CameraBlock moved; };
 layout(push_constant, scalar) uniform Push { MoveCameraPush push; };
 
+// Adds what is learned of the readout's motion.
+void move_readout(inout CameraBlock block) {
+    vec3 turn = vec3(camera.readout_turn[0], camera.readout_turn[1], camera.readout_turn[2]) + motions[MOTION_TEXELS * push.readout].xyz;
+    turn *= min(1.0, float(READOUT_TURN_LEARNED) / max(length(turn), 1e-3));
+    const vec3 shift = motions[MOTION_TEXELS * push.readout + 1u].xyz;
+    [[unroll]] for (int i = 0; i < 3; ++i) {
+        block.readout_turn[i] = turn[i];
+        block.readout_shift[i] = camera.readout_shift[i] + shift[i];
+    }
+}
+
 void main() {
     if (LANE != 0u) return;
-    const vec4 first = motions[MOTION_TEXELS * push.photo];
-    const vec3 shift = motions[MOTION_TEXELS * push.photo + 1u].xyz;
+    const vec4 first = motions[MOTION_TEXELS * push.motion];
+    const vec3 shift = motions[MOTION_TEXELS * push.motion + 1u].xyz;
     const float focal_change = exp(first.w) - 1.0;
     const mat3 rotation = camera_rotation();
     const vec3 away = transpose(rotation) * shift;
@@ -43,5 +54,6 @@ void main() {
         block.tan_min[i] = camera.tan_min[i] / (1.0 + focal_change);
         block.tan_max[i] = camera.tan_max[i] / (1.0 + focal_change);
     }
+    if (push.readout != push.motion) move_readout(block);
     moved = block;
 }

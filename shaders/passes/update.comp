@@ -15,6 +15,7 @@
 #include "lib/stored_splat.glsl"
 #include "lib/footprint_gradient.glsl"
 #include "lib/splat_gradient.glsl"
+#include "lib/motion.glsl"
 #include "lib/subgroup.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
@@ -47,31 +48,51 @@ struct MotionGradient {
     vec3 shift;
 };
 
+struct MotionGradients {
+    MotionGradient pose, readout;
+};
+const MotionGradient NO_MOTION = MotionGradient(vec4(0.0), vec3(0.0));
+const MotionGradients NO_MOTIONS = MotionGradients(NO_MOTION, NO_MOTION);
+
 // The rotation turns the splat's position and axes, as the camera sees them, and the direction of parallel rays. The shift moves
 // the mean the other way.
-MotionGradient motion_gradient(FootprintGradient f, StoredProjection stored, vec3 view_gradient, vec3 torque, vec3 mean_gradient,
-                               vec3 direction_gradient) {
+MotionGradient pose_gradient(FootprintGradient f, StoredProjection stored, SplatGradient g, vec3 direction_gradient) {
     const Projection p = stored.footprint;
-    const vec3 position = vec3(p.view.x.x, p.view.y.x, p.view.z.x);
-    const vec3 axes_torque = camera_rotation() * (rotation_of(stored.unit_quaternion) * torque);
-    vec3 turn = cross(position, view_gradient) + axes_torque;
+    const vec3 axes_torque = camera_rotation() * (rotation_of(stored.unit_quaternion) * g.torque);
+    vec3 turn = cross(point_of(p.view), g.view) + axes_torque;
     if (LENSES != 0u && camera.lens == LENS_ORTHOGRAPHIC) turn += cross(camera_rotation() * direction_gradient, vec3(0.0, 0.0, 1.0));
-    return MotionGradient(vec4(turn, LENSES != 0u ? lens_focal_gradient(f, p) : focal_gradient(f, p)),
-                          -(camera_rotation() * mean_gradient));
+    return MotionGradient(vec4(turn, LENSES != 0u ? lens_focal_gradient(f, p) : focal_gradient(f, p)), -(camera_rotation() * g.mean));
+}
+
+// The same through a rolling shutter, and by its motion. With the time t, R = exp(t turn) and the point p in the middle,
+//   y = R (p - t shift) and v = turn x y - R shift.
+MotionGradients rolling_gradient(StoredProjection stored, SplatGradient g) {
+    const Projection p = stored.footprint;
+    const float time = p.readout.time;
+    const mat3 back = transpose(readout_rotation(time));
+    const vec3 position = point_of(p.view), by_middle = camera_rotation() * g.mean;
+    const vec3 torque = cross(position, g.view) + seen_rotation(p) * (rotation_of(stored.unit_quaternion) * g.torque);
+    const vec3 later = torque - cross(readout_shift_at(time), g.motion);
+    return MotionGradients(
+        MotionGradient(vec4(back * torque + time * cross(readout_shift(), by_middle), 0.0), -by_middle),
+        MotionGradient(vec4(time * turn_gradient(time * readout_turn(), later) + cross(position, g.motion), 0.0),
+                       -(time * by_middle + back * g.motion)));
 }
 
 // All lanes take part in the sums, with or without a splat.
-void write_motion_sums(MotionGradient own) {
+void write_motion_sums(MotionGradient own, uint first_row) {
     const uint subgroups = gl_NumWorkGroups.x * gl_NumWorkGroups.y * (GROUP_SIZE / SUBGROUP);
     const uint at = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * (GROUP_SIZE / SUBGROUP) + SUBGROUP_INDEX;
     [[unroll]] for (uint row = 0; row < MOTION_VALUES; ++row) {
         const float sum = subgroup_sum(row < 4u ? own.first[row % 4u] : own.shift[(row + 2u) % 3u]);
-        if (LANE == 0u) motion_sums[row * subgroups + at] = sum;
+        if (LANE == 0u) motion_sums[(first_row + row) * subgroups + at] = sum;
     }
 }
 
+bool all_finite(MotionGradient g) { return is_finite(g.first) && is_finite(g.shift); }
+
 // Returns the gradient by the camera's motion.
-MotionGradient update_splat(uint i) {
+MotionGradients update_splat(uint i) {
     const uint count = tile_counts[i];
     const bool visible = count > 0u;
     const vec4 p0 = fetch(params, index_of(0, i)), p1 = fetch(params, index_of(1, i)),
@@ -100,19 +121,23 @@ MotionGradient update_splat(uint i) {
                visible ? vec4(g.log_scale, red_gradient) : zero,
                KERNEL == KERNEL_DENSITY ? sigmoid(p0.w) : stored.peak, depth, visible ? widest_log_scale(p) : 3.4e38);
     if (STATISTICS && visible) statistics[i] += statistics_of(f, vec2(push.half_size[0], push.half_size[1]));
-    const MotionGradient none = MotionGradient(vec4(0.0), vec3(0.0));
-    if (!MOTION || !visible) return none;
-    const MotionGradient motion = motion_gradient(f, stored, g.view, g.torque, g.mean, direction_gradient);
+    if (!MOTION || !visible) return NO_MOTIONS;
+    MotionGradients motion = NO_MOTIONS;
+    if (ROLLING)
+        motion = rolling_gradient(stored, g);
+    else
+        motion.pose = pose_gradient(f, stored, g, direction_gradient);
     // One splat's gradient that is not finite leaves those of the others.
-    if (is_finite(motion.first) && is_finite(motion.shift)) return motion;
-    return none;
+    if (all_finite(motion.pose) && all_finite(motion.readout)) return motion;
+    return NO_MOTIONS;
 }
 
 void main() {
     if (counts.instances > push.instance_capacity) return;
     const uint i = item_index();
-    MotionGradient motion = MotionGradient(vec4(0.0), vec3(0.0));
+    MotionGradients motion = NO_MOTIONS;
     if (i < push.splats) motion = update_splat(i);
     count_updates();
-    if (MOTION) write_motion_sums(motion);
+    if (MOTION) write_motion_sums(motion.pose, 0u);
+    if (MOTION && ROLLING) write_motion_sums(motion.readout, MOTION_VALUES);
 }

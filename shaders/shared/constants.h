@@ -19,7 +19,8 @@ EWA_REAL(QUATERNION_MIN, 1.1754943508222875e-38);
 EWA_REAL(JACOBIAN_MARGIN, 0.3);  // x/z in J is clamped to this share of the half image beyond each border
 
 // A rolling shutter. Beyond READOUT_MARGIN of the image's side outside of it, the camera is at rest.
-EWA_REAL(READOUT_TURN_MAX, 1.58);  // radians from the first row to the last
+EWA_REAL(READOUT_TURN_MAX, 1.58);      // radians from the first row to the last
+EWA_REAL(READOUT_TURN_LEARNED, 1.57);  // the same, of a motion that training learns
 EWA_REAL(READOUT_MARGIN, 0.15);
 EWA_UINT(READOUT_VIEWS, 8u);  // that find the time of a splat's row, by Newton's method from one to the next
 EWA_REAL(READOUT_RATE_MIN, 0.1);   // a splat that almost keeps up with the readout has no sharp image

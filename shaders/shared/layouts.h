@@ -215,10 +215,13 @@ EWA_UINT(GRID_PART_PIXELS, 8192u);  // pixels of a column of cells that a subgro
 
 // ---- A camera's motion: what training learns of a camera ----
 // 2 texels at 2 * image: rotation vector (radians, camera axes), logarithm of the factor of the focal lengths; shift of
-// the centre (world units, along the axes that the camera had at the start), 0. lib/motion.glsl has the formulas.
+// the centre (world units, along the axes that the camera had at the start), 0. lib/motion.glsl has the formulas. Those of the
+// images' readouts, if any, follow those of the images.
 EWA_UINT(MOTION_TEXELS, 2u);
 EWA_UINT(MOTION_FLOATS, 8u);
 EWA_UINT(MOTION_VALUES, 7u);  // without the last float
+EWA_UINT(READOUT_MOTION_VALUES,
+         14u);  // rows of sums with LENSES_ROLLING: those of the pose, then those of the readout
 // A camera's basis: MOTION_VALUES rows of as many floats. The motion changes by the basis times a step of Adam.
 EWA_UINT(MOTION_BASIS_FLOATS, 49u);
 
@@ -266,11 +269,12 @@ struct CameraBlock {
     float lens_lo[12];
     float lens_limit;  // LENS_BROWN: largest x^2 + y^2 of tangents; LENS_FISHEYE: largest angle (radians)
     uint lens;         // LENS_*
-    // With LENSES_ROLLING, and zeros where the camera is at rest: scene::ReadoutMotion, in camera axes.
+    // With LENSES_ROLLING: scene::middle_motion. The pose above is that of the middle of the readout. Zeros with a global shutter.
     float readout_turn[3];   // radians
     float readout_shift[3];  // world units
-    float readout_slope[2];  // d(share of the readout)/d(pixel)
-    float readout_first;
+    float readout_slope
+        [2];  // d(time)/d(pixel); the time is -0.5 at the border where the readout begins, and 0.5 at the other
+    float readout_first;  // time of the pixel (0, 0)
 };
 
 // A view of the operators, whose matrix need not be a rotation. The values are as the caller gave them.
@@ -477,12 +481,14 @@ struct SkyUpdatePush {
 };
 
 struct MoveCameraPush {
-    uint photo;  // index of the training image
+    uint motion;   // index of the training image's motion
+    uint readout;  // of what is learned of its readout; that of the motion: nothing
 };
 
 struct MotionUpdatePush {
-    uint photo;
-    uint blocks;  // of partial sums
+    uint motion;
+    uint first_row;  // of its sums. Above 0: of a readout, whose sums are the gradient by the values
+    uint blocks;     // of partial sums
     float rate;
     float pull, shift_pull;  // d(loss)/d(value) for a value of 1
     float beta1, beta2;      // Adam's

@@ -29,10 +29,14 @@ struct GradArguments {
 };
 
 /// dL/d(each value of the camera's motion).
-report::Json motion_json(const CameraMotion& m) {
-    return {{"rotation", {m.rotation.x, m.rotation.y, m.rotation.z}},
-            {"shift", {m.shift.x, m.shift.y, m.shift.z}},
-            {"log_focal", m.log_focal}};
+report::Json motion_json(const CameraMotion& m, bool rolling) {
+    const auto list = [](const glm::dvec3& v) { return report::Json{v.x, v.y, v.z}; };
+    if (rolling)
+        return {{"rotation", list(m.rotation)},
+                {"shift", list(m.shift)},
+                {"readout_turn", list(m.readout_turn)},
+                {"readout_shift", list(m.readout_shift)}};
+    return {{"rotation", list(m.rotation)}, {"shift", list(m.shift)}, {"log_focal", m.log_focal}};
 }
 
 int run(const GradArguments& arguments) {
@@ -65,8 +69,8 @@ int run(const GradArguments& arguments) {
         if (weights.l2 > 0) json["l2"] = result.l2;
         if (weights.ssim > 0) json["ssim"] = result.ssim;
         if (result.weights.alpha > 0) json["alpha"] = result.alpha;
-        if (options.integrator == Integrator::splat && !options.points && !scene::moves(frame.camera))
-            json["camera"] = motion_json(result.camera);
+        if (options.integrator == Integrator::splat && !options.points)
+            json["camera"] = motion_json(result.camera, scene::moves(frame.camera));
         json["frame"] = index;
         json["name"] = frame.name;
         write_json(arguments.json, json);

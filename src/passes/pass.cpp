@@ -25,7 +25,7 @@ static_assert(sizeof(ImageLayout) == 16 && sizeof(PackPush) == 4 && sizeof(Expos
 static_assert(sizeof(PpispPush) == 24 && sizeof(PpispUpdatePush) == 36 && sizeof(PpispCameraPush) == 24 &&
               sizeof(GridPush) == 24 && sizeof(GridUpdatePush) == 32);
 static_assert(sizeof(SkyPush) == 24 && sizeof(SkyGradientPush) == 28 && sizeof(SkyUpdatePush) == 24);
-static_assert(sizeof(MoveCameraPush) == 4 && sizeof(MotionUpdatePush) == 40);
+static_assert(sizeof(MoveCameraPush) == 8 && sizeof(MotionUpdatePush) == 44);
 static_assert(sizeof(UpdatePush) == 72 && sizeof(DensifyPush) == 76 && sizeof(ResetPush) == 12);
 static_assert(sizeof(BandTilesPush) == 16 && sizeof(CollectVisiblePush) == 24 && sizeof(ReceivePush) == 12 &&
               sizeof(SumSlotsPush) == 8 && sizeof(UpdateViewsPush) == 88);

@@ -296,7 +296,7 @@ void FramePasses::backward(const Model& model, const Sorted& sorted, const Rates
     if (plan.rays()) return record(passes::UpdateRays{buffers}, push, {degree(), mode, kernel(), lenses()});
     record(passes::Update{buffers, plan.motion ? frame.motion_sums : frame.partials}, push,
            {degree(), mode, kernel(), lenses()});
-    if (plan.motion) record_motion_sums(*this, frame);
+    if (plan.motion) record_motion_sums(*this, frame, inputs.camera.lenses == shared::LENSES_ROLLING);
     if (motion) record_motion_update(*this, frame, *motion);
 }
 

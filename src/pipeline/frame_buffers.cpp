@@ -205,14 +205,14 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
         s.reduced = rows * s.reduce_blocks * word;
     }
     if (request.gradients && request.motion) {
-        constexpr uint64_t kRows = shared::MOTION_VALUES;
+        const uint64_t motion_rows = request.readouts ? shared::READOUT_MOTION_VALUES : shared::MOTION_VALUES;
         shared::UpdatePush push{};
         push.splats = std::max(request.splats, 1u);
         const auto groups = passes::Update::Work::groups(config, push);
         s.motion_items = groups[0] * groups[1] * (config.element_group / config.subgroup);
         s.motion_blocks = divide_up(s.motion_items, s.reduce_block);
-        s.motion_sums = kRows * s.motion_items * word;
-        s.motion_reduced = kRows * s.motion_blocks * word;
+        s.motion_sums = motion_rows * s.motion_items * word;
+        s.motion_reduced = motion_rows * s.motion_blocks * word;
     }
     if (request.gradients) {
         const uint32_t slot = request.rays ? shared::RAY_SLOT_FLOATS : shared::SLOT_FLOATS;

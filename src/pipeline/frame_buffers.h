@@ -24,9 +24,10 @@ struct FrameRequest {
     bool given_gradient = false;
     // With gradients: buffers that are not needed at the same time share memory. The same for all requests of a frame.
     bool overlaid = false;
-    bool motion = false;  // with gradients: that of the camera's motion
-    bool rays = false;    // splats are integrated along rays
-    LossWeights loss{};   // with gradients: of the loss, whose terms of weight 0 have no buffers
+    bool motion = false;    // with gradients: that of the camera's motion
+    bool readouts = false;  // with motion: a readout's too
+    bool rays = false;      // splats are integrated along rays
+    LossWeights loss{};     // with gradients: of the loss, whose terms of weight 0 have no buffers
 };
 
 /// How a radix sort is divided.

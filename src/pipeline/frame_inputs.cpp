@@ -49,8 +49,8 @@ uint32_t lens_of(const Distortion& lens) {
 }
 
 void set_readout(const Camera& camera, shared::CameraBlock& block) {
-    if (!scene::moves(camera)) return;
-    const scene::ReadoutMotion motion = scene::readout_motion(camera);
+    if (!camera.readout) return;
+    const scene::ReadoutMotion motion = scene::middle_motion(camera);
     for (int i = 0; i < 3; ++i) {
         block.readout_turn[i] = float(motion.turn[i]);
         block.readout_shift[i] = float(motion.shift[i]);
@@ -95,11 +95,12 @@ shared::CameraBlock camera_block(const Camera& camera, const passes::KernelConfi
                                  const glm::dvec3& origin) {
     check(camera);
     shared::CameraBlock block{};
+    const Camera middle = scene::at_middle(camera);
     for (int row = 0; row < 3; ++row)
         for (int column = 0; column < 3; ++column)
-            split(camera.rotation[column][row], block.rotation_hi[3 * row + column],
+            split(middle.rotation[column][row], block.rotation_hi[3 * row + column],
                   block.rotation_lo[3 * row + column]);
-    const glm::dvec3 position = camera.position() - origin;
+    const glm::dvec3 position = middle.position() - origin;
     for (int i = 0; i < 3; ++i) split(position[i], block.position_hi[i], block.position_lo[i]);
     const double focal[2] = {camera.fx, camera.fy}, center[2] = {camera.cx, camera.cy};
     const int size[2] = {camera.width, camera.height};

@@ -10,6 +10,7 @@
 #include "pipeline/adam.h"
 #include "pipeline/model.h"
 #include "scene/native_lens.h"
+#include "scene/readout.h"
 
 namespace ewa::pipeline {
 namespace {
@@ -79,14 +80,25 @@ std::optional<Derivative> seen_derivative(const Camera& camera, double limit, co
 
 using Matrix = std::array<std::array<double, kRows>, kRows>;
 
+/// The derivative by the motion during the readout, at the time of the point's row.
+Derivative at_time(const Camera& camera, const scene::ReadoutMotion& motion, Derivative d) {
+    const double x = camera.fx * d[0][kFocalRow] + camera.cx, y = camera.fy * d[1][kFocalRow] + camera.cy;
+    const double time = motion.first + motion.slope.x * x + motion.slope.y * y;
+    for (auto& row : d)
+        for (double& value : row) value *= time;
+    return d;
+}
+
 /// Adds J^T J of the points that the camera sees. Returns their number.
-size_t add_points(Matrix& a, const Camera& camera, const Gaussians& gaussians) {
+size_t add_points(Matrix& a, const Camera& moving, const Gaussians& gaussians, bool readout) {
+    const Camera camera = scene::at_middle(moving);
+    const scene::ReadoutMotion motion = scene::middle_motion(moving);
     const double limit = scene::lens_limit(camera);
     std::vector<Derivative> seen;
     for (size_t i = 0; i < gaussians.size(); ++i)
         if (const auto d = seen_derivative(camera, limit,
                                            camera.rotation * gaussians.world_mean(i) + camera.translation))
-            seen.push_back(*d);
+            seen.push_back(readout ? at_time(camera, motion, *d) : *d);
     const size_t stride = seen.size() / kBasisPoints + 1;
     size_t points = 0;
     for (size_t i = 0; i < seen.size(); i += stride, ++points)
@@ -121,11 +133,8 @@ Matrix inverse_of_lower(const Matrix& l) {
     return inverse;
 }
 
-}  // namespace
-
-MotionBasis motion_basis(const Camera& camera, const Gaussians& gaussians, bool focal, double extent) {
-    Matrix a{};
-    const size_t points = add_points(a, camera, gaussians);
+/// From the sum of J^T J over the points.
+MotionBasis basis_of(Matrix& a, size_t points, bool focal, double extent) {
     for (size_t r = 0; r < kRows; ++r) {
         for (size_t c = 0; c < kRows; ++c) {
             a[r][c] /= double(std::max<size_t>(points, 1));
@@ -144,8 +153,39 @@ MotionBasis motion_basis(const Camera& camera, const Gaussians& gaussians, bool 
     return basis;
 }
 
-Motions::Motions(gpu::Device& device, const std::vector<MotionBasis>& of_photos)
-    : photos(uint32_t(of_photos.size())),
+}  // namespace
+
+MotionBasis motion_basis(const Camera& camera, const Gaussians& gaussians, bool focal, double extent) {
+    Matrix a{};
+    const size_t points = add_points(a, camera, gaussians, false);
+    return basis_of(a, points, focal, extent);
+}
+
+MotionBasis readout_basis(const Camera& camera, const Gaussians& gaussians, double extent) {
+    Matrix a{};
+    const size_t points = add_points(a, camera, gaussians, true);
+    return basis_of(a, points, false, extent);
+}
+
+MotionBases motion_bases(const std::vector<Camera>& cameras, const Gaussians& gaussians, bool focal,
+                         double extent) {
+    MotionBases bases;
+    for (const Camera& camera : cameras) {
+        bases.poses.push_back(motion_basis(camera, gaussians, focal, extent));
+        bases.rolling.push_back(camera.readout.has_value());
+    }
+    if (std::ranges::find(bases.rolling, true) == bases.rolling.end()) {
+        bases.rolling.clear();
+        return bases;
+    }
+    for (const Camera& camera : cameras)
+        bases.readouts.push_back(camera.readout ? readout_basis(camera, gaussians, extent) : MotionBasis{});
+    return bases;
+}
+
+Motions::Motions(gpu::Device& device, const MotionBases& of_photos)
+    : photos(uint32_t(of_photos.poses.size())),
+      rolling(of_photos.rolling),
       values(device, "motions", bytes()),
       moments1(device, "motion moments1", bytes()),
       moments2(device, "motion moments2", bytes()),
@@ -154,15 +194,21 @@ Motions::Motions(gpu::Device& device, const std::vector<MotionBasis>& of_photos)
     zero(values);
     zero(moments1);
     zero(moments2);
-    bases.upload(std::span<const MotionBasis>(of_photos));
+    std::vector<MotionBasis> all = of_photos.poses;
+    all.insert(all.end(), of_photos.readouts.begin(), of_photos.readouts.end());
+    bases.upload(std::span<const MotionBasis>(all));
 }
 
 std::vector<CameraMotion> Motions::download() const {
-    const auto floats = values.download<float>(size_t(shared::MOTION_FLOATS) * photos);
+    const auto floats = values.download<float>(size_t(shared::MOTION_FLOATS) * count());
     std::vector<CameraMotion> motions(photos);
-    for (size_t i = 0; i < photos; ++i) {
+    for (uint32_t i = 0; i < photos; ++i) {
         const float* f = &floats[shared::MOTION_FLOATS * i];
-        motions[i] = {{f[0], f[1], f[2]}, f[3], {f[4], f[5], f[6]}};
+        motions[i] = {{f[0], f[1], f[2]}, f[3], {f[4], f[5], f[6]}, {}, {}};
+        if (!has_readout(i)) continue;
+        f += shared::MOTION_FLOATS * size_t(photos);
+        motions[i].readout_turn = {f[0], f[1], f[2]};
+        motions[i].readout_shift = {f[4], f[5], f[6]};
     }
     return motions;
 }
@@ -172,53 +218,69 @@ CameraUse record_move_camera(const passes::Recorder& on, const Motions& motions,
     on.record(passes::MoveCamera{.camera = {*base.buffer, base.offset, sizeof(shared::CameraBlock)},
                                  .motions = motions.values,
                                  .moved = motions.camera},
-              {.photo = photo});
+              {.motion = photo, .readout = motions.has_readout(photo) ? motions.photos + photo : photo});
     CameraUse use = base;
     use.buffer = &motions.camera;
     use.offset = 0;
+    // One that is at rest may have learned to move.
+    if (motions.has_readout(photo)) use.lenses = shared::LENSES_ROLLING;
     return use;
 }
 
-void record_motion_sums(const passes::Recorder& on, const FrameBuffers& frame) {
+void record_motion_sums(const passes::Recorder& on, const FrameBuffers& frame, bool readout) {
     on.record(
         passes::Reduce{.source = frame.motion_sums, .sums = frame.motion_reduced, .counts = frame.counts},
         {.items = frame.sizes.motion_items,
          .block = frame.sizes.reduce_block,
          .target = shared::REDUCE_TO_SUMS,
-         .rows = kRows,
+         .rows = readout ? shared::READOUT_MOTION_VALUES : kRows,
          .scale = 1});
 }
 
 void record_motion_update(const passes::Recorder& on, const FrameBuffers& frame, const MotionUse& use) {
     const Motions& m = *use.motions;
     const auto [bias1, bias2] = adam_biases(use.visit, kBeta1, kBeta2);
-    on.record(passes::MotionUpdate{.sums = frame.motion_reduced,
-                                   .motions = m.values,
-                                   .moments1 = m.moments1,
-                                   .moments2 = m.moments2,
-                                   .bases = m.bases,
-                                   .counts = frame.counts},
-              {.photo = use.photo,
-               .blocks = frame.sizes.motion_blocks,
-               .rate = use.rate,
-               .pull = kMotionPull,
-               .shift_pull = kMotionPull / (use.extent * use.extent),
-               .beta1 = float(kBeta1),
-               .beta2 = float(kBeta2),
-               .bias1 = bias1,
-               .bias2 = bias2,
-               .instance_capacity = frame.instance_capacity});
+    shared::MotionUpdatePush push{.motion = use.photo,
+                                  .first_row = 0,
+                                  .blocks = frame.sizes.motion_blocks,
+                                  .rate = use.rate,
+                                  .pull = kMotionPull,
+                                  .shift_pull = kMotionPull / (use.extent * use.extent),
+                                  .beta1 = float(kBeta1),
+                                  .beta2 = float(kBeta2),
+                                  .bias1 = bias1,
+                                  .bias2 = bias2,
+                                  .instance_capacity = frame.instance_capacity};
+    const auto record = [&] {
+        on.record(passes::MotionUpdate{.sums = frame.motion_reduced,
+                                       .motions = m.values,
+                                       .moments1 = m.moments1,
+                                       .moments2 = m.moments2,
+                                       .bases = m.bases,
+                                       .counts = frame.counts},
+                  push);
+    };
+    record();
+    if (!m.has_readout(use.photo)) return;
+    push.motion += m.photos;
+    push.first_row = kRows;
+    record();
 }
 
-CameraMotion download_motion_gradient(const FrameBuffers& frame) {
+CameraMotion download_motion_gradient(const FrameBuffers& frame, bool readout) {
     const uint32_t blocks = frame.sizes.motion_blocks;
-    const auto sums = frame.motion_reduced.download<float>(size_t(kRows) * blocks);
+    const uint32_t rows = readout ? shared::READOUT_MOTION_VALUES : kRows;
+    const auto sums = frame.motion_reduced.download<float>(size_t(rows) * blocks);
     const auto row = [&](uint32_t r) {
         double sum = 0;
         for (uint32_t b = 0; b < blocks; ++b) sum += sums[r * blocks + b];
         return sum;
     };
-    return {{row(0), row(1), row(2)}, row(3), {row(4), row(5), row(6)}};
+    CameraMotion motion{{row(0), row(1), row(2)}, row(3), {row(4), row(5), row(6)}, {}, {}};
+    if (!readout) return motion;
+    motion.readout_turn = {row(kRows), row(kRows + 1), row(kRows + 2)};
+    motion.readout_shift = {row(kRows + 4), row(kRows + 5), row(kRows + 6)};
+    return motion;
 }
 
 }  // namespace ewa::pipeline

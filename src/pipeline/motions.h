@@ -20,18 +20,33 @@ using MotionBasis = std::array<float, shared::MOTION_BASIS_FLOATS>;
 
 /// focal: the focal lengths move too. extent: of the scene, world units.
 MotionBasis motion_basis(const Camera& camera, const Gaussians& gaussians, bool focal, double extent);
+/// The same of what is learned of the motion during a readout: it moves a point by its time from the middle of the readout.
+MotionBasis readout_basis(const Camera& camera, const Gaussians& gaussians, double extent);
+
+/// The bases of photos' cameras.
+struct MotionBases {
+    std::vector<MotionBasis> poses;
+    std::vector<MotionBasis> readouts;  // empty, or as many
+    std::vector<bool> rolling;          // with readouts: whether the photo has one
+};
+MotionBases motion_bases(const std::vector<Camera>& cameras, const Gaussians& gaussians, bool focal,
+                         double extent);
 
 /// Motions of all training cameras, with Adam's moments.
 struct Motions {
     uint32_t photos = 0;
+    std::vector<bool>
+        rolling;  // whether a photo's readout has a motion, the photos-th after that of its pose
     gpu::Buffer values, moments1, moments2, bases;
     gpu::Buffer camera;  // the moved camera of the frame
 
     Motions() = default;
-    /// bases: motion_basis of each photo's camera.
-    Motions(gpu::Device& device, const std::vector<MotionBasis>& bases);
-    uint64_t bytes() const { return 4ull * shared::MOTION_FLOATS * photos; }  // of values and of each moment
-    uint64_t basis_bytes() const { return 4ull * shared::MOTION_BASIS_FLOATS * photos; }
+    Motions(gpu::Device& device, const MotionBases& bases);
+    bool readouts() const { return !rolling.empty(); }
+    bool has_readout(uint32_t photo) const { return readouts() && rolling[photo]; }
+    uint64_t count() const { return readouts() ? 2ull * photos : photos; }
+    uint64_t bytes() const { return 4ull * shared::MOTION_FLOATS * count(); }  // of values and of each moment
+    uint64_t basis_bytes() const { return 4ull * shared::MOTION_BASIS_FLOATS * count(); }
     std::vector<CameraMotion> download() const;
 };
 
@@ -49,13 +64,13 @@ CameraUse record_move_camera(const passes::Recorder& on, const Motions& motions,
                              const CameraUse& base);
 
 /// Adds the partial sums of the gradient that the update pass has left in frame.motion_sums. Their blocks are in
-/// frame.motion_reduced.
-void record_motion_sums(const passes::Recorder& on, const FrameBuffers& frame);
+/// frame.motion_reduced. readout: of a camera with LENSES_ROLLING.
+void record_motion_sums(const passes::Recorder& on, const FrameBuffers& frame, bool readout);
 
 /// The motion takes its own step of Adam, after record_motion_sums.
 void record_motion_update(const passes::Recorder& on, const FrameBuffers& frame, const MotionUse& use);
 
 /// The gradient of the last frame with record_motion_sums, for no motion.
-CameraMotion download_motion_gradient(const FrameBuffers& frame);
+CameraMotion download_motion_gradient(const FrameBuffers& frame, bool readout);
 
 }  // namespace ewa::pipeline

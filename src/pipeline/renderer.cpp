@@ -324,7 +324,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                                 .loss = weights,
                                 .masks = alpha_is_weight && target.channels == 4,
                                 .alpha = cut,
-                                .motion = !scene::moves(camera)});
+                                .motion = true});
     const Model model = upload_model(*device, gaussians, plan.moment_buffers(), false);
     const gpu::Buffer block = upload_camera(*device, camera, cache.config(), model.origin);
     const gpu::Buffer photo = upload_photo(*device, target);
@@ -339,6 +339,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                             .masks = plan.masks,
                             .overlaid = true,
                             .motion = plan.motion,
+                            .readouts = scene::moves(camera),
                             .rays = plan.rays(),
                             .loss = plan.loss};
     FrameBuffers frame;
@@ -358,7 +359,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
     result.loss = loss_of(plan.loss, counts);
     result.gradient = download_model(model, model.moments1);
     result.gradient.origin = glm::dvec3(0);  // a gradient has no origin
-    if (plan.motion) result.camera = download_motion_gradient(frame);
+    if (plan.motion) result.camera = download_motion_gradient(frame, scene::moves(camera));
     result.skipped_nonfinite = counts.skipped_nonfinite;
     return result;
 }

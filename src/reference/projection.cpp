@@ -267,17 +267,22 @@ void shape_backward(const ProjectionSteps& s, const Rows& by_m, Splat& out) {
         out.quaternion[k] = (by_unit[k] - s.unit_quaternion[k] * along) / s.quaternion_norm;
 }
 
-/// dL/d(view position) through mean2d and through J. by_log: dL/d ln(optical depth) of a density, whose |J| is
-/// |row0 x row1|; else 0. by_offset: the colour's dL/d(mean - camera position), which counts here for the time of a readout.
-glm::dvec3 view_backward(const ProjectionSteps& s, const ScreenGradient& g, const Rows& by_m, double by_log,
-                         const glm::dvec3& by_offset) {
-    const LensImage& image = s.image;
-    glm::dvec3 by_view = g.mean2d.x * image.exact.x + g.mean2d.y * image.exact.y;
-    // dL/dJ = dL/dM (W R S)^T, row by row.
-    const glm::dmat3 wrs =
+/// dL/dJ = dL/dM (W R S)^T, row by row.
+Rows axes_gradient(const ProjectionSteps& s, const Rows& by_m) {
+    const glm::dmat3 axes =
         s.camera_rotation *
         glm::dmat3(s.rotation[0] * s.scale[0], s.rotation[1] * s.scale[1], s.rotation[2] * s.scale[2]);
-    Rows by_j{wrs * by_m.x, wrs * by_m.y};
+    return {axes * by_m.x, axes * by_m.y};
+}
+
+/// dL/d(view position) through mean2d and through J. by_log: dL/d ln(optical depth) of a density, whose |J| is
+/// |row0 x row1|; else 0. by_offset: the colour's dL/d(mean - camera position), which counts here for the time of a readout.
+/// by_motion: of readout_backward.
+glm::dvec3 view_backward(const ProjectionSteps& s, const ScreenGradient& g, const Rows& by_m, double by_log,
+                         const glm::dvec3& by_offset, glm::dvec3& by_motion) {
+    const LensImage& image = s.image;
+    glm::dvec3 by_view = g.mean2d.x * image.exact.x + g.mean2d.y * image.exact.y;
+    Rows by_j = axes_gradient(s, by_m);
     // The camera's rotation turns the axes: that moves M as a turn of the rows the other way would.
     const double by_axes = s.readout.moves
                                ? glm::dot(s.readout.turn, glm::cross(by_j.x, image.jacobian.x) +
@@ -288,7 +293,7 @@ glm::dvec3 view_backward(const ProjectionSteps& s, const ScreenGradient& g, cons
         by_j.x += by_log / glm::dot(n, n) * glm::cross(image.jacobian.y, n);
         by_j.y += by_log / glm::dot(n, n) * glm::cross(n, image.jacobian.x);
     }
-    if (s.readout.moves) return readout_backward(s.readout, {by_j, by_view, by_axes, by_offset});
+    if (s.readout.moves) return readout_backward(s.readout, {by_j, by_view, by_axes, by_offset}, by_motion);
     for (size_t c = 0; c < 3; ++c)
         by_view += by_j.x[int(c)] * image.hessian[0][c] + by_j.y[int(c)] * image.hessian[1][c];
     return by_view;
@@ -326,11 +331,7 @@ glm::dvec3 direction_backward(const ProjectionSteps& s, const glm::dvec3& by_dir
 void add_motion_gradient(const ProjectionSteps& s, const Camera& camera, const ScreenGradient& g,
                          const Rows& by_m, double by_log, const glm::dvec3& by_view,
                          const glm::dvec3& by_mean, const glm::dvec3& by_direction, CameraMotion& out) {
-    // dL/dJ by rows, and with that dL/dW_j = J^T dL/d(J W)_j.
-    const glm::dmat3 axes =
-        camera.rotation *
-        glm::dmat3(s.rotation[0] * s.scale[0], s.rotation[1] * s.scale[1], s.rotation[2] * s.scale[2]);
-    const glm::dvec3 by_jx = axes * by_m.x, by_jy = axes * by_m.y;
+    const auto [by_jx, by_jy] = axes_gradient(s, by_m);
     const glm::dvec3 &jx = s.image.jacobian.x, &jy = s.image.jacobian.y;
     out.rotation += glm::cross(s.view, by_view) + glm::cross(by_jx, jx) + glm::cross(by_jy, jy);
     // Parallel rays turn with the camera, and with them the direction of the colours.
@@ -367,27 +368,17 @@ Splat project_backward(const Splat& splat, const Camera& camera, const RenderOpt
     const glm::dvec3 by_direction = color_backward(splat, s, gradient.color, out);
     const double by_log = projected.density ? gradient.opacity * projected.opacity : 0;
     const glm::dvec3 by_offset = direction_backward(s, by_direction);
-    const glm::dvec3 by_view = view_backward(s, gradient, by_m, by_log, by_offset);
+    glm::dvec3 by_velocity(0);
+    const glm::dvec3 by_view = view_backward(s, gradient, by_m, by_log, by_offset, by_velocity);
     if (projected.density) shadow_backward(s, by_log, out.log_scale);
     out.mean = glm::transpose(s.camera_rotation) * by_view + by_offset;
-    if (by_motion && !s.readout.moves)
+    if (by_motion && s.readout.moves) {
+        const auto [by_jx, by_jy] = axes_gradient(s, by_m);
+        add_rolling_gradient(s.readout, camera, by_view, by_velocity,
+                             glm::cross(by_jx, s.image.jacobian.x) + glm::cross(by_jy, s.image.jacobian.y),
+                             out.mean, *by_motion);
+    } else if (by_motion)
         add_motion_gradient(s, camera, gradient, by_m, by_log, by_view, out.mean, by_direction, *by_motion);
-    return out;
-}
-
-CameraMotion motion_backward(const CameraMotion& motion, const CameraMotion& gradient) {
-    const glm::dvec3 w = motion.rotation;
-    const double angle = glm::length(w);
-    if (angle == 0) return gradient;
-    const glm::dvec3 axis = w / angle;
-    const double sine = std::sin(angle), cosine = std::cos(angle);
-    // The transposes of exp(w), and of its left Jacobian (Sola et al. 2018, eq. 145), by Rodrigues' formula.
-    const auto transposed = [&](double along, double across, double turned, const glm::dvec3& v) {
-        return across * v + (along - across) * axis * glm::dot(axis, v) - turned * glm::cross(axis, v);
-    };
-    CameraMotion out = gradient;
-    out.rotation = transposed(1, sine / angle, (1 - cosine) / angle, gradient.rotation);
-    out.shift = transposed(1, cosine, sine, gradient.shift);
     return out;
 }
 

@@ -142,9 +142,6 @@ struct ScreenGradient {
 Splat project_backward(const Splat& splat, const Camera& camera, const RenderOptions& options,
                        const ScreenGradient& gradient, CameraMotion* by_motion = nullptr);
 
-/// dL/d(each value of a motion) from that of a motion which follows it.
-CameraMotion motion_backward(const CameraMotion& motion, const CameraMotion& gradient);
-
 /// dY_j/d(x, y, z) of the polynomials in scene/color.h, with independent x, y and z. The caller's
 /// normalisation removes the part along the direction.
 std::array<glm::dvec3, kMaxCoefficients> sh_basis_gradient(int degree, const glm::dvec3& direction);

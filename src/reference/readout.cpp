@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "reference/motion.h"
 #include "scene/readout.h"
 #include "shared/constants.h"
 
@@ -68,7 +69,7 @@ ReadoutImage readout_image(const Camera& camera, const glm::dvec3& mean, LensIma
     return out;
 }
 
-glm::dvec3 readout_backward(const ReadoutImage& image, const ReadoutGradient& g) {
+glm::dvec3 readout_backward(const ReadoutImage& image, const ReadoutGradient& g, glm::dvec3& by_v) {
     const glm::dvec3 &v = image.motion, &r = image.row;
     const double k = image.gain;
     const Rows& j = image.still.jacobian;
@@ -77,7 +78,7 @@ glm::dvec3 readout_backward(const ReadoutImage& image, const ReadoutGradient& g)
     const double along_x = glm::dot(j.x, v), along_y = glm::dot(j.y, v);
     const double by_gain = along_x * glm::dot(by.x, r) + along_y * glm::dot(by.y, r);
     const glm::dvec3 by_r = k * (along_x * by.x + along_y * by.y) + k * k * by_gain * v;
-    const glm::dvec3 by_v = k * (glm::dot(by.x, r) * j.x + glm::dot(by.y, r) * j.y) + k * k * by_gain * r;
+    by_v = k * (glm::dot(by.x, r) * j.x + glm::dot(by.y, r) * j.y) + k * k * by_gain * r;
     const Rows by_j{by.x + k * glm::dot(by.x, r) * v, by.y + k * glm::dot(by.y, r) * v};
     glm::dvec3 by_point = glm::cross(by_v, image.turn);
     for (size_t c = 0; c < 3; ++c) {
@@ -89,6 +90,26 @@ glm::dvec3 readout_backward(const ReadoutImage& image, const ReadoutGradient& g)
     const double by_time = g.by_axes - glm::dot(by_v, glm::cross(image.turn, image.shift)) -
                            glm::dot(g.offset, glm::transpose(image.camera.rotation) * image.shift);
     return g.exact + by_point + k * r * (glm::dot(v, by_point) + by_time);
+}
+
+void add_rolling_gradient(const ReadoutImage& image, const Camera& camera, const glm::dvec3& by_point,
+                          const glm::dvec3& by_motion, const glm::dvec3& by_axes, const glm::dvec3& by_mean,
+                          CameraMotion& out) {
+    const double time = image.share - 0.5;
+    const Camera middle = scene::at_middle(camera);
+    const glm::dvec3 shift = scene::middle_motion(camera).shift;
+    // With the point p in the middle, y = R (p - time shift) and v = turn x y - R shift. Where the axes turn by w, the centre
+    // of the camera at this time moves too, as if p moved by w x (time shift).
+    const glm::dmat3 back = middle.rotation * glm::transpose(image.camera.rotation);  // R^T
+    const glm::dvec3 by_middle = middle.rotation * by_mean;
+    const glm::dvec3 torque = glm::cross(image.point, by_point) + by_axes;
+    out.rotation += back * torque + time * glm::cross(shift, by_middle);
+    out.shift -= by_middle;
+    // A change of the turn turns y and the axes, and R in v.
+    const CameraMotion turned{time * image.turn};
+    const CameraMotion later{torque - glm::cross(image.shift, by_motion)};
+    out.readout_turn += time * motion_backward(turned, later).rotation + glm::cross(image.point, by_motion);
+    out.readout_shift -= time * by_middle + back * by_motion;
 }
 
 }  // namespace ewa::reference

@@ -10,6 +10,7 @@
 #include <glm/vec3.hpp>
 
 #include "ewa/camera.h"
+#include "ewa/camera_motion.h"
 #include "reference/lens.h"
 
 namespace ewa::reference {
@@ -40,7 +41,14 @@ struct ReadoutGradient {
     glm::dvec3 offset{0};  // dL/d(mean - camera position), in the world, through the colour
 };
 
-/// dL/dy at the splat's time, for all of it but `offset`, whose own part the mean has directly.
-glm::dvec3 readout_backward(const ReadoutImage& image, const ReadoutGradient& gradient);
+/// dL/dy at the splat's time, for all of it but `offset`, whose own part the mean has directly. by_motion: dL/dv.
+glm::dvec3 readout_backward(const ReadoutImage& image, const ReadoutGradient& gradient,
+                            glm::dvec3& by_motion);
+
+/// Adds the gradient by the camera's motion, for no motion. by_point, by_motion: of readout_backward. by_axes: dL/d(rotation of the
+/// splat's axes, in camera axes at its time). by_mean: dL/d(mean), in the world.
+void add_rolling_gradient(const ReadoutImage& image, const Camera& camera, const glm::dvec3& by_point,
+                          const glm::dvec3& by_motion, const glm::dvec3& by_axes, const glm::dvec3& by_mean,
+                          CameraMotion& out);
 
 }  // namespace ewa::reference

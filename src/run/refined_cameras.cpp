@@ -9,6 +9,7 @@
 #include "gpu/executor.h"
 #include "pipeline/backward.h"
 #include "pipeline/model.h"
+#include "scene/readout.h"
 #include "train/image_cache.h"
 
 namespace ewa::train {
@@ -25,14 +26,10 @@ glm::dmat3 closest_rotation(glm::dmat3 m) {
     return m;
 }
 
-std::vector<pipeline::MotionBasis> bases_of(const Gaussians& gaussians, const Dataset& dataset,
-                                            const std::vector<int>& frames, const TrainOptions& options,
-                                            double extent) {
-    std::vector<pipeline::MotionBasis> bases;
-    for (const int frame : frames)
-        bases.push_back(pipeline::motion_basis(dataset.frames[size_t(frame)].camera, gaussians,
-                                               options.refine_focal, extent));
-    return bases;
+std::vector<Camera> cameras_of(const Dataset& dataset, const std::vector<int>& frames) {
+    std::vector<Camera> cameras;
+    for (const int frame : frames) cameras.push_back(dataset.frames[size_t(frame)].camera);
+    return cameras;
 }
 
 /// Fixed splats on the device, and the frames of a dataset whose cameras move.
@@ -51,7 +48,8 @@ class Alignment {
                                     .alpha = images_.any_cut(),
                                     .motion = true})),
           model_(pipeline::upload_model(*device, gaussians, plan_.moment_buffers(), false)),
-          motions_(*device, bases_of(gaussians, dataset, frames, options, extent)),
+          motions_(*device, pipeline::motion_bases(cameras_of(dataset, frames), gaussians,
+                                                   options.refine_focal, extent)),
           options_(options),
           extent_(extent) {}
 
@@ -79,6 +77,7 @@ class Alignment {
             .masks = plan_.masks,
             .overlaid = true,
             .motion = true,
+            .readouts = motions_.readouts(),
             .loss = plan_.loss};
         run_until_it_fits(cache_, executor_, frame_, size, [&](const passes::Recorder& recorder) {
             const pipeline::FrameInputs inputs{
@@ -115,15 +114,16 @@ Similarity similarity_between(const std::vector<Camera>& from, const std::vector
     const double count = double(from.size());
     glm::dvec3 mean_from(0), mean_to(0);
     for (size_t i = 0; i < from.size(); ++i) {
-        mean_from += from[i].position() / count;
-        mean_to += to[i].position() / count;
+        mean_from += scene::at_middle(from[i]).position() / count;
+        mean_to += scene::at_middle(to[i]).position() / count;
     }
     glm::dmat3 products(0), axes(0);
     double square = 0;
     for (size_t i = 0; i < from.size(); ++i) {
-        const glm::dvec3 a = from[i].position() - mean_from, b = to[i].position() - mean_to;
+        const Camera start = scene::at_middle(from[i]), end = scene::at_middle(to[i]);
+        const glm::dvec3 a = start.position() - mean_from, b = end.position() - mean_to;
         products += glm::outerProduct(b, a);
-        axes += glm::transpose(to[i].rotation) * from[i].rotation;
+        axes += glm::transpose(end.rotation) * start.rotation;
         square += glm::dot(a, a);
     }
     Similarity result;
@@ -136,9 +136,17 @@ Similarity similarity_between(const std::vector<Camera>& from, const std::vector
 }
 
 Camera transformed(const Camera& camera, const Similarity& similarity) {
+    const glm::dmat3 back = glm::transpose(similarity.rotation);
+    const auto position = [&](const glm::dmat3& rotation, const glm::dvec3& translation) {
+        return similarity(-(glm::transpose(rotation) * translation));
+    };
     Camera result = camera;
-    result.rotation = camera.rotation * glm::transpose(similarity.rotation);
-    result.translation = -(result.rotation * similarity(camera.position()));
+    result.rotation = camera.rotation * back;
+    result.translation = -(result.rotation * position(camera.rotation, camera.translation));
+    if (!camera.readout) return result;
+    const Readout& end = *camera.readout;
+    result.readout->rotation = end.rotation * back;
+    result.readout->translation = -(result.readout->rotation * position(end.rotation, end.translation));
     return result;
 }
 

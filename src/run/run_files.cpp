@@ -168,7 +168,8 @@ void RunFolder::save_cameras(const Dataset& dataset, const Split& split, const s
         images.push_back(refined_record(frame, given[i]));
     }
     io::write_refined_cameras(path_ / report::kCamerasFile, cameras, extent);
-    if (!std::ranges::all_of(images, io::fits_colmap)) return;
+    const auto rolls = [](const Frame& frame) { return frame.camera.readout.has_value(); };
+    if (!std::ranges::all_of(images, io::fits_colmap) || std::ranges::any_of(dataset.frames, rolls)) return;
     PointCloud points = dataset.points;
     for (glm::dvec3& point : points.positions) point = world(point);
     io::write_colmap(path_ / "cameras/sparse/0", images, points);

@@ -9,11 +9,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
-#include <glm/trigonometric.hpp>
 #include <stdexcept>
-
-#include "ewa/camera_motion.h"
-
 namespace ewa {
 
 Camera downscale(const Camera& camera, int factor) {
@@ -38,25 +34,6 @@ Camera narrowed(const Camera& camera, int64_t most_width) {
     if (width <= most_width) return camera;
     const int64_t height = (2 * camera.height * most_width + width) / (2 * width);
     return resized(camera, int(most_width), int(std::max<int64_t>(1, height)));
-}
-
-Camera moved(const Camera& camera, const CameraMotion& motion) {
-    if (motion == CameraMotion{}) return camera;
-    Camera result = camera;
-    const double angle = glm::length(motion.rotation);
-    if (angle > 0)
-        result.rotation = glm::mat3_cast(glm::angleAxis(angle, motion.rotation / angle)) * camera.rotation;
-    const glm::dvec3 position = camera.position() + glm::transpose(camera.rotation) * motion.shift;
-    result.translation = -(result.rotation * position);
-    result.fx *= std::exp(motion.log_focal);
-    result.fy *= std::exp(motion.log_focal);
-    return result;
-}
-
-CameraDistance distance_between(const Camera& from, const Camera& to) {
-    const glm::dquat turn(to.rotation * glm::transpose(from.rotation));
-    const double angle = 2 * std::atan2(glm::length(glm::dvec3(turn.x, turn.y, turn.z)), std::abs(turn.w));
-    return {glm::degrees(angle), glm::length(to.position() - from.position()), to.fx / from.fx};
 }
 
 namespace {

@@ -44,6 +44,13 @@ ReadoutMotion readout_motion(const Camera& camera) {
     return motion;
 }
 
+ReadoutMotion middle_motion(const Camera& camera) {
+    ReadoutMotion motion = readout_motion(camera);
+    motion.shift = rotation_by(0.5 * motion.turn) * motion.shift;
+    motion.first -= 0.5;
+    return motion;
+}
+
 bool moves(const Camera& camera) {
     return camera.readout &&
            (camera.readout->rotation != camera.rotation || camera.readout->translation != camera.translation);
@@ -86,13 +93,20 @@ std::optional<PixelRay> world_ray(const Camera& camera, double limit, double x, 
     return PixelRay{at.position() + to_world * ray->origin, to_world * ray->direction};
 }
 
-void check_readout(const Camera& camera) {
-    if (!moves(camera)) return;
+void check_readout_lens(const Camera& camera) {
     const Lens lens = camera.distortion.lens;
     if (lens != Lens::brown && lens != Lens::fisheye)
         throw InputError("a rolling shutter takes perspective and fisheye images only");
+}
+
+void check_readout(const Camera& camera) {
+    if (!moves(camera)) return;
+    check_readout_lens(camera);
     if (!(glm::length(readout_motion(camera).turn) <= shared::READOUT_TURN_MAX))
-        throw InputError("a camera turns by more than 90 degrees while its rolling shutter reads an image");
+        throw InputError(
+            "the camera turns by more than 90 degrees while its rolling shutter reads the image; are the "
+            "poses of "
+            "start and end its own?");
 }
 
 }  // namespace ewa::scene

@@ -28,6 +28,9 @@ struct ReadoutMotion {
 /// All zeros with a global shutter.
 ReadoutMotion readout_motion(const Camera& camera);
 
+/// The same for times from the middle of the readout, -0.5 to 0.5, where p and the axes are those of the pose in the middle.
+ReadoutMotion middle_motion(const Camera& camera);
+
 /// Whether the camera moves during its readout. If not, its images are those of a global shutter.
 bool moves(const Camera& camera);
 
@@ -46,5 +49,7 @@ std::optional<PixelRay> world_ray(const Camera& camera, double limit, double x, 
 
 /// Throws InputError where splats cannot be rendered through this camera while it moves.
 void check_readout(const Camera& camera);
+/// The same, whatever its motion.
+void check_readout_lens(const Camera& camera);
 
 }  // namespace ewa::scene

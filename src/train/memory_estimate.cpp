@@ -244,6 +244,7 @@ MemoryEstimate MemoryEstimator::up_to(uint32_t max_splats) {
                                    .appearance = plan.appearance,
                                    .overlaid = true,
                                    .motion = plan.motion,
+                                   .readouts = frame.camera.readout.has_value(),
                                    .rays = plan.rays(),
                                    .loss = plan.loss};
         const Sizes sizes = sizes_for(config, request);

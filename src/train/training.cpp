@@ -50,13 +50,16 @@ std::vector<uint32_t> cameras_of(const Dataset& dataset, const std::vector<int>&
 void check_lenses(const TrainOptions& options, const Dataset& dataset, const std::vector<int>& frames) {
     for (const int index : frames) {
         const Frame& frame = dataset.frames[size_t(index)];
-        const bool moving = scene::moves(frame.camera);
-        if (frame.camera.distortion.none() && !moving) continue;
+        const bool learned = options.refine_poses && frame.camera.readout;
+        if (frame.camera.distortion.none() && !scene::moves(frame.camera) && !learned) continue;
         scene::check_lens(options.render, frame.camera);
-        if (moving && (options.refine_poses || options.sky))
-            throw InputError(std::string(options.sky ? "--background sky" : "--refine-poses") +
-                             " takes no rolling shutter, and frame \"" + frame.name + "\" has one");
-        if (moving) continue;
+        if (learned) scene::check_readout_lens(frame.camera);
+        if (options.sky && scene::moves(frame.camera))
+            throw InputError("--background sky takes no rolling shutter, and frame \"" + frame.name +
+                             "\" has one");
+        if (options.refine_focal && frame.camera.readout)
+            throw InputError("--refine-focal takes no rolling shutter, and frame \"" + frame.name +
+                             "\" has one; leave it out");
         if (options.refine_focal)
             throw InputError("--refine-focal takes pinholes only, and frame \"" + frame.name +
                              "\" has another lens; take --lens undistort");
@@ -163,11 +166,9 @@ Training::Training(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
         learned_.appearances.set_exposures(first_exposures(dataset, frames));
     if (plan_.sky) learned_.sky = LearnedSky(*device_, uint32_t(options.batch));
     if (plan_.motion) {
-        std::vector<MotionBasis> bases;
-        for (const int index : frames)
-            bases.push_back(
-                motion_basis(dataset.frames[size_t(index)].camera, ready, options.refine_focal, extent));
-        learned_.motions = Motions(*device_, bases);
+        std::vector<Camera> cameras;
+        for (const int index : frames) cameras.push_back(dataset.frames[size_t(index)].camera);
+        learned_.motions = Motions(*device_, motion_bases(cameras, ready, options.refine_focal, extent));
     }
     log_.report.splats = portions_.splats();
 }

@@ -83,6 +83,7 @@ FrameRequest Training::request_of(const CameraUse& camera) const {
             .appearance = plan_.appearance,
             .overlaid = true,
             .motion = plan_.motion,
+            .readouts = learned_.motions.readouts(),
             .rays = plan_.rays(),
             .loss = plan_.loss};
 }

@@ -12,7 +12,7 @@
 #include "passes/passes.h"
 #include "pipeline/backward.h"
 #include "pipeline/frame_inputs.h"
-#include "reference/projection.h"
+#include "reference/motion.h"
 #include "scene/native_lens.h"
 #include "support/random_lens.h"
 
@@ -44,7 +44,7 @@ void set_motion(pipeline::Motions& motions, const CameraMotion& m) {
 
 shared::CameraBlock block_of(const Camera& camera, const CameraMotion& motion, const glm::dvec3& origin) {
     Rig& r = rig();
-    pipeline::Motions motions(*device(), bases());
+    pipeline::Motions motions(*device(), {bases(), {}, {}});
     set_motion(motions, motion);
     const gpu::Buffer base = pipeline::upload_camera(*device(), camera, r.config(), origin);
     r.run([&](gpu::Recording& recording) {
@@ -57,11 +57,40 @@ shared::CameraBlock block_of(const Camera& camera, const CameraMotion& motion, c
     return motions.camera.download<shared::CameraBlock>(1)[0];
 }
 
+/// A camera that moves during its readout, and what three cameras with readouts have learned.
+shared::CameraBlock rolling_block(const Camera& camera, const CameraMotion& motion) {
+    Rig& r = rig();
+    pipeline::Motions motions(*device(), {bases(), bases(), {true, true, true}});
+    std::vector<float> values(2 * shared::MOTION_FLOATS * kCameras, 0.25f);
+    for (const auto& [index, turn, shift] : {std::tuple{kOwn, motion.rotation, motion.shift},
+                                             {kCameras + kOwn, motion.readout_turn, motion.readout_shift}}) {
+        float* own = &values[shared::MOTION_FLOATS * index];
+        for (int k = 0; k < 3; ++k) {
+            own[k] = float(turn[k]);
+            own[4 + k] = float(shift[k]);
+        }
+        own[3] = 0;
+    }
+    motions.values.upload(std::span<const float>(values));
+    EXPECT_EQ(motions.download()[kOwn], motion);
+    const gpu::Buffer base = pipeline::upload_camera(*device(), camera, r.config(), {});
+    r.run([&](gpu::Recording& recording) {
+        const auto use =
+            record_move_camera({recording, r.cache}, motions, kOwn, pipeline::use_of(base, 0, camera));
+        EXPECT_EQ(use.lenses, shared::LENSES_ROLLING);
+    });
+    return motions.camera.download<shared::CameraBlock>(1)[0];
+}
+
 /// The values of a motion as float32, which the device stores.
 CameraMotion rounded(CameraMotion m) {
     for (int k = 0; k < 3; ++k) {
         m.rotation[k] = float(m.rotation[k]);
         m.shift[k] = float(m.shift[k]);
+    }
+    for (int k = 0; k < 3; ++k) {
+        m.readout_turn[k] = float(m.readout_turn[k]);
+        m.readout_shift[k] = float(m.readout_shift[k]);
     }
     m.log_focal = float(m.log_focal);
     return m;
@@ -111,6 +140,34 @@ TEST(MoveCamera, MatchesTheReferenceBeyondFloat32) {
     }
 }
 
+TEST(MoveCamera, MovesTheReadoutAsTheReferenceDoes) {
+    for (const auto& [name, camera] : rolling_cameras(8300, 61, 47))
+        for (const double more : {0.0, 0.1, 3.0}) {  // the last one turns further than a readout may
+            SCOPED_TRACE(name + " " + std::to_string(more));
+            const CameraMotion motion = rounded({{0.03, -0.02, 0.04},
+                                                 0,
+                                                 {0.2, -0.1, 0.3},
+                                                 more * glm::dvec3(0.5, -1, 0.3),
+                                                 more * glm::dvec3(-0.3, 0.6, 0.2)});
+            const shared::CameraBlock is = rolling_block(camera, motion);
+            const shared::CameraBlock want =
+                pipeline::camera_block(moved(camera, motion), rig().config(), {});
+            for (int i = 0; i < 9; ++i) EXPECT_NEAR(is.rotation_hi[i], want.rotation_hi[i], 1e-6);
+            for (int i = 0; i < 3; ++i) {
+                EXPECT_NEAR(is.position_hi[i], want.position_hi[i], 2e-6);
+                EXPECT_NEAR(is.readout_turn[i], want.readout_turn[i], 1e-6);
+                EXPECT_NEAR(is.readout_shift[i], want.readout_shift[i], 1e-6);
+            }
+            for (int i = 0; i < 2; ++i) EXPECT_EQ(is.readout_slope[i], want.readout_slope[i]);
+            EXPECT_EQ(is.readout_first, want.readout_first);
+        }
+    Camera still = random_camera(8301, 61, 47);
+    still.readout = Readout{ReadoutFrom::left, still.rotation, still.translation};
+    const shared::CameraBlock is = rolling_block(still, {.readout_turn = {0.25, 0, 0}});
+    EXPECT_EQ(is.readout_turn[0], 0.25f);
+    EXPECT_GT(is.readout_slope[0], 0);
+}
+
 /// motion_backward is the chain rule: central differences of a function of the moved camera.
 TEST(ReferenceMotion, BackwardIsTheSlopeOfAFunctionOfTheMovedCamera) {
     const Camera camera = random_camera(83, 61, 47);
@@ -155,7 +212,7 @@ void update(pipeline::Motions& motions, pipeline::FrameBuffers& frame, const std
     counts.instances = instances;
     frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
     r.run([&](gpu::Recording& recording) {
-        record_motion_sums({recording, r.cache}, frame);
+        record_motion_sums({recording, r.cache}, frame, motions.has_readout(kOwn));
         record_motion_update({recording, r.cache}, frame,
                              {.motions = &motions,
                               .photo = kOwn,
@@ -180,7 +237,7 @@ TEST(MotionUpdate, FollowsTheReferencesAdam) {
         SCOPED_TRACE(splats);
         GuardedFrame guarded(rig().config(), request_for(splats));
         pipeline::FrameBuffers& frame = guarded.frame;
-        pipeline::Motions motions(*device(), bases());
+        pipeline::Motions motions(*device(), {bases(), {}, {}});
         // The factor of the focal length is so large that its pull exceeds the tolerance.
         CameraMotion motion = rounded({{0.03, -0.02, 0.04}, 1.5, {0.2, -0.1, 0.3}});
         set_motion(motions, motion);
@@ -271,6 +328,39 @@ TEST(MotionBasis, MovesTheImageEquallyAlongEachCoordinate) {
         EXPECT_TRUE(std::isfinite(value));
 }
 
+/// Of a camera at rest, whose points move by their time.
+TEST(MotionBasis, OfAReadoutMovesTheImageEquallyToo) {
+    Camera camera = random_camera(5400, 61, 47);
+    const Gaussians gaussians = random_gaussians(5401, 500, SplatKind::ordinary, camera, 0);
+    camera.readout = Readout{ReadoutFrom::bottom, camera.rotation, camera.translation};
+    const MotionBasis basis = pipeline::readout_basis(camera, gaussians, 2);
+    const double h = 1e-5;
+    for (size_t j = 0; j < kMotionFloats; ++j) {
+        const auto value = [&](size_t i) { return h * double(basis[kMotionFloats * i + j]); };
+        double square = 0;
+        size_t points = 0;
+        for (size_t i = 0; i < gaussians.size(); ++i) {
+            const auto pixel = [&](const Camera& c) {
+                return scene::pixel_of(c, scene::lens_limit(c),
+                                       c.rotation * gaussians.world_mean(i) + c.translation);
+            };
+            const auto at = pixel(camera);
+            if (!at || !(at->x >= 0 && at->x < camera.width && at->y >= 0 && at->y < camera.height)) continue;
+            const double time = 0.5 - at->y / camera.height;  // from the bottom
+            Camera still = camera;
+            still.readout.reset();
+            const auto after = pixel(moved(still, {time * glm::dvec3(value(0), value(1), value(2)), 0,
+                                                   time * glm::dvec3(value(4), value(5), value(6))}));
+            if (!after) continue;
+            const glm::dvec2 by = (*after - *at) / h / glm::dvec2(camera.fx, camera.fy);
+            square += glm::dot(by, by);
+            ++points;
+        }
+        EXPECT_GT(points, 50u);
+        EXPECT_NEAR(std::sqrt(square / double(points)), j == 3 ? 0 : 0.9, 0.15) << j;
+    }
+}
+
 TEST(MotionBasis, MovesTheImageOfALensEquallyToo) {
     for (const NamedCamera& lens : random_lenses(5300, 61, 47)) {
         SCOPED_TRACE(lens.name);
@@ -284,9 +374,51 @@ TEST(MotionBasis, MovesTheImageOfALensEquallyToo) {
     }
 }
 
+/// Its sums are the rows after those of the pose, and are the gradient by the values themselves.
+TEST(MotionUpdate, OfAReadoutFollowsItsOwnSums) {
+    auto request = request_for(5000);
+    request.readouts = true;
+    GuardedFrame guarded(rig().config(), request);
+    pipeline::FrameBuffers& frame = guarded.frame;
+    pipeline::Motions motions(*device(), {bases(), bases(), {false, true, false}});
+    std::vector<float> values(2 * shared::MOTION_FLOATS * kCameras, 0.25f);
+    motions.values.upload(std::span<const float>(values));
+    Random random(89);
+    std::vector<float> sums(size_t(shared::READOUT_MOTION_VALUES) * frame.sizes.motion_items);
+    for (float& sum : sums) sum = float(random.normal());
+    std::array<double, shared::READOUT_MOTION_VALUES> row{};
+    for (size_t i = 0; i < sums.size(); ++i) row[i / frame.sizes.motion_items] += sums[i];
+    update(motions, frame, sums, 1);
+    EXPECT_TRUE(guarded.intact());
+    const auto first = motions.moments1.download<float>(2 * shared::MOTION_FLOATS * kCameras);
+    const auto now = motions.values.download<float>(2 * shared::MOTION_FLOATS * kCameras);
+    const MotionBasis basis = bases()[kOwn];
+    const size_t own = shared::MOTION_FLOATS * (kCameras + kOwn);
+    std::array<double, kMotionFloats> expected;
+    expected.fill(0.25);
+    for (size_t j = 0; j < kMotionFloats; ++j) {
+        double gradient = 0;
+        for (size_t i = 0; i < kMotionFloats; ++i) {
+            const double pull = kMotionPull / (i < 4 ? 1 : kExtent * kExtent);
+            gradient += double(basis[kMotionFloats * i + j]) * (row[kMotionFloats + i] + 0.25 * pull);
+        }
+        EXPECT_NEAR(first[own + j], (1 - kBeta1) * gradient, 1e-4 * std::abs(gradient) + 1e-3) << j;
+        // Adam's first step along each coordinate.
+        for (size_t i = 0; i < kMotionFloats; ++i)
+            expected[i] -=
+                double(kMotionRate) * double(basis[kMotionFloats * i + j]) * (gradient > 0 ? 1 : -1);
+    }
+    for (size_t j = 0; j < kMotionFloats; ++j) {
+        EXPECT_NEAR(now[own + j], expected[j], 1e-5) << j;
+        EXPECT_NE(now[shared::MOTION_FLOATS * kOwn + j], 0.25f);  // the pose has its own step
+    }
+    for (const size_t other : {0u, 2u, 3u, 5u})
+        for (size_t j = 0; j < kMotionFloats; ++j) EXPECT_EQ(now[shared::MOTION_FLOATS * other + j], 0.25f);
+}
+
 TEST(MotionUpdate, AStepThatIsNotFiniteIsDroppedAndCounted) {
     GuardedFrame guarded(rig().config(), request_for(100));
-    pipeline::Motions motions(*device(), bases());
+    pipeline::Motions motions(*device(), {bases(), {}, {}});
     Random random(85);
     std::vector<float> sums = random_sums(guarded.frame, random);
     sums[2] = std::numeric_limits<float>::infinity();
@@ -297,7 +429,7 @@ TEST(MotionUpdate, AStepThatIsNotFiniteIsDroppedAndCounted) {
 
 TEST(MotionUpdate, NothingMovesWhereTheInstancesDidNotFit) {
     GuardedFrame guarded(rig().config(), request_for(100));
-    pipeline::Motions motions(*device(), bases());
+    pipeline::Motions motions(*device(), {bases(), {}, {}});
     Random random(86);
     const std::vector<float> sums = random_sums(guarded.frame, random);
     update(motions, guarded.frame, sums, 1, guarded.frame.instance_capacity + 1);

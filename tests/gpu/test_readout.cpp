@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 
 #include "ewa/error.h"
 #include "ewa/renderer.h"
@@ -53,6 +54,12 @@ TEST(Readout, GradientsAreTheReferences) {
         tolerance.element_relative = 2e-3;
         tolerance.element_absolute = 2e-4;
         EXPECT_TRUE(splat_gradients_agree(actual.gradient, expected.gradient, tolerance));
+        for (const auto part : {&CameraMotion::rotation, &CameraMotion::shift, &CameraMotion::readout_turn,
+                                &CameraMotion::readout_shift}) {
+            const glm::dvec3 &is = actual.camera.*part, &want = expected.camera.*part;
+            EXPECT_LT(glm::length(is - want), 1e-4 * glm::length(want));
+        }
+        EXPECT_EQ(actual.camera.log_focal, 0);
     }
 }
 

@@ -433,7 +433,7 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     ppisp = pipeline::Appearances(*device(), AppearanceModel::ppisp, {0, 1, 0}, 2);
     grids = pipeline::Appearances(*device(), AppearanceModel::grid, {0, 0}, 1);
     sky = pipeline::LearnedSky(*device(), 1);
-    motions = pipeline::Motions(*device(), std::vector<pipeline::MotionBasis>(3));
+    motions = pipeline::Motions(*device(), {std::vector<pipeline::MotionBasis>(3), {}, {}});
     const pipeline::MotionUse motion{.motions = &motions, .photo = 1};
     model = pipeline::upload_model(*device(), scene.gaussians, 2, true);
     camera = camera_buffer(scene.camera, r.config());

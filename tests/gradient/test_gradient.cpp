@@ -160,6 +160,31 @@ void expect_slopes(const Gaussians& gaussians, const Camera& camera, const Image
     check("sh", values.sh, g.sh, cpu.gradient.sh);
 }
 
+/// The same of these parts of the gradient by the camera's motion.
+void expect_camera_slopes(const Gaussians& gaussians, const Camera& camera, const Image& target,
+                          const RenderOptions& options, const CameraMotion& actual, const CameraMotion& cpu,
+                          std::initializer_list<glm::dvec3 CameraMotion::*> parts) {
+    CameraMotion motion;
+    const auto loss = [&] {
+        return reference::loss_gradient(gaussians, moved(camera, motion), target, options).loss;
+    };
+    const auto list = [](const glm::dvec3& v) { return std::vector<double>{v.x, v.y, v.z}; };
+    int index = 0;
+    for (const auto part : parts) {
+        std::vector<double> slope;
+        for (int k = 0; k < 3; ++k)
+            slope.push_back(best_central_difference(loss, (motion.*part)[k], (cpu.*part)[k], 1e-4, 1e-7));
+        GradientTolerance tolerance;
+        tolerance.cosine = 1e-7;
+        tolerance.norm = 3e-4;
+        EXPECT_TRUE(gradients_agree(list(cpu.*part), slope, tolerance))
+            << "camera of the reference, " << index;
+        EXPECT_TRUE(gradients_agree(list(actual.*part), slope, tolerance))
+            << "camera of the device, " << index;
+        ++index;
+    }
+}
+
 /// Through each lens: the device's and the reference's gradient against central differences of the reference's loss.
 TEST(GradientThroughALens, IsTheSlopeOfTheReferencesLoss) {
     for (const Footprint kernel : {Footprint::peak, Footprint::antialias, Footprint::density})
@@ -174,27 +199,8 @@ TEST(GradientThroughALens, IsTheSlopeOfTheReferencesLoss) {
             const reference::ReferenceGradient cpu =
                 reference::loss_gradient(gaussians, camera, target, options);
             expect_slopes(gaussians, camera, target, options, actual, cpu);
-
-            CameraMotion motion;
-            const auto moved_loss = [&] {
-                return reference::loss_gradient(gaussians, moved(camera, motion), target, options).loss;
-            };
-            for (int part = 0; part < 2; ++part) {
-                glm::dvec3& value = part == 0 ? motion.rotation : motion.shift;
-                const glm::dvec3 of_cpu = part == 0 ? cpu.camera.rotation : cpu.camera.shift;
-                const glm::dvec3 of_device = part == 0 ? actual.camera.rotation : actual.camera.shift;
-                std::vector<double> slope;
-                for (int k = 0; k < 3; ++k)
-                    slope.push_back(best_central_difference(moved_loss, value[k], of_cpu[k], 1e-4, 1e-7));
-                GradientTolerance tolerance;
-                tolerance.cosine = 1e-7;
-                tolerance.norm = 3e-4;
-                const auto list = [](const glm::dvec3& v) { return std::vector<double>{v.x, v.y, v.z}; };
-                EXPECT_TRUE(gradients_agree(list(of_cpu), slope, tolerance))
-                    << "camera of the reference, " << part;
-                EXPECT_TRUE(gradients_agree(list(of_device), slope, tolerance))
-                    << "camera of the device, " << part;
-            }
+            expect_camera_slopes(gaussians, camera, target, options, actual.camera, cpu.camera,
+                                 {&CameraMotion::rotation, &CameraMotion::shift});
         }
 }
 
@@ -207,9 +213,13 @@ TEST(GradientOfARollingShutter, IsTheSlopeOfTheReferencesLoss) {
             const Image target = random_target(5302, 25, 17);
             RenderOptions options;
             options.kernel = kernel;
-            expect_slopes(gaussians, rolling.camera, target, options,
-                          loss_gradient(device(), gaussians, rolling.camera, target, options),
-                          reference::loss_gradient(gaussians, rolling.camera, target, options));
+            const LossGradient actual = loss_gradient(device(), gaussians, rolling.camera, target, options);
+            const reference::ReferenceGradient cpu =
+                reference::loss_gradient(gaussians, rolling.camera, target, options);
+            expect_slopes(gaussians, rolling.camera, target, options, actual, cpu);
+            expect_camera_slopes(gaussians, rolling.camera, target, options, actual.camera, cpu.camera,
+                                 {&CameraMotion::rotation, &CameraMotion::shift, &CameraMotion::readout_turn,
+                                  &CameraMotion::readout_shift});
         }
 }
 

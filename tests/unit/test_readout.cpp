@@ -6,9 +6,11 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "ewa/camera_motion.h"
 #include "ewa/error.h"
 #include "reference/readout.h"
 #include "scene/readout.h"
+#include "shared/constants.h"
 #include "support/random_lens.h"
 #include "support/random_scene.h"
 
@@ -69,6 +71,32 @@ TEST(Readout, GoesFromOnePoseToTheOther) {
         EXPECT_LT(farthest(again.rotation, camera.rotation), 1e-13);
         EXPECT_LT(farthest(again.readout->rotation, camera.readout->rotation), 1e-13);
         EXPECT_LT(glm::length(again.position() - camera.position()), 1e-13);
+    }
+}
+
+TEST(Readout, IsMovedWithItsCamera) {
+    for (const auto& [name, camera] : rolling_cameras(7500, 97, 61)) {
+        SCOPED_TRACE(name);
+        const CameraMotion motion{
+            {0.02, -0.03, 0.01}, 0, {0.1, 0.2, -0.3}, {0.04, 0.01, -0.02}, {0.3, 0, 0.1}};
+        const Camera after = moved(camera, motion);
+        // The pose in the middle moves as that of a global shutter.
+        const Camera middle = moved(scene::at_middle(camera), motion);
+        EXPECT_LT(farthest(scene::at_middle(after).rotation, middle.rotation), 1e-13);
+        EXPECT_LT(glm::length(scene::at_middle(after).position() - middle.position()), 1e-13);
+        const scene::ReadoutMotion from = scene::middle_motion(camera), to = scene::middle_motion(after);
+        EXPECT_LT(glm::length(to.turn - from.turn - motion.readout_turn), 1e-13);
+        EXPECT_LT(glm::length(to.shift - from.shift - motion.readout_shift), 1e-13);
+        EXPECT_EQ(after.readout->from, camera.readout->from);
+        const CameraDistance distance = distance_between(camera, after);
+        EXPECT_NEAR(distance.length, glm::length(motion.shift), 1e-13);
+        // Without a motion of the readout, both ends keep theirs.
+        const Camera same = moved(camera, {{0.02, -0.03, 0.01}, 0, {0.1, 0.2, -0.3}, {}, {}});
+        EXPECT_LT(glm::length(scene::middle_motion(same).shift - from.shift), 1e-13);
+        // No readout turns further than splats are drawn for.
+        const Camera most = moved(camera, {.readout_turn = {9, 0, 0}});
+        EXPECT_NEAR(glm::length(scene::readout_motion(most).turn), shared::READOUT_TURN_LEARNED, 1e-9);
+        EXPECT_NO_THROW(scene::check_readout(most));
     }
 }
 

@@ -44,6 +44,24 @@ TEST(ViewList, EveryNumberComesBack) {
     EXPECT_EQ(views[1].name, "");
 }
 
+TEST(ViewList, AReadoutComesBack) {
+    const TempFolder folder;
+    NamedView view = some_view();
+    view.camera.readout = Readout{ReadoutFrom::right, glm::transpose(view.camera.rotation), {1, 2, 3}};
+    write_views(folder / "views.json", {view, some_view()});
+    const auto views = read_views(folder / "views.json");
+    ASSERT_TRUE(views[0].camera.readout);
+    EXPECT_EQ(views[0].camera.readout->from, ReadoutFrom::right);
+    EXPECT_EQ(views[0].camera.readout->rotation, view.camera.readout->rotation);
+    EXPECT_EQ(views[0].camera.readout->translation, view.camera.readout->translation);
+    EXPECT_FALSE(views[1].camera.readout);
+    std::ifstream file(folder / "views.json");
+    std::string text((std::istreambuf_iterator<char>(file)), {});
+    text.replace(text.find("right-to-left"), 5, "wrong");
+    folder.write("bad.json", text);
+    EXPECT_THROW(read_views(folder / "bad.json"), InputError);
+}
+
 TEST(ViewList, DamageIsRefusedWithItsPlace) {
     const TempFolder folder;
     write_views(folder / "good.json", {some_view(), some_view()});

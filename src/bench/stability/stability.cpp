@@ -100,6 +100,7 @@ std::vector<uint8_t> pixels_at_threshold(const Rendered& rendered) {
 /// A norm for each part of a gradient by the camera.
 struct CameraTerms {
     double rotation = 0, shift = 0, focal = 0;
+    double readout_turn = 0, readout_shift = 0;
 };
 
 /// What the reference computes of a case, and how errors against it are measured.
@@ -109,7 +110,8 @@ struct Expected {
     double scale = 1;               // of the image's errors
     double least_quaternions = 0;   // see least_quaternion_norm
     bool moves_camera = false;      // there is a gradient by the camera
-    CameraTerms least_camera{};     // of its three parts, see least_camera_terms
+    bool rolling = false;           // it has no focal length, and that of the readout
+    CameraTerms least_camera{};     // of its parts, see least_camera_terms
 };
 
 /// The largest error of a pixel that is not excluded. color: an Image or a Raster.
@@ -146,11 +148,17 @@ std::vector<Comparison> errors_of(const Expected& expected, const Pixels& color,
     if (!expected.moves_camera) return errors;
     const CameraMotion& expected_camera = expected.reference.camera;
     const CameraTerms& least = expected.least_camera;
-    errors.push_back(
-        {"camera rotation", relative_distance(numbers_of(camera.rotation),
-                                              numbers_of(expected_camera.rotation), least.rotation)});
-    errors.push_back({"camera shift", relative_distance(numbers_of(camera.shift),
-                                                        numbers_of(expected_camera.shift), least.shift)});
+    const auto compare = [&](const char* name, glm::dvec3 CameraMotion::*part, double least_norm) {
+        errors.push_back({name, relative_distance(numbers_of(camera.*part), numbers_of(expected_camera.*part),
+                                                  least_norm)});
+    };
+    compare("camera rotation", &CameraMotion::rotation, least.rotation);
+    compare("camera shift", &CameraMotion::shift, least.shift);
+    if (expected.rolling) {
+        compare("readout turn", &CameraMotion::readout_turn, least.readout_turn);
+        compare("readout shift", &CameraMotion::readout_shift, least.readout_shift);
+        return errors;
+    }
     errors.push_back({"focal length", relative_distance(std::vector<double>{camera.log_focal},
                                                         {expected_camera.log_focal}, least.focal)});
     return errors;
@@ -193,6 +201,8 @@ CameraTerms least_camera_terms(const StabilityCase& one, const ReferenceGradient
         least.rotation += kShare * (glm::length(term.rotation) + torque);
         least.shift += kShare * shift;
         least.focal += kShare * (std::abs(term.log_focal) + torque);
+        least.readout_turn += kShare * (glm::length(term.readout_turn) + torque);
+        least.readout_shift += kShare * (glm::length(term.readout_shift) + shift);
     }
     return least;
 }
@@ -222,7 +232,8 @@ Expected expected_of(const StabilityCase& one, const Image& target) {
     expected.excluded =
         on_rays ? reference::Rays(one.gaussians, one.camera, one.options).at_threshold(kAtThreshold)
                 : pixels_at_threshold(expected.reference.rendered);
-    expected.moves_camera = !on_rays && !one.options.points && !scene::moves(one.camera);
+    expected.moves_camera = !on_rays && !one.options.points;
+    expected.rolling = scene::moves(one.camera);
     if (expected.moves_camera) expected.least_camera = least_camera_terms(one, expected.reference);
     for (const double v : expected.reference.rendered.blended.color.values)
         expected.scale = std::max(expected.scale, std::abs(v));

@@ -38,12 +38,13 @@ RefinedUse use_refined_cameras(Dataset& dataset, const std::filesystem::path& pa
         use.aligned = use.aligned || found->second.aligned;
         const Camera& refined = found->second.camera;
         Camera& camera = frame.camera;
-        if (scene::moves(camera))
-            throw InputError(core::one_line(path.string()) +
-                             ": refined cameras have no rolling shutter, and frame \"" + frame.name +
-                             "\" has one");
+        if (scene::moves(camera) && !refined.readout)
+            throw InputError(core::one_line(path.string()) + ": has no rolling shutter for frame \"" +
+                             core::one_line(frame.name) +
+                             "\", and the dataset has one; name the run that was trained on it");
         camera.rotation = refined.rotation;
         camera.translation = refined.translation;
+        camera.readout = refined.readout;
         camera.fx = refined.fx * (double(camera.width) / refined.width);
         camera.fy = refined.fy * (double(camera.height) / refined.height);
     }

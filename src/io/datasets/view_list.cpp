@@ -8,8 +8,10 @@
 
 #include "core/atomic_file.h"
 #include "core/json.h"
+#include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
+#include "scene/readout.h"
 
 namespace ewa::io {
 namespace {
@@ -38,6 +40,28 @@ bool is_rotation(const glm::dmat3& r) {
     return glm::determinant(r) > 0;
 }
 
+void read_pose(const std::vector<double>& rotation, const std::vector<double>& translation,
+               glm::dmat3& to_rotation, glm::dvec3& to_translation) {
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column)
+            to_rotation[column][row] = rotation[size_t(3 * row + column)];
+        to_translation[row] = translation[size_t(row)];
+    }
+    if (!is_rotation(to_rotation)) throw InputError("rotation is not orthonormal");
+}
+
+std::optional<Readout> parse_readout(const Json& object) {
+    if (!object.contains("rolling_shutter")) return std::nullopt;
+    const auto order = object.at("rolling_shutter").get<std::string>();
+    const auto from = core::find_value(scene::kReadoutWords, order);
+    if (!from)
+        throw InputError("rolling_shutter '" + core::one_line(order.substr(0, 40)) + "' is no direction");
+    Readout end{*from, {}, {}};
+    read_pose(numbers(object, "rotation_end", 9), numbers(object, "translation_end", 3), end.rotation,
+              end.translation);
+    return end;
+}
+
 NamedView parse_view(const Json& object) {
     NamedView view;
     view.name = object.value("name", std::string());
@@ -53,32 +77,37 @@ NamedView parse_view(const Json& object) {
     if (!(camera.fx > 0) || !(camera.fy > 0)) throw InputError("a focal length is not above zero");
     const auto rotation = numbers(object, "rotation", 9), translation = numbers(object, "translation", 3),
                pivot = object.contains("pivot") ? numbers(object, "pivot", 3) : std::vector<double>(3);
-    for (int row = 0; row < 3; ++row) {
-        for (int column = 0; column < 3; ++column)
-            camera.rotation[column][row] = rotation[size_t(3 * row + column)];
-        camera.translation[row] = translation[size_t(row)];
-        view.pivot[row] = pivot[size_t(row)];
-    }
+    read_pose(rotation, translation, camera.rotation, camera.translation);
+    for (int k = 0; k < 3; ++k) view.pivot[k] = pivot[size_t(k)];
+    camera.readout = parse_readout(object);
     view.aligned = object.value("aligned", false);
-    if (!is_rotation(camera.rotation)) throw InputError("rotation is not orthonormal");
     return view;
 }
 
 }  // namespace
 
 Json camera_json(const std::string& name, const Camera& c) {
-    Json rotation = Json::array();
-    for (int row = 0; row < 3; ++row)
-        for (int column = 0; column < 3; ++column) rotation.push_back(c.rotation[column][row]);
-    return {{"name", name},
-            {"width", c.width},
-            {"height", c.height},
-            {"fx", c.fx},
-            {"fy", c.fy},
-            {"cx", c.cx},
-            {"cy", c.cy},
-            {"rotation", rotation},
-            {"translation", {c.translation.x, c.translation.y, c.translation.z}}};
+    const auto rows = [](const glm::dmat3& rotation) {
+        Json values = Json::array();
+        for (int row = 0; row < 3; ++row)
+            for (int column = 0; column < 3; ++column) values.push_back(rotation[column][row]);
+        return values;
+    };
+    Json view{{"name", name},
+              {"width", c.width},
+              {"height", c.height},
+              {"fx", c.fx},
+              {"fy", c.fy},
+              {"cx", c.cx},
+              {"cy", c.cy},
+              {"rotation", rows(c.rotation)},
+              {"translation", {c.translation.x, c.translation.y, c.translation.z}}};
+    if (!c.readout) return view;
+    const glm::dvec3& end = c.readout->translation;
+    view["rolling_shutter"] = core::word_for(scene::kReadoutWords, c.readout->from);
+    view["rotation_end"] = rows(c.readout->rotation);
+    view["translation_end"] = {end.x, end.y, end.z};
+    return view;
 }
 
 std::vector<NamedView> read_views(const std::filesystem::path& path, size_t most) {

@@ -2,7 +2,8 @@
 // Named cameras in a JSON file. Sizes are in px; the rotation is world to camera, row after row:
 //   {"views": [{"name": "...", "width": n, "height": n, "fx": n, "fy": n, "cx": n, "cy": n,
 //               "rotation": [9 numbers], "translation": [3], "pivot": [3]}, ...]}
-// The pivot may be missing, and there may be other keys.
+// The pivot may be missing, and there may be other keys. A view with "rolling_shutter", which has the words of transforms.json, also
+// has "rotation_end" and "translation_end": the pose when the readout reaches the opposite border.
 #pragma once
 #include <filesystem>
 #include <glm/vec3.hpp>
