@@ -6,9 +6,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 #include <map>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <string_view>
 #include <tuple>
 
@@ -33,6 +36,7 @@
 #include "io/gltf/mesh.h"
 #include "io/splats/formats.h"
 #include "report/summary.h"
+#include "scene/readout.h"
 
 namespace ewa::cli {
 namespace {
@@ -212,6 +216,42 @@ std::vector<CameraGroup> camera_groups(const Dataset& dataset) {
     return list;
 }
 
+struct Rolling {
+    int frames = 0;
+    std::string order;                 // that of the first one
+    double degrees = 0, distance = 0;  // medians, during a readout; world units
+};
+
+/// Empty if no frame has a readout.
+std::optional<Rolling> rolling_of(const Dataset& dataset) {
+    Rolling rolling;
+    std::vector<double> degrees, distances;
+    for (const Frame& frame : dataset.frames) {
+        if (!frame.camera.readout) continue;
+        const scene::ReadoutMotion motion = scene::readout_motion(frame.camera);
+        if (rolling.frames++ == 0)
+            rolling.order = core::word_for(scene::kReadoutWords, frame.camera.readout->from);
+        degrees.push_back(glm::degrees(glm::length(motion.turn)));
+        distances.push_back(glm::length(motion.shift));
+    }
+    if (rolling.frames == 0) return std::nullopt;
+    const auto median = [](std::vector<double>& values) {
+        const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+        std::nth_element(values.begin(), middle, values.end());
+        return *middle;
+    };
+    rolling.degrees = median(degrees);
+    rolling.distance = median(distances);
+    return rolling;
+}
+
+void print_rolling(const Dataset& dataset) {
+    if (const auto rolling = rolling_of(dataset))
+        fmt::print("rolling shutter {}, {}; a camera turns by {:.3g} degrees and moves by {:.3g} (medians)\n",
+                   core::counted(uint64_t(rolling->frames), "frame"), rolling->order, rolling->degrees,
+                   rolling->distance);
+}
+
 Json dataset_json(const Dataset& dataset, const Split& split, double extent) {
     Json cameras = Json::array();
     for (const CameraGroup& group : camera_groups(dataset))
@@ -223,18 +263,24 @@ Json dataset_json(const Dataset& dataset, const Split& split, double extent) {
                            {"cx", group.camera.cx},
                            {"cy", group.camera.cy},
                            {"distorted", group.distorted}});
-    return {{"kind", dataset.format},
-            {"program", dataset.program},
-            {"notes", dataset.notes},
-            {"frames", dataset.frames.size()},
-            {"missing_images", dataset.missing_images},
-            {"cameras", cameras},
-            {"points", dataset.points.positions.size()},
-            {"dropped_points", dataset.dropped_points},
-            {"color_depends_on_view", dataset.color_depends_on_view},
-            {"extent", extent},
-            {"train", split.train.size()},
-            {"test", split.test.size()}};
+    Json json{{"kind", dataset.format},
+              {"program", dataset.program},
+              {"notes", dataset.notes},
+              {"frames", dataset.frames.size()},
+              {"missing_images", dataset.missing_images},
+              {"cameras", cameras},
+              {"points", dataset.points.positions.size()},
+              {"dropped_points", dataset.dropped_points},
+              {"color_depends_on_view", dataset.color_depends_on_view},
+              {"extent", extent},
+              {"train", split.train.size()},
+              {"test", split.test.size()}};
+    if (const auto rolling = rolling_of(dataset))
+        json["rolling_shutter"] = {{"frames", rolling->frames},
+                                   {"order", rolling->order},
+                                   {"degrees", rolling->degrees},
+                                   {"distance", rolling->distance}};
+    return json;
 }
 
 void print_cameras(const Dataset& dataset) {
@@ -269,6 +315,7 @@ void info_dataset(const fs::path& path, const fs::path& named, int test_every, b
         fmt::print("images          {} missing; their frames are skipped unless all images are missing\n",
                    dataset.missing_images);
     print_cameras(dataset);
+    print_rolling(dataset);
     fmt::print("points          {}{}\n", dataset.points.positions.size(),
                dataset.dropped_points == 0
                    ? std::string()

@@ -27,6 +27,7 @@
 #include "scene/framing.h"
 #include "scene/looks.h"
 #include "scene/native_lens.h"
+#include "scene/readout.h"
 
 namespace ewa::cli {
 namespace {
@@ -149,7 +150,7 @@ void check_renders(const RenderArguments& arguments, const std::vector<fs::path>
 /// The view of a frame through another lens. A 360° image is twice as wide as high, and as high as the frame's longer side.
 Camera of_frame(const LensArgument& lens, const Camera& frame, const Dataset& dataset,
                 const Gaussians& gaussians) {
-    Camera camera = frame;
+    Camera camera = scene::at_middle(frame);
     if (lens.lens.lens == Lens::equirectangular) {
         camera.height = std::max(frame.width, frame.height);
         camera.width = 2 * camera.height;

@@ -315,6 +315,24 @@ TEST(Transforms, RollingShutters) {
     scene.write();
     expect_error<InputError>([&] { load_dataset(scene.folder.path(), {.lens = LensUse::undistort}); },
                              {"rolling shutter", "undistorted"});
+    // Poses that no readout uses are named.
+    first.erase("rolling_shutter");
+    first["transform_matrix"] = kMatrix;
+    ASSERT_EQ(scene.load().notes.size(), 1u);
+    EXPECT_NE(scene.load().notes[0].find("transform_matrix_start"), std::string::npos);
+    first["rolling_shutter"] = "global";
+    EXPECT_TRUE(scene.load().notes.empty());
+    // Half a turn about the camera's own axis, and an end that is too far away.
+    first["rolling_shutter"] = "top-to-bottom";
+    json around = later;
+    for (size_t row = 0; row < 3; ++row)
+        for (size_t column = 0; column < 2; ++column)
+            around[row][column] = -around[row][column].get<double>();
+    first["transform_matrix_end"] = around;
+    scene.refuse({"frame \"", "more than 90 degrees"});
+    later[0][3] = 1e300;
+    first["transform_matrix_end"] = later;
+    scene.refuse({"frame \"", "not a finite number"});
 }
 
 TEST(Transforms, NamesWhatIsWrong) {

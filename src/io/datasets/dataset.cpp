@@ -130,7 +130,7 @@ class CameraCache {
     /// A pinhole, or `source` with its lens.
     Camera of(const Camera& source, const Distortion& distortion) {
         if (distortion.none()) return source;
-        if (scene::moves(source)) return moving(source, distortion);
+        if (source.readout) return rolling(source, distortion);
         const auto known = std::find_if(known_.begin(), known_.end(), [&](const Known& k) {
             const Camera& c = k.source;
             return k.distortion == distortion && c.width == source.width && c.height == source.height &&
@@ -148,7 +148,7 @@ class CameraCache {
 
   private:
     /// The rows of an undistorted image would be read at no one time.
-    Camera moving(const Camera& source, const Distortion& distortion) const {
+    Camera rolling(const Camera& source, const Distortion& distortion) const {
         if (use_ == LensUse::undistort || !scene::is_native(distortion))
             throw InputError(
                 "images of a rolling shutter cannot be undistorted; --lens native takes pinholes, OpenCV's "
@@ -204,6 +204,7 @@ Frame make_frame(const io::ImageRecord& image, const ImageFile& file, const Data
         frame.pinhole = cameras.of(frame.source, image.distortion);
         if (frame.pinhole.distortion.none()) frame.distortion = image.distortion;
         frame.camera = downscale(frame.pinhole, frame.downscale);
+        scene::check_readout(frame.camera);
     } catch (const InputError& error) {
         throw InputError(core::one_line("frame \"" + image.name + "\": " + error.what()));
     }
@@ -217,8 +218,10 @@ void check_positions(const Dataset& dataset) {
     // A single camera far away would move the mean, and so make every other distance infinite.
     for (const bool from_mean : {false, true})
         for (const Frame& frame : dataset.frames) {
-            const glm::dvec3 place = frame.camera.position() - (from_mean ? mean : glm::dvec3(0.0));
-            if (!std::isfinite(glm::length(place)))
+            const glm::dvec3 zero = from_mean ? mean : glm::dvec3(0.0);
+            const double far = glm::length(frame.camera.position() - zero) +
+                               glm::length(scene::at_share(frame.camera, 1).position() - zero);
+            if (!std::isfinite(far))
                 throw InputError(
                     core::one_line(dataset.root.string() + ": frame \"" + frame.name +
                                    "\": the position of its camera, or the distance to it, is not "

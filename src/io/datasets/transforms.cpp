@@ -318,6 +318,7 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
     result.format = "transforms";
     result.program = program_of(top);
     add_notes(top, result);
+    bool unused_poses = false;
     for (size_t i = 0; i < frames->size(); ++i) {
         const Entry entry(name + ": frame " + std::to_string(i), top, (*frames)[i]);
         if (!(*frames)[i].is_object()) entry.fail("is not a JSON object");
@@ -328,9 +329,14 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
         if (const auto mask = named_file(entry, "mask_path", folder); !mask.empty())
             image.mask = folder / mask;
         read_poses(entry, image.camera);
+        unused_poses =
+            unused_poses || (entry.find("transform_matrix_start") && !entry.find("rolling_shutter"));
         read_intrinsics(entry, image);
         result.images.push_back(std::move(image));
     }
+    if (unused_poses)
+        result.notes.emplace_back(
+            "transform_matrix_start and _end are not used: rolling_shutter names no order of the readout");
     if (const auto view = top.find("view_dependent"); view != top.end() && !view->is_null()) {
         if (!view->is_boolean()) throw InputError(name + ": \"view_dependent\" is neither true nor false");
         result.color_depends_on_view = view->get<bool>();
