@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "ewa/camera.h"
@@ -50,6 +51,8 @@ struct RunOptions {
     int max_width = 0;           // px; images that are wider after `downscale` are reduced to it; 0: none are
     MaskUse masks = MaskUse::automatic;
     LensUse lens = LensUse::automatic;
+    /// With TrainOptions::refine_poses: frames without a readout get one in this order, and learn their cameras' motion from rest.
+    std::optional<ReadoutFrom> rolling_shutter;
     int test_every = 8;          // every K-th image in name order is held out; 0: none
     bool skip_blurred = false;   // training images are skipped that are blurred far more than the others
     bool weigh_blurred = false;  // they count less

@@ -162,6 +162,7 @@ COMMAND_LINE = {
     "output",
     "resume",
     "robust",
+    "rolling-shutter",
     "save-every",
     "skip-blurred",
     "test-every",

@@ -16,6 +16,7 @@
 #include "run/look_options.h"
 #include "run/loss_option.h"
 #include "run/option_rows.h"
+#include "run/pose_options.h"
 #include "run/region_option.h"
 #include "scene/looks.h"
 
@@ -304,15 +305,9 @@ std::vector<Row> rows() {
         {"Quality", "exposure",
          flag("exposure", "The same as --appearance affine",
               [](RunOptions& o) -> bool& { return o.train.exposure; })},
-        {"Quality", "refine_poses",
-         later_flag(
-             "refine-poses",
-             "Learn a small rotation and translation for each training camera. Test cameras are aligned to "
-             "their images before they are scored",
-             [](RunOptions& o) -> bool& { return o.train.refine_poses; })},
-        {"Quality", "refine_focal",
-         later_flag("refine-focal", "With --refine-poses: also learn a factor of each camera's focal lengths",
-                    [](RunOptions& o) -> bool& { return o.train.refine_focal; })},
+        {"Quality", "refine_poses", refine_poses_option()},
+        {"Quality", "refine_focal", refine_focal_option()},
+        {"Quality", "", rolling_shutter_option()},
         {"Quality", "halvings",
          number<int>(
              "resolution-schedule", "N",

@@ -20,6 +20,7 @@
 #include "ewa/splat_files.h"
 #include "io/datasets/image_records.h"
 #include "run/blurred_images.h"
+#include "run/pose_options.h"
 #include "run/region_option.h"
 #include "scene/dense_points.h"
 #include "scene/names.h"
@@ -328,10 +329,12 @@ RunInput load_run(const RunOptions& options) {
     RunInput input;
     input.options = options;
     input.name = run_name(options);
+    input.options.lens = lens_use(options);
     input.dataset = load_dataset(options.dataset, {.downscale = options.downscale,
                                                    .masks = options.masks,
-                                                   .lens = options.lens,
+                                                   .lens = input.options.lens,
                                                    .max_width = options.max_width});
+    add_unknown_readouts(options, input.dataset);
     input.split = split_frames(input.dataset, options.test_every);
     if (input.split.train.empty())
         throw InputError(fmt::format("{}: of {} images ({} missing) none is left to train on",
@@ -408,7 +411,10 @@ constexpr std::array kRunExclusions{
                  [](const RunOptions& o) { return o.train.render.nearest != RenderOptions().nearest; },
                  Relation::needs, "--points", draws_points},
     RunExclusion{"--refine-focal", [](const RunOptions& o) { return o.train.refine_focal; }, Relation::needs,
-                 "--refine-poses", [](const RunOptions& o) { return o.train.refine_poses; }}};
+                 "--refine-poses", [](const RunOptions& o) { return o.train.refine_poses; }},
+    RunExclusion{"--rolling-shutter", [](const RunOptions& o) { return o.rolling_shutter.has_value(); },
+                 Relation::needs, "--refine-poses",
+                 [](const RunOptions& o) { return o.train.refine_poses; }}};
 
 }  // namespace
 

@@ -387,6 +387,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                              {"integrator", "ray"},
                                              {"refine-poses", "true"},
                                              {"refine-focal", "true"},
+                                             {"rolling-shutter", "right-to-left"},
                                              {"eval-every", "6"},
                                              {"save-every", "4"},
                                              {"keep", "3"},
