@@ -8,7 +8,9 @@
 #include <span>
 #include <utility>
 
+#include "ewa/error.h"
 #include "scene/native_lens.h"
+#include "scene/readout.h"
 
 namespace ewa::python {
 namespace {
@@ -124,8 +126,45 @@ nb::object terms_of(const Distortion& lens) {
     return nb::cast(to_numpy(std::move(values), {count}));
 }
 
+namespace {
+
+constexpr const char* kGlobal = "global";
+
+/// Gives the cameras their readouts.
+void add_readouts(Cameras& cameras, const ReadoutArguments& readout) {
+    if (readout.order == kGlobal) {
+        if (!readout.ends.is_none())
+            refuse("viewmats_end needs rolling_shutter, the order in which the rows or columns are read");
+        return;
+    }
+    const auto from = core::find_value(scene::kReadoutWords, readout.order);
+    if (!from)
+        refuse("rolling_shutter: '" + readout.order +
+               "' is none of global, top-to-bottom, bottom-to-top, left-to-right, right-to-left");
+    if (readout.ends.is_none())
+        refuse("rolling_shutter '" + readout.order +
+               "' needs viewmats_end, the poses when the readout reaches the last border");
+    const size_t count = cameras.all.size();
+    const Array<double> ends(readout.ends, "viewmats_end",
+                             cameras.batch ? Shape{ptrdiff_t(count), 4, 4} : Shape{4, 4});
+    for (size_t i = 0; i < count; ++i) {
+        const std::string name = element("viewmats_end", i, cameras.batch);
+        Camera end;
+        set_pose(end, ends.data() + 16 * i, name);
+        Camera& camera = cameras.all[i];
+        camera.readout = Readout{*from, end.rotation, end.translation};
+        try {
+            scene::check_readout(camera);
+        } catch (const InputError& error) {
+            refuse(name + ": " + error.what());
+        }
+    }
+}
+
+}  // namespace
+
 Cameras cameras_of(nb::handle viewmats, nb::handle intrinsics, int width, int height,
-                   const LensArguments& lens) {
+                   const LensArguments& lens, const ReadoutArguments& readout) {
     const Distortion distortion = distortion_of(lens);
     const bool whole = distortion.lens == Lens::equirectangular && intrinsics.is_none();
     const Array<double> poses(viewmats, "viewmats", {Shape{any('C'), 4, 4}, Shape{4, 4}});
@@ -151,7 +190,22 @@ Cameras cameras_of(nb::handle viewmats, nb::handle intrinsics, int width, int he
             scene::set_equirectangular(camera);
         cameras.all.push_back(camera);
     }
+    add_readouts(cameras, readout);
     return cameras;
+}
+
+std::string order_of(const Camera& camera) {
+    return camera.readout ? core::word_for(scene::kReadoutWords, camera.readout->from) : kGlobal;
+}
+
+std::vector<Camera> ends_of(const std::vector<Camera>& cameras) {
+    std::vector<Camera> ends = cameras;
+    for (Camera& camera : ends) {
+        if (!camera.readout) continue;
+        camera.rotation = camera.readout->rotation;
+        camera.translation = camera.readout->translation;
+    }
+    return ends;
 }
 
 nb::ndarray<nb::numpy, double> viewmats_of(const std::vector<Camera>& cameras) {

@@ -236,6 +236,9 @@ void bind_frame(nb::module_& module) {
             "distortion", [](const Frame& frame) { return terms_of(frame.camera.distortion); },
             nb::for_getter(nb::sig("def distortion(self) -> numpy.typing.NDArray[numpy.float64] | None")),
             "The terms of the lens, as render() takes them.")
+        .def_prop_ro(
+            "rolling_shutter", [](const Frame& frame) { return order_of(frame.camera); },
+            "As render() takes it: \"global\", or the order in which rows or columns are read.")
         .def("__repr__",
              [](const Frame& frame) {
                  return "Frame('" + frame.name + "', " + std::to_string(frame.camera.width) + "x" +
@@ -325,6 +328,12 @@ void bind_dataset(nb::module_& module) {
             "viewmats", [](const LoadedDataset& d) { return viewmats_of(cameras(d)); }, nb::rv_policy::move,
             nb::for_getter(nb::sig("def viewmats(self) -> numpy.typing.NDArray[numpy.float64]")),
             "[n, 4, 4], from the world to the camera (x right, y down, z forward).")
+        .def_prop_ro(
+            "viewmats_end", [](const LoadedDataset& d) { return viewmats_of(ends_of(cameras(d))); },
+            nb::rv_policy::move,
+            nb::for_getter(nb::sig("def viewmats_end(self) -> numpy.typing.NDArray[numpy.float64]")),
+            "[n, 4, 4], the poses when a rolling shutter reaches the last border; those of viewmats with a "
+            "global one.")
         .def_prop_ro(
             "Ks", [](const LoadedDataset& d) { return intrinsics_of(cameras(d)); }, nb::rv_policy::move,
             nb::for_getter(nb::sig("def Ks(self) -> numpy.typing.NDArray[numpy.float64]")),

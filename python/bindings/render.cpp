@@ -123,9 +123,11 @@ class SceneRenderer {
     }
 
     Renders render(nb::handle viewmats, nb::handle intrinsics, int width, int height, nb::handle background,
-                   const std::string& mode, const std::string& camera_model, nb::object distortion) {
+                   const std::string& mode, const std::string& camera_model, nb::object distortion,
+                   const std::string& rolling_shutter, nb::object viewmats_end) {
         const Cameras cameras =
-            cameras_of(viewmats, intrinsics, width, height, {camera_model, std::move(distortion)});
+            cameras_of(viewmats, intrinsics, width, height, {camera_model, std::move(distortion)},
+                       {rolling_shutter, std::move(viewmats_end)});
         DrawOptions options{.render = options_, .drawing = drawing_of(mode)};
         use_background(options.render, background);
         const size_t count = cameras.all.size();
@@ -165,18 +167,21 @@ class SceneRenderer {
 
 Renders render(const Splats& splats, nb::handle viewmats, nb::handle intrinsics, int width, int height,
                nb::handle background, const std::string& mode, const std::string& camera_model,
-               nb::object distortion, std::optional<bool> antialias, std::optional<std::string> kernel,
+               nb::object distortion, const std::string& rolling_shutter, nb::object viewmats_end,
+               std::optional<bool> antialias, std::optional<std::string> kernel,
                const std::string& integrator, std::optional<int> samples, bool points,
                std::optional<int> nearest, int sh_degree) {
     return SceneRenderer(splats,
                          {antialias, std::move(kernel), integrator, samples, points, nearest, sh_degree})
-        .render(viewmats, intrinsics, width, height, background, mode, camera_model, std::move(distortion));
+        .render(viewmats, intrinsics, width, height, background, mode, camera_model, std::move(distortion),
+                rolling_shutter, std::move(viewmats_end));
 }
 
 #define EWA_CAMERA_TYPES                                                                                \
     "viewmats: numpy.typing.ArrayLike, Ks: numpy.typing.ArrayLike | None, width: int, height: int, *, " \
     "background: numpy.typing.ArrayLike | str = (0, 0, 0), "                                            \
-    "mode: typing.Literal['color', 'depth', 'count', 'ellipsoids'] = 'color', " EWA_LENS_TYPES
+    "mode: typing.Literal['color', 'depth', 'count', 'ellipsoids'] = 'color', " EWA_LENS_TYPES          \
+    ", " EWA_READOUT_TYPES
 #define EWA_SCENE_TYPES EWA_LOOK_TYPES ", sh_degree: int = 3"
 
 constexpr const char* kRenderHelp =
@@ -189,6 +194,9 @@ constexpr const char* kRenderHelp =
     "s4 for \"opencv\", k1 k2 k3 k4 for \"fisheye\", or the first of these. An equirectangular image shows "
     "all directions "
     "with Ks None. Ks of an orthographic camera are px per world unit. "
+    "With a rolling_shutter, viewmats are the poses when the readout leaves the first border of the image, "
+    "and "
+    "viewmats_end those when it reaches the opposite one. "
     "Without antialias and kernel, the kernel is that of the splats. Ctrl-C ends it after "
     "a "
     "camera.";
@@ -244,13 +252,15 @@ void bind_render(nb::module_& module) {
              "Uploads other splats, with the kernels that there are.")
         .def("render", &SceneRenderer::render, "viewmats"_a, "Ks"_a.none(), "width"_a, "height"_a,
              nb::kw_only(), "background"_a = nb::make_tuple(0, 0, 0), "mode"_a = "color",
-             "camera_model"_a = "pinhole", "distortion"_a = nb::none(),
-             nb::sig("def render(self, " EWA_CAMERA_TYPES ") -> Renders"), kRenderHelp);
+             "camera_model"_a = "pinhole", "distortion"_a = nb::none(), "rolling_shutter"_a = "global",
+             "viewmats_end"_a = nb::none(), nb::sig("def render(self, " EWA_CAMERA_TYPES ") -> Renders"),
+             kRenderHelp);
     module.def("render", render, "splats"_a, "viewmats"_a, "Ks"_a.none(), "width"_a, "height"_a,
                nb::kw_only(), "background"_a = nb::make_tuple(0, 0, 0), "mode"_a = "color",
-               "camera_model"_a = "pinhole", "distortion"_a = nb::none(), "antialias"_a = nb::none(),
-               "kernel"_a = nb::none(), "integrator"_a = "splat", "samples"_a = nb::none(),
-               "points"_a = false, "nearest"_a = nb::none(), "sh_degree"_a = kMaxShDegree,
+               "camera_model"_a = "pinhole", "distortion"_a = nb::none(), "rolling_shutter"_a = "global",
+               "viewmats_end"_a = nb::none(), "antialias"_a = nb::none(), "kernel"_a = nb::none(),
+               "integrator"_a = "splat", "samples"_a = nb::none(), "points"_a = false,
+               "nearest"_a = nb::none(), "sh_degree"_a = kMaxShDegree,
                nb::sig("def render(splats: Splats, " EWA_CAMERA_TYPES ", " EWA_SCENE_TYPES ") -> Renders"),
                kRenderHelp);
 }

@@ -108,6 +108,24 @@ def test_what_is_no_lens_is_refused():
         ewa.render(make_splats(), viewmat, k, width, height, camera_model="fisheye", integrator="march")
 
 
+def test_a_rolling_shutter_needs_an_order_and_its_last_poses():
+    viewmat, k, width, height = camera()
+    behind = np.diag([-1.0, 1, -1, 1]) @ viewmat
+    for kwargs, text in (
+        ({"rolling_shutter": "top", "viewmats_end": viewmat}, "rolling_shutter: 'top' is none of global, top-to-bottom"),
+        ({"rolling_shutter": "top-to-bottom"}, "rolling_shutter 'top-to-bottom' needs viewmats_end"),
+        ({"viewmats_end": viewmat}, "viewmats_end needs rolling_shutter"),
+        ({"rolling_shutter": "top-to-bottom", "viewmats_end": viewmat[None]}, "viewmats_end"),
+        ({"rolling_shutter": "top-to-bottom", "viewmats_end": np.full((4, 4), np.nan)}, "viewmats_end is not finite"),
+        ({"rolling_shutter": "top-to-bottom", "viewmats_end": behind}, "viewmats_end: the camera turns by more than 90 degrees"),
+    ):
+        with pytest.raises(ValueError, match=re.escape(text)):
+            ewa.render(make_splats(), viewmat, k, width, height, **kwargs)
+    plain = ewa.render(make_splats(), viewmat, k, width, height).color
+    still = ewa.render(make_splats(), viewmat, k, width, height, rolling_shutter="left-to-right", viewmats_end=viewmat)
+    assert np.array_equal(still.color, plain)
+
+
 def test_renders_are_those_of_the_command_line(tmp_path, program, still_life):
     splats = ewa.Splats.from_points(still_life.points, still_life.point_colors, sh_degree=0)
     ewa.save(tmp_path / "splats.ply", splats)
