@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rolling shutters in ewa.gsplat, beside the rows of cameras at rest."""
+"""Rolling shutters in ewa.gsplat and in ewa.render: rows of cameras at rest, and each other."""
 
+import numpy as np
 import pytest
+
+import ewa
 
 torch = pytest.importorskip("torch")
 
@@ -9,7 +12,12 @@ from ewa import gsplat as ours
 from gsplat_scenes import HEIGHT, WIDTH, Scene
 
 Type = ours.RollingShutterType
-ORDERS = [order for order in Type if order != Type.GLOBAL]
+ORDERS = {
+    Type.ROLLING_TOP_TO_BOTTOM: "top-to-bottom",
+    Type.ROLLING_BOTTOM_TO_TOP: "bottom-to-top",
+    Type.ROLLING_LEFT_TO_RIGHT: "left-to-right",
+    Type.ROLLING_RIGHT_TO_LEFT: "right-to-left",
+}
 
 
 FOOTPRINT = (("means2d", 2), ("conics", 3), ("depths", 1))
@@ -72,6 +80,47 @@ def test_a_camera_at_rest_has_the_image_of_a_global_shutter():
     expected = ours.rasterization(**s.arguments())[0]
     image = draw(s, Type.ROLLING_TOP_TO_BOTTOM, s.viewmats.detach().clone())[0]
     assert (image - expected).abs().max() < 2e-5
+
+
+@pytest.mark.parametrize("shift, turn", [((0.3, -0.2, 0.4), (0, 0, 0)), ((0, 0, 0), (0.1, -0.2, 0.3))])
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_operators_and_the_renderer_agree(order, shift, turn):
+    """gsplat's matrices are those of the outer rows' centres, ewa's those of the borders."""
+    s, _ = rolling_scene()
+    start = torch.eye(4)[None]
+    rows = "TOP" in order.name
+    margin = 0.5 / ((HEIGHT if rows else WIDTH) - 1)
+
+    def at(share):
+        matrix = turned(share * torch.tensor(turn, dtype=torch.float), start).clone()
+        matrix[..., :3, 3] += share * torch.tensor(shift)
+        return matrix
+
+    image = ours.rasterization(
+        **s.arguments(
+            viewmats=start, rolling_shutter=order, viewmats_rs=at(1.0), packed=False, near_plane=0.2
+        )
+    )[0]
+    with torch.no_grad():
+        splats = ewa.Splats(
+            means=s.means.numpy(),
+            quats=s.quats.numpy(),
+            log_scales=torch.log(s.scales).numpy(),
+            opacity_logits=torch.logit(s.opacities).numpy(),
+            sh=((s.colors - 0.5) / 0.28209479177387814)[:, None].numpy(),
+        )
+    expected = ewa.render(
+        splats,
+        at(-margin)[0].double().numpy(),
+        s.Ks[0].numpy(),
+        WIDTH,
+        HEIGHT,
+        rolling_shutter=ORDERS[order],
+        viewmats_end=at(1 + margin)[0].double().numpy(),
+    ).color
+    # A weight near 1/255 may count in one of them alone.
+    difference = np.abs(image[0].detach().numpy() - expected)
+    assert (difference > 5e-4).mean() < 0.005 and (difference**2).mean() ** 0.5 < 3e-4
 
 
 @pytest.mark.parametrize("order", [Type.ROLLING_TOP_TO_BOTTOM, Type.ROLLING_RIGHT_TO_LEFT])
