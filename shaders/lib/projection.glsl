@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // From a splat's parameters to its 2D Gaussian: Sigma2 = J W Sigma W^T J^T + LOW_PASS I (EWA; Zwicker et al. 2001,
-// eq. 22 to 31). With M = J W R S, Sigma2 = M M^T + LOW_PASS I. All passes that project
-// splats, or go back through the projection, share this code.
+// eq. 22 to 31). With M = J W R S, Sigma2 = M M^T + LOW_PASS I. The low-pass of KERNEL_ANTIALIAS is LOW_PASS_ANTIALIAS. All
+// passes that project splats, or go back through the projection, share this code.
 #ifndef EWA_LIB_PROJECTION
 #define EWA_LIB_PROJECTION
 #include "lib/density.glsl"
@@ -25,6 +25,8 @@ struct Readout {
 };
 
 layout(constant_id = SPEC_KERNEL) const uint KERNEL = KERNEL_PEAK;
+
+float kernel_low_pass() { return KERNEL == KERNEL_ANTIALIAS ? float(LOW_PASS_ANTIALIAS) : float(LOW_PASS); }
 
 struct Projection {
     View view;

@@ -82,12 +82,12 @@ StoredProjection project_splat(StoredSplat splat) {
         View seen = view;
         const Readout readout = read_out(seen, image);
         const mat3 turned = readout_rotation(readout.time) * directions;
-        p.footprint = project_through_lens(seen, image, turned, turned, scale, float(LOW_PASS));
+        p.footprint = project_through_lens(seen, image, turned, turned, scale, kernel_low_pass());
         p.footprint.readout = readout;
     } else if (LENSES != 0u)
-        p.footprint = project_through_lens(view, lens_image(view), directions, directions, scale, float(LOW_PASS));
+        p.footprint = project_through_lens(view, lens_image(view), directions, directions, scale, kernel_low_pass());
     else
-        p.footprint = project_shape(view, lens, directions, directions, scale, float(LOW_PASS));
+        p.footprint = project_shape(view, lens, directions, directions, scale, kernel_low_pass());
     const vec3 far = abs(view.offset);
     // A NaN fails these comparisons.
     p.in_range = far.x <= float(VIEW_MAX) && far.y <= float(VIEW_MAX) && far.z <= float(VIEW_MAX) &&

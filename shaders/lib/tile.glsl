@@ -20,10 +20,11 @@ const uint ROW_STEP = SUBGROUP / TILE_WIDTH;
 // A lane's column is evaluated in segments. exp() is computed at pixel SEGMENT_BASE of a segment. The other pixels follow
 // by two products each: exp(-(a + b p + c p^2)) is a geometric sequence whose ratio is itself a geometric sequence.
 // The low-pass bounds the slope of a footprint (|step of (u, v)| <= sqrt(1 / (2 LOW_PASS)) a pixel), so within 4 pixels of
-// the base no visible value overflows or underflows. A column of fewer than 4 pixels is evaluated pixel by pixel, and so is
-// each where the caller's footprints may be sharper (SPEC_SHARP).
+// the base no visible value overflows or underflows. With LOW_PASS_ANTIALIAS that holds within 2 pixels. A column of fewer
+// than 4 pixels is evaluated pixel by pixel, and so is each where the caller's footprints may be sharper (SPEC_SHARP).
 layout(constant_id = SPEC_SHARP) const uint SHARP = 0;
-const uint SEGMENT = PIXELS < 8u / ROW_STEP ? PIXELS : 8u / ROW_STEP;
+const uint SEGMENT_ROWS = KERNEL == KERNEL_ANTIALIAS && ROW_STEP <= 4u ? 4u : 8u;
+const uint SEGMENT = PIXELS < SEGMENT_ROWS / ROW_STEP ? PIXELS : SEGMENT_ROWS / ROW_STEP;
 const uint SEGMENT_BASE = (SEGMENT - 1u) / 2u;
 const bool BY_RATIO = SEGMENT >= 4u && SHARP == 0u;
 

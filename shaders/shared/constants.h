@@ -10,6 +10,8 @@ EWA_BEGIN_SHARED
 EWA_REAL(NEAR_PLANE, 0.01);           // a splat is visible only where view z > NEAR_PLANE (world units)
 EWA_REAL(MEDIAN_TRANSMITTANCE, 0.5);  // the median depth is where T first falls to it
 EWA_REAL(LOW_PASS, 0.3);              // added to both diagonal entries of the 2D covariance (px^2)
+EWA_REAL(LOW_PASS_ANTIALIAS,
+         0.1);  // the same with KERNEL_ANTIALIAS: Mip-Splatting's, about the width of a pixel
 // A splat that exceeds one of the next three is skipped and counted.
 EWA_REAL(VIEW_MAX, 1e18);       // distance of the mean from the camera along each axis (world units)
 EWA_REAL(FOOTPRINT_MAX, 1e18);  // sum of the six entries of M = J W R S (px)

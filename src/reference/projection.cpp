@@ -140,6 +140,10 @@ double ray_space_factor(const ProjectionSteps& s) {
     return glm::length(glm::cross(s.image.jacobian.x, s.image.jacobian.y));
 }
 
+double low_pass_of(Footprint kernel) {
+    return kernel == Footprint::antialias ? LOW_PASS_ANTIALIAS : LOW_PASS;
+}
+
 double kernel_factor(Footprint kernel, const ProjectionSteps& s, double det) {
     switch (kernel) {
         case Footprint::peak:
@@ -204,13 +208,14 @@ Projected project(const Splat& splat, const Camera& camera, const RenderOptions&
         out.skipped_nonfinite = true;
         return out;
     }
-    out.a = glm::dot(s.m.x, s.m.x) + LOW_PASS;
+    const double low_pass = low_pass_of(options.kernel);
+    out.a = glm::dot(s.m.x, s.m.x) + low_pass;
     out.b = glm::dot(s.m.x, s.m.y);
-    out.c = glm::dot(s.m.y, s.m.y) + LOW_PASS;
+    out.c = glm::dot(s.m.y, s.m.y) + low_pass;
     const glm::dvec3 minors = glm::cross(s.m.x, s.m.y);
     s.det0 = glm::dot(minors, minors);
     const double trace = glm::dot(s.m.x, s.m.x) + glm::dot(s.m.y, s.m.y);
-    out.det = s.det0 + LOW_PASS * trace + LOW_PASS * LOW_PASS;
+    out.det = s.det0 + low_pass * trace + low_pass * low_pass;
 
     s.sigmoid = 1 / (1 + std::exp(-splat.opacity_logit));
     s.kernel_factor = kernel_factor(options.kernel, s, out.det);
@@ -227,7 +232,7 @@ Projected project(const Splat& splat, const Camera& camera, const RenderOptions&
 
 namespace {
 
-/// dL/ddet0 and dL/dtrace given dL/dfactor, where det = det0 + LOW_PASS * trace + LOW_PASS^2.
+/// dL/ddet0 and dL/dtrace given dL/dfactor, where det = det0 + low_pass * trace + low_pass^2.
 struct DetGradient {
     double det0 = 0, trace = 0;
 };
@@ -237,7 +242,7 @@ DetGradient kernel_backward(Footprint kernel, const ProjectionSteps& s, double d
     const double by_det = -0.5 * s.kernel_factor / det;
     // Antialias is sqrt(det0 / det). det0 > 0, because otherwise the factor is zero and the splat invisible.
     const double direct = kernel == Footprint::antialias ? 0.5 / std::sqrt(s.det0 * det) : 0;
-    return {by_factor * (direct + by_det), by_factor * by_det * LOW_PASS};
+    return {by_factor * (direct + by_det), by_factor * by_det * low_pass_of(kernel)};
 }
 
 Rows m_gradient(const ProjectionSteps& s, const ScreenGradient& g, const DetGradient& det) {

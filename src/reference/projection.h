@@ -11,6 +11,7 @@
 //   [a b; b c] = M M^T + LOW_PASS * I                         px^2
 //   det0       = det(M M^T) = |row0 x row1|^2                 Cauchy-Binet: squared 2 x 2 minors of M
 //   det        = det0 + LOW_PASS * trace(M M^T) + LOW_PASS^2  avoids the cancellation of a c - b^2
+// With Footprint::antialias, LOW_PASS_ANTIALIAS takes the place of LOW_PASS.
 // Opacity is sigmoid(logit) times the kernel's factor (KERNEL_* in shared/constants.h):
 //   peak 1;  antialias sqrt(max(0, det0 / det))
 // With Footprint::density the splat is a density in space, and the optical depth takes the place of the opacity:

@@ -13,7 +13,9 @@
 #include "gpu/reference_inputs.h"
 #include "gpu/refinement.h"
 #include "passes/passes.h"
+#include "reference/render.h"
 #include "reference/training.h"
+#include "support/image_difference.h"
 
 namespace ewa::test {
 namespace {
@@ -38,6 +40,36 @@ TEST(ScanEdges, ATotalPast32BitsIsTheLargestNumber) {
     EXPECT_EQ(instances({0xffff0000u, 0xffffu, 1u}), 0xffffffffu);  // by the carry of the low halves
     EXPECT_EQ(instances({0x80000000u, 0x80000000u, 7u}), 0xffffffffu);
     EXPECT_EQ(instances(std::vector<uint32_t>(300, 0x10000000u)), 0xffffffffu);
+}
+
+/// Antialiased lines of a tenth of a pixel, at each height between the rows: the sharpest footprints. Their exponentials
+/// change most from pixel to pixel, and none underflows between a segment's base and a pixel that shows the line.
+TEST(BlendEdges, AThinAntialiasedLineIsWholeAtEveryHeight) {
+    constexpr int kWidth = 24, kHeight = 16, kParts = 8;
+    constexpr float kSize = 100, kDepth = 4;
+    Camera camera = random_camera(1, kWidth, kHeight);
+    camera.fx = camera.fy = kSize;
+    camera.cx = kWidth / 2.0, camera.cy = kHeight / 2.0;
+    camera.rotation = glm::dmat3(1.0);
+    camera.translation = glm::dvec3(0.0);
+    RenderOptions options;
+    options.kernel = Footprint::antialias;
+    for (int part = 0; part < kParts * kHeight; ++part) {
+        Gaussians line;
+        line.sh_degree = 0;
+        line.resize(1);
+        const float y = float(part) / kParts - kHeight / 2.0f;
+        line.means = {0, y * kDepth / kSize, kDepth};
+        line.quaternions = {1, 0, 0, 0};
+        const float thin = std::log(0.1f * kDepth / kSize);
+        line.log_scales = {std::log(6 * kDepth / kSize), thin, thin};
+        line.opacity_logits = {4};
+        line.sh = {1, 1, 1};
+        Renderer renderer(device(), line, options);
+        const Image actual = renderer.render(camera).color;
+        EXPECT_LT(largest_difference(actual, reference::render(line, camera, options).blended.color, 1), 2e-5)
+            << part;
+    }
 }
 
 /// What is not finite is counted wherever the splat is, in front of the camera or behind it.

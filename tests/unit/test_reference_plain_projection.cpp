@@ -23,6 +23,7 @@ TEST(ReferencePlainProjection, AgreesWithTheTrainersProjection) {
         RenderOptions options;
         options.kernel = Footprint::antialias;
         scene.options.compensations = true;
+        scene.options.low_pass = float(shared::LOW_PASS_ANTIALIAS);
         for (size_t i = 0; i < scene.size(); ++i) {
             const Projected expected = project(gaussians, i, camera, options);
             if (!expected.visible) continue;

@@ -53,7 +53,7 @@ TEST(ReferenceProjection, KernelFactors) {
     const Splat splat = round_splat({0, 0, 4}, 0.2, 0.7);
     RenderOptions options;
     options.kernel = Footprint::antialias;
-    EXPECT_NEAR(project(splat, plain_camera(), options).opacity, 0.7 * std::sqrt(25.0 * 16.0 / (25.3 * 16.3)),
+    EXPECT_NEAR(project(splat, plain_camera(), options).opacity, 0.7 * std::sqrt(25.0 * 16.0 / (25.1 * 16.1)),
                 1e-12);
     // The optical depth of a sphere is that of its opacity; the low-pass spreads it.
     options.kernel = Footprint::density;

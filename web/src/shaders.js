@@ -79,9 +79,10 @@ void main() {
     vec3 depth = vec3(axes[0].z, axes[1].z, axes[2].z);
     vec3 u = lens.x / p.z * (vec3(axes[0].x, axes[1].x, axes[2].x) - bounded.x * depth);
     vec3 v = lens.y / p.z * (vec3(axes[0].y, axes[1].y, axes[2].y) - bounded.y * depth);
-    float uu = dot(u, u), vv = dot(v, v), xy = dot(u, v), x = uu + 0.3, y = vv + 0.3;
+    const float low_pass = ${antialias ? 0.1 : 0.3};
+    float uu = dot(u, u), vv = dot(v, v), xy = dot(u, v), x = uu + low_pass, y = vv + low_pass;
     vec3 minors = cross(u, v);
-    float plain = dot(minors, minors), det = plain + 0.3 * (uu + vv) + 0.09;
+    float plain = dot(minors, minors), det = plain + low_pass * (uu + vv) + low_pass * low_pass;
     float opacity = float(b.z >> 24) / 255.0;
     ${antialias ? "opacity *= sqrt(plain / det);" : ""}
     if (!(opacity * 255.0 >= 1.0)) return;
