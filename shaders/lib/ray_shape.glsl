@@ -78,7 +78,7 @@ float relative_shadow(vec3 sharpness) {
 
 Widening widening_of(RayCamera eye, mat3 directions, vec3 log_scale) {
     Widening w;
-    const float log_width = log(eye.depth) + 0.5 * log(float(LOW_PASS) / (camera.focal_hi[0] * camera.focal_hi[1]));
+    const float log_width = log(eye.depth) + 0.5 * log(float(LOW_PASS_ANTIALIAS) / (camera.focal_hi[0] * camera.focal_hi[1]));
     const vec3 more = 2.0 * (log_width - log_scale);
     // ln s - ln s'
     const vec3 less = -0.5 * (max(more, vec3(0.0)) + log(1.0 + exp(-abs(more))));

@@ -86,7 +86,7 @@ void Rays::widen(Member& m, const Splat& splat, const glm::dmat3& axes, const gl
     w.mean = glm::transpose(axes) * mean;
     w.depth = by_distance_ ? glm::length(mean) : (camera_.rotation * mean).z;
     w.deeper = by_distance_ ? mean / w.depth : glm::row(camera_.rotation, 2);
-    w.squared = shared::LOW_PASS * w.depth * w.depth / (camera_.fx * camera_.fy);
+    w.squared = shared::LOW_PASS_ANTIALIAS * w.depth * w.depth / (camera_.fx * camera_.fy);
     const auto shadow = [&](const glm::dvec3& s) { return s.x * s.y * s.z * glm::length(w.mean / s); };
     for (int k = 0; k < 3; ++k) m.scale[k] = std::sqrt(w.own[k] * w.own[k] + w.squared);
     const double opacity = 1 / (1 + std::exp(-splat.opacity_logit));

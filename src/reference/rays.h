@@ -5,7 +5,7 @@
 //
 // With Footprint::antialias every splat is widened as by splatting's low-pass, and absorbs as much as before. With t0 the view depth
 // of the mean m (from the eye) and f = sqrt(fx fy):
-//   s'_k^2 = s_k^2 + w^2,  w^2 = LOW_PASS (t0 / f)^2,  c = A(s) / A(s'),  A(s) = s1 s2 s3 |S^-1 R^T m|
+//   s'_k^2 = s_k^2 + w^2,  w^2 = LOW_PASS_ANTIALIAS (t0 / f)^2,  c = A(s) / A(s'),  A(s) = s1 s2 s3 |S^-1 R^T m|
 //   depth  = -ln(1 - c opacity)            of the ray through the mean
 // c is the share of the wider splat's shadow. Mip-Splatting (Yu et al. 2024) scales opacity by the same share, on the image.
 // With p = R^T m, Q = sum (p_k / s_k)^2, and G the gradient by ln(c opacity), the splat's own scales, rotation and mean get
