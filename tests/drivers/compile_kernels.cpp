@@ -112,11 +112,11 @@ void compile_splatting(Compiler& compiler) {
     compiler.compile<passes::TileStarts>();
     compiler.compile<passes::Blend>(
         {{SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH, BLEND_COUNT, BLEND_ELLIPSOIDS, BLEND_MEDIAN}},
-         {SPEC_KERNEL, {KERNEL_PEAK, KERNEL_DENSITY}}});
+         {SPEC_KERNEL, {KERNEL_PEAK, KERNEL_ANTIALIAS, KERNEL_DENSITY}}});
     compiler.compile<passes::BlendBackward>(
         {{SPEC_MODE,
           {0, BLEND_BACKWARD_ABSOLUTE, BLEND_BACKWARD_ALPHA, BLEND_BACKWARD_ABSOLUTE | BLEND_BACKWARD_ALPHA}},
-         {SPEC_KERNEL, {KERNEL_PEAK, KERNEL_DENSITY}}});
+         {SPEC_KERNEL, {KERNEL_PEAK, KERNEL_ANTIALIAS, KERNEL_DENSITY}}});
     compiler.compile<passes::Pack>();
 }
 
