@@ -37,12 +37,12 @@ RayTerms summed(RayTerms own) {
     return RayTerms(subgroup_sum(own.first), subgroup_sum(own.second), subgroup_sum(own.third), subgroup_sum(own.blue));
 }
 
-void write_ray_slot(uint instance, RayTerms all) {
+void add_terms_to_slot(uint instance, RayTerms all) {
     const uint at = RAY_SLOT_TEXELS * instance;
-    slots[at] = all.first;
-    slots[at + 1u] = all.second;
-    slots[at + 2u] = all.third;
-    slots[at + 3u].x = all.blue;
+    slots[at] += all.first;
+    slots[at + 1u] += all.second;
+    slots[at + 2u] += all.third;
+    slots[at + 3u].x += all.blue;
 }
 
 // Adds what all lanes have for one splat.
@@ -51,13 +51,7 @@ void add_to_slot(RaySplat r, Meeting m, bool counts, float g, float s1, float s2
     add_ray_terms(own, r, m, counts, g, s1, s2, color);
     const RayTerms all = summed(own);
     // Without loops: their turns would count (rays.glsl).
-    if (LANE == r.at % SUBGROUP) {
-        const uint at = RAY_SLOT_TEXELS * r.at;
-        slots[at] += all.first;
-        slots[at + 1u] += all.second;
-        slots[at + 2u] += all.third;
-        slots[at + 3u].x += all.blue;
-    }
+    if (LANE == r.at % SUBGROUP) add_terms_to_slot(r.at, all);
 }
 
 vec3 gradient_of(uint at) {

@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Gradient of blend_fast_rays, front to back, with the terms of blend_rays_backward.
 // One workgroup is one subgroup and owns a tile. It reads the tile's sorted splats, how rays meet them, the image planes and
-// dL/d(image). It writes the gradient slots of the tile's instances up to the last one that a pixel blends; the others are
-// zero before.
+// dL/d(image). It adds to the gradient slots of the tile's instances, which are zero before.
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_CAMERA 7
 #include "lib/prelude.glsl"
@@ -64,7 +63,7 @@ void main() {
                 }
             }
             const RayTerms all = summed(sum);
-            if (LANE == 0u) write_ray_slot(r.at, all);
+            if (LANE == 0u) add_terms_to_slot(r.at, all);
         }
     }
     report_turns();

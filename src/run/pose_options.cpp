@@ -27,12 +27,11 @@ RunOption refine_focal_option() {
 }
 
 RunOption rolling_shutter_option() {
-    RunOption option{"rolling-shutter", "TEXT",
-                     "With --refine-poses: the order in which a rolling shutter reads the images. How each "
-                     "camera moves meanwhile is learned",
+    RunOption option{"rolling-shutter", "ORDER",
+                     "With --refine-poses: the order in which a rolling shutter reads the images: "
+                     "top-to-bottom, bottom-to-top, left-to-right, right-to-left or none. How each camera "
+                     "moves meanwhile is learned",
                      kDecides};
-    option.choices = core::words_of(scene::kReadoutWords);
-    option.choices.insert(option.choices.begin(), kNoReadout);
     option.get = [](const RunOptions& options) {
         return nlohmann::ordered_json(options.rolling_shutter
                                           ? core::word_for(scene::kReadoutWords, *options.rolling_shutter)

@@ -104,7 +104,7 @@ std::vector<RayCase> ray_cases() {
         for (const auto& [integrator, kernel] : {std::pair(Integrator::ray, Footprint::antialias),
                                                  std::pair(Integrator::fast_ray, Footprint::antialias),
                                                  std::pair(Integrator::fast_ray, Footprint::density)})
-            all.push_back({kind, 150, 45, 37, int(seed % 4), integrator, 0, kernel, seed++});
+            all.push_back({kind, 150, 45, 37, int(seed % 4), integrator, 0, kernel, 380 + seed++});
     for (const int samples : {1, 3})
         all.push_back(
             {SplatKind::mixed, 100, 33, 21, 1, Integrator::march, samples, Footprint::peak, seed++});

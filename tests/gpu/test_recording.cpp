@@ -554,7 +554,7 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
 
     request.render.points = false;
     request.drawing = Drawing::color;
-    for (const Integrator integrator : {Integrator::ray, Integrator::march}) {
+    for (const Integrator integrator : {Integrator::ray, Integrator::fast_ray, Integrator::march}) {
         request.render.integrator = integrator;
         gpu::Recording rays = r.recording();
         record_gradient(parts, rays, request, inputs);

@@ -41,6 +41,7 @@ TEST(Exclusions, AreThoseOfTheDocument) {
             TrainOptions options;
             options.render.points = row.option == "--points";
             options.refine_poses = row.option == "--refine-poses";
+            if (row.option == "--integrator") options.render.integrator = Integrator::fast_ray;
             options.sky = row.option == "--background sky";
             if (row.option == "--appearance") options.appearance = AppearanceModel::ppisp;
             EXPECT_TRUE(row.used(options));
