@@ -95,14 +95,18 @@ class FakePortal {
         daemon_ =
             core::start_program({"dbus-daemon", "--config-file=" + folder / "bus.conf", "--nofork"}, {}, {});
         address_ = "unix:path=" + folder / "bus";
-        if (!soon([&] { return fs::exists(folder / "bus"); })) return;
-        sd_bus_new(&bus_);
-        sd_bus_set_address(bus_, address_.c_str());
-        sd_bus_set_bus_client(bus_, 1);
+        // Between the socket's file and the first connection that it takes, the daemon refuses.
+        const auto connected = [&] {
+            bus_ = sd_bus_unref(bus_);
+            sd_bus_new(&bus_);
+            sd_bus_set_address(bus_, address_.c_str());
+            sd_bus_set_bus_client(bus_, 1);
+            return sd_bus_start(bus_) >= 0;
+        };
+        if (!soon([&] { return fs::exists(folder / "bus") && connected(); })) return;
         static const sd_bus_vtable methods[] = {
             SD_BUS_VTABLE_START(0), SD_BUS_METHOD("OpenFile", "ssa{sv}", "o", opened, 0), SD_BUS_VTABLE_END};
-        ready_ = sd_bus_start(bus_) >= 0 &&
-                 sd_bus_add_object_vtable(bus_, nullptr, "/org/freedesktop/portal/desktop",
+        ready_ = sd_bus_add_object_vtable(bus_, nullptr, "/org/freedesktop/portal/desktop",
                                           "org.freedesktop.portal.FileChooser", methods, this) >= 0 &&
                  sd_bus_request_name(bus_, "org.freedesktop.portal.Desktop", 0) >= 0;
         thread_ = std::thread([this] {
