@@ -3,7 +3,7 @@
 
     test_scripts.py EWA_BENCH      the program, whose output is read; without it only the rest is tested
 """
-import importlib.machinery, importlib.util, pathlib, re, subprocess, sys, unittest
+import importlib.machinery, importlib.util, pathlib, re, subprocess, sys, tempfile, unittest
 
 PROJECT = pathlib.Path(__file__).resolve().parents[2]
 sys.dont_write_bytecode = True  # no cache beside a script
@@ -47,11 +47,34 @@ class Drivers(unittest.TestCase):
 
 
 class GpuCheck(unittest.TestCase):
+    def shell(self, command, said=""):
+        script = f"source {PROJECT}/scripts/gpu-check; here={PROJECT}/bench; {command}"
+        return subprocess.run(["bash", "-c", script], input=said, stdout=subprocess.PIPE, text=True, check=True).stdout
+
+    def test_each_test_is_counted_once(self):
+        logs = ("[ RUN      ] A.Passes/one\n    a figure\n[       OK ] A.Passes/one (3 ms)\n[ RUN      ] A.Skips\n[  SKIPPED ] A.Skips (0 ms)\n"
+                "[ RUN      ] A.Fails/0\n[  FAILED  ] A.Fails/0, where GetParam() = 7 (2 ms)\n[ RUN      ] A.Hangs\n",
+                "[ RUN      ] B.Fails\n[  FAILED  ] B.Fails (1 ms)\n[  SKIPPED ] 1 test, listed below:\n[  FAILED  ] 1 test, listed below:\n"
+                "[  FAILED  ] B.Fails\n\n 1 FAILED TEST\n")
+        with tempfile.TemporaryDirectory() as folder:
+            for number, log in enumerate(logs):
+                pathlib.Path(folder, str(number)).write_text(log)
+            said = self.shell(f"test_results {folder}/*")
+        self.assertEqual(said.splitlines(), ["passed A.Passes/one", "failed A.Fails/0", "unended A.Hangs", "failed B.Fails"])
+
+    def test_stages_share_the_time(self):
+        stages = re.search(r"^stages_known=\((.*)\)$", (PROJECT / "scripts/gpu-check").read_text(), re.MULTILINE)[1].split()
+        left = 540
+        for at in range(len(stages)):  # each uses all of its share
+            share = int(self.shell(f"share_of {left} {' '.join(stages[at:])}"))
+            self.assertGreaterEqual(share, 10, stages[at])
+            left -= share
+        self.assertEqual(left, 0)
+
     @unittest.skipUnless(BENCH, "without ewa-bench")
     def test_each_prediction_finds_its_passes(self):
         said = subprocess.run([BENCH, "--cases", "capture_2k*train", "--runs", "1"], stdout=subprocess.PIPE, text=True, check=True).stdout
-        script = f'source {PROJECT}/scripts/gpu-check; here={PROJECT}/bench; pass_times <(cat)'
-        rows = subprocess.run(["bash", "-c", script], input=said, stdout=subprocess.PIPE, text=True, check=True).stdout
+        rows = self.shell("pass_times <(cat)", said)
         times = {line.split("|")[0]: float(line.split("|")[1]) for line in rows.splitlines()}
         *passes, other, whole, _ = times
         self.assertEqual((other, whole), ("other passes", "all passes"))
