@@ -97,6 +97,11 @@ void repeat(int runs, const std::function<void()>& work) {
     }
 }
 
+void repeat_for(double milliseconds, const std::function<void()>& work) {
+    const double start = wall_milliseconds();
+    while (wall_milliseconds() - start < milliseconds) work();
+}
+
 Timed time_repeated(int runs, const std::function<void()>& work) {
     work();
     Stopwatch watch;

@@ -31,6 +31,9 @@ unsigned host_threads();
 /// Calls work() `runs` times. runs 0: for about a second, at least 5 and at most 25 times.
 void repeat(int runs, const std::function<void()>& work);
 
+/// Calls work() again and again until so much wall time has passed.
+void repeat_for(double milliseconds, const std::function<void()>& work);
+
 /// Times each call, after one that does not count.
 Timed time_repeated(int runs, const std::function<void()>& work);
 
