@@ -215,7 +215,7 @@ void Device::limit_memory(uint64_t bytes, std::function<bool()> make_room) {
 }
 
 uint64_t Device::staging_bytes() const {
-    constexpr uint64_t kMost = uint64_t(64) << 20, kLeast = uint64_t(1) << 16;
+    constexpr uint64_t kMost = MemoryPool::kStagingBytes, kLeast = uint64_t(1) << 16;
     const uint64_t limit = memory_limit();
     // Half of the part that is kept for it: the host sees other small buffers, too.
     return limit == 0 ? kMost : std::clamp(MemoryPool::host_part(limit) / 2, kLeast, kMost);

@@ -90,7 +90,7 @@ std::optional<Memory> MemoryPool::allocate(const vk::MemoryRequirements& require
         for (uint32_t type = 0; type < properties_.memoryTypeCount; ++type) {
             const vk::MemoryPropertyFlags flags = properties_.memoryTypes[type].propertyFlags;
             if (!(requirements.memoryTypeBits & (1u << type)) || (flags & wish) != wish) continue;
-            std::optional<Memory> memory = take(requirements, type, most);
+            std::optional<Memory> memory = take(requirements, type, most, host_visible);
             if (!memory) continue;
             memory->access_ = (flags & kHost) != kHost    ? HostAccess::none
                               : flags & Flag::eHostCached ? HostAccess::read_write
@@ -103,14 +103,20 @@ std::optional<Memory> MemoryPool::allocate(const vk::MemoryRequirements& require
 }
 
 std::optional<Memory> MemoryPool::take(const vk::MemoryRequirements& requirements, uint32_t type,
-                                       uint64_t most) {
+                                       uint64_t most, bool for_host) {
     for (Block& block : blocks_) {
-        if (block.type != type) continue;
-        if (const auto offset = block.free.take(requirements.size, requirements.alignment))
-            return take_from(block, *offset, requirements.size);
+        if (block.type != type || (&block == spare_ && !fits(block.bytes, most))) continue;
+        const auto offset = block.free.take(requirements.size, requirements.alignment);
+        if (!offset) continue;
+        if (&block == spare_) {
+            spare_ = nullptr;
+            count(block);
+        }
+        return take_from(block, *offset, requirements.size);
     }
     Block* block = new_block(requirements, type, most);
     if (!block) return std::nullopt;
+    block->for_host = for_host;
     return take_from(*block, *block->free.take(requirements.size, requirements.alignment), requirements.size);
 }
 
@@ -141,25 +147,44 @@ MemoryPool::Block* MemoryPool::new_block(const vk::MemoryRequirements& requireme
 }
 
 MemoryPool::Block* MemoryPool::try_block(uint64_t bytes, uint32_t type, uint64_t most) {
-    if (bytes > most || use_.held > most - bytes) return nullptr;
+    if (!fits(bytes, most)) return nullptr;
+    if (spare_ && !fits(bytes, most - std::min(most, spare_->bytes))) free_spare();
     vk::MemoryAllocateInfo info;
     info.setAllocationSize(bytes).setMemoryTypeIndex(type);
-    Block block{{}, type, bytes, nullptr, FreeRanges(bytes)};
+    Block block{{}, type, bytes, false, nullptr, FreeRanges(bytes)};
     try {
         block.memory = device_.allocateMemoryUnique(info);
     } catch (const vk::OutOfDeviceMemoryError&) {
-        return nullptr;
     } catch (const vk::OutOfHostMemoryError&) {
-        return nullptr;
     } catch (const vk::TooManyObjectsError&) {
-        return nullptr;
+    }
+    if (!block.memory) {
+        if (!spare_) return nullptr;
+        free_spare();
+        return try_block(bytes, type, most);
     }
     if ((properties_.memoryTypes[type].propertyFlags & kHost) == kHost)
         block.mapped = static_cast<std::byte*>(device_.mapMemory(*block.memory, 0, VK_WHOLE_SIZE));
-    use_.held += bytes;
-    ++use_.blocks;
     ++use_.allocated;
+    count(block);
     return &blocks_.emplace_back(std::move(block));
+}
+
+void MemoryPool::count(const Block& block) {
+    use_.held += block.bytes;
+    ++use_.blocks;
+}
+
+/// Where the host reads and writes the device's memory itself, nothing is staged.
+bool MemoryPool::becomes_spare(const Block& block) const {
+    const bool stages = !mapped_is_fast_ || most_access_ != HostAccess::read_write;
+    return stages && block.for_host && block.bytes <= kStagingBytes &&
+           (!spare_ || spare_->bytes < block.bytes);
+}
+
+void MemoryPool::free_spare() {
+    const Block* spare = std::exchange(spare_, nullptr);
+    blocks_.remove_if([&](const Block& each) { return &each == spare; });
 }
 
 void MemoryPool::give_back(Block* block, uint64_t offset, uint64_t bytes) {
@@ -169,7 +194,12 @@ void MemoryPool::give_back(Block* block, uint64_t offset, uint64_t bytes) {
     if (!block->free.all_free()) return;
     use_.held -= block->bytes;
     --use_.blocks;
-    blocks_.remove_if([&](const Block& each) { return &each == block; });
+    if (becomes_spare(*block)) {
+        free_spare();
+        spare_ = block;
+    } else {
+        blocks_.remove_if([&](const Block& each) { return &each == block; });
+    }
 }
 
 MemoryUse MemoryPool::use() const {

@@ -39,8 +39,8 @@ uint64_t block_bytes(uint64_t stride, uint64_t held, uint64_t heap);
 struct MemoryUse {
     uint64_t used = 0;       // bytes of all buffers
     uint64_t peak = 0;       // of used
-    uint64_t held = 0;       // bytes of all blocks
-    uint32_t blocks = 0;     // the driver's allocations now
+    uint64_t held = 0;       // bytes of the blocks with a buffer in them
+    uint32_t blocks = 0;     // their number
     uint64_t allocated = 0;  // the driver's allocations so far
 };
 
@@ -67,6 +67,7 @@ class Memory {
         vk::UniqueDeviceMemory memory;
         uint32_t type = 0;
         uint64_t bytes = 0;
+        bool for_host = false;  // made for a buffer that the host sees
         std::byte* mapped = nullptr;
         FreeRanges free;
     };
@@ -95,15 +96,22 @@ class MemoryPool {
     uint64_t limit() const { return limit_; }
     /// The part of the limit for memory that the host can see.
     static uint64_t host_part(uint64_t limit) { return limit / 32; }
+    /// Bytes of the largest staging buffer.
+    static constexpr uint64_t kStagingBytes = uint64_t(64) << 20;
     MemoryUse use() const;
 
   private:
     friend class Memory;
     using Block = Memory::Block;
-    std::optional<Memory> take(const vk::MemoryRequirements& requirements, uint32_t type, uint64_t most);
+    std::optional<Memory> take(const vk::MemoryRequirements& requirements, uint32_t type, uint64_t most,
+                               bool for_host);
     Memory take_from(Block& block, uint64_t offset, uint64_t bytes);
     Block* new_block(const vk::MemoryRequirements& requirements, uint32_t type, uint64_t most);
     Block* try_block(uint64_t bytes, uint32_t type, uint64_t most);
+    bool fits(uint64_t bytes, uint64_t most) const { return bytes <= most && use_.held <= most - bytes; }
+    void count(const Block& block);
+    bool becomes_spare(const Block& block) const;
+    void free_spare();
     void give_back(Block* block, uint64_t offset, uint64_t bytes);
 
     vk::Device device_;
@@ -113,6 +121,9 @@ class MemoryPool {
     uint64_t limit_ = 0;  // bytes of all blocks; 0: none
     mutable std::mutex mutex_;
     std::list<Block> blocks_;
+    // An empty block of blocks_ for the next staging buffer, or null: an allocation of the driver takes longer than a copy of
+    // a few megabytes.
+    Block* spare_ = nullptr;
     MemoryUse use_;
 };
 

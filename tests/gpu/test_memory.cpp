@@ -121,6 +121,46 @@ TEST(DeviceMemory, ALargeBufferTakesAndFreesItsOwnBytes) {
     EXPECT_EQ(own->memory_use().held, before.held);
 }
 
+/// An allocation of the driver would cost more than the copy.
+TEST(DeviceMemory, CopiesShareOneStagingBlock) {
+    const auto own = open_test_device(true);
+    own->limit_host_access(gpu::HostAccess::none);
+    gpu::Buffer large(*own, "large", 5 * kMiB);  // leaves no room in its block
+    const gpu::MemoryUse before = own->memory_use();
+    for (uint32_t i = 0; i < 20; ++i) {
+        large.upload(std::span<const uint32_t>(contents(i)), 16 * i);
+        EXPECT_EQ(large.download<uint32_t>(4, 16 * i), contents(i));
+        EXPECT_EQ(own->memory_use().held, before.held);
+        EXPECT_EQ(own->memory_use().blocks, before.blocks);
+    }
+    EXPECT_EQ(own->memory_use().allocated, before.allocated + 1);
+
+    // A larger copy needs a block of its own, which the next ones take.
+    const std::vector<uint32_t> words(kMiB, 7);
+    for (int i = 0; i < 3; ++i) large.upload(std::span<const uint32_t>(words));
+    large.upload(std::span<const uint32_t>(contents(1)));
+    EXPECT_EQ(own->memory_use().allocated, before.allocated + 2);
+    EXPECT_EQ(large.download<uint32_t>(2, 16), std::vector<uint32_t>(2, 7));
+    EXPECT_EQ(own->memory_use().held, before.held);
+}
+
+/// The spare block counts within a limit: it makes room for others.
+TEST(DeviceMemory, ASpareStagingBlockMakesRoom) {
+    const auto own = open_test_device(true);
+    own->limit_host_access(gpu::HostAccess::none);
+    own->limit_memory(64 * kMiB, {});
+    gpu::Buffer large(*own, "large", 40 * kMiB);
+    const std::vector<uint32_t> words(kMiB / 4, 7);
+    large.upload(std::span<const uint32_t>(words));
+    const gpu::MemoryUse spare = own->memory_use();
+    // 62 MiB are for buffers of the device: the spare block's mebibyte is part of them.
+    const gpu::Buffer rest(*own, "rest", 22 * kMiB - 65536);
+    EXPECT_LE(own->memory_use().held, 62 * kMiB);
+    large.upload(std::span<const uint32_t>(words));
+    EXPECT_EQ(own->memory_use().allocated, spare.allocated + 2);
+    EXPECT_EQ(large.download<uint32_t>(2), std::vector<uint32_t>(2, 7));
+}
+
 /// Counts of kernels: the host reads them at the end of a submission, whatever it can map.
 TEST(ReadBack, GivesTheValueOfTheLastSubmission) {
     for (const auto most : {gpu::HostAccess::none, gpu::HostAccess::write, gpu::HostAccess::read_write}) {
