@@ -188,8 +188,11 @@ struct Dispatches : testing::Test {
         return {{shared::SPEC_GROUP_SIZE, 64}, {shared::SPEC_CUT_OFF, 0}, {shared::SPEC_COLOR_FLOATS, 0}};
     }
     gpu::Buffer a = words("a"), b = words("b"), c = words("c"), texels = words("texels", gpu::Texel::rgba32f);
-    gpu::Pipeline starts{*device(), "tile_starts", passes::shader_code("tile_starts", true), constants()};
-    gpu::Pipeline unpack{*device(), "unpack_target", passes::shader_code("unpack_target", true), constants()};
+    static gpu::Pipeline pipeline(const char* shader) {
+        return {*device(), shader, passes::shader_code(shader, device()->limits().texel_buffers),
+                constants()};
+    }
+    gpu::Pipeline starts = pipeline("tile_starts"), unpack = pipeline("unpack_target");
     gpu::Recording recording = rig().recording();
     const shared::TileStartsPush push{1, 1};
 
