@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -59,6 +60,14 @@ std::string what_would_help() {
     }
     return (found.empty() ? "no driver is installed in the vulkan/icd.d folders" : "drivers: " + found) +
            "; " + kInstall;
+}
+
+/// With NVIDIA's driver, the loader asks the layer for this function while it creates a device. ewa never does.
+bool is_of_the_loader(std::string_view message) {
+    return message.find(
+               "vkGetDeviceProcAddr(): pName is trying to grab "
+               "vkGetPhysicalDeviceVideoEncodeQualityLevelPropertiesKHR which is an instance level "
+               "function") != std::string_view::npos;
 }
 
 VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT,
@@ -243,6 +252,7 @@ RunError Device::out_of_memory(uint64_t bytes) const {
 }
 
 void Device::add_validation_message(const std::string& message) {
+    if (is_of_the_loader(message)) return;
     const std::lock_guard lock(message_mutex_);
     messages_.push_back(message);
 }

@@ -130,6 +130,22 @@ TEST(WithFloatModes, AddsACapabilityAndAnExecutionModeEach) {
     }
 }
 
+TEST(Validation, OnlyTheMessageOfTheLoaderIsIgnored) {
+    const auto own = open_test_device(false);
+    const std::string of_the_loader =
+        "vkGetDeviceProcAddr(): pName is trying to grab "
+        "vkGetPhysicalDeviceVideoEncodeQualityLevelPropertiesKHR which is an instance level function";
+    own->add_validation_message(of_the_loader);
+    EXPECT_NO_THROW(own->check_validation());
+    own->add_validation_message("Validation Error: [ UNASSIGNED ] | " + of_the_loader);
+    EXPECT_NO_THROW(own->check_validation());
+    own->add_validation_message(
+        "vkGetDeviceProcAddr(): pName is trying to grab vkCreateInstance which is an instance level "
+        "function");
+    EXPECT_THROW(own->check_validation(), RunError);
+    EXPECT_NO_THROW(own->check_validation());
+}
+
 TEST(LacksOf, NamesEachPartOnceWithItsConsequence) {
     const gpu::OptionalParts whole{.cpu = false,
                                    .subgroups = {.lanes = 32, .controlled = true},
