@@ -112,7 +112,10 @@ void write_shape(uint i, PlainSplat splat, vec4 unit_quaternion, float norm, Tot
         return;
     }
     // s_i / s_j - s_j / s_i, without cancellation where the scales are nearly equal.
-    const vec3 a = splat.scale.yzx, b = splat.scale.zxy;
+    // A compiler may divide by the product of two tiny scales, which is zero: a power of two lifts both.
+    const vec3 largest = max(abs(splat.scale.yzx), abs(splat.scale.zxy));
+    const vec3 lift = mix(vec3(1.0), vec3(1125899906842624.0), lessThan(largest, vec3(1e-6)));
+    const vec3 a = lift * splat.scale.yzx, b = lift * splat.scale.zxy;
     const vec3 torque = total.beside / a / b * (a - b) * (a + b);
     const vec4 by_quaternion = torque_on_quaternion(unit_quaternion, torque) / norm;
     [[unroll]] for (uint j = 0; j < 4; ++j) shapes_gradient[4 * i + j] = by_quaternion[j];
