@@ -186,6 +186,38 @@ vk::DescriptorType descriptor_type(BindingKind kind) {
                                         : vk::DescriptorType::eStorageBuffer;
 }
 
+namespace {
+
+vk::UniquePipeline compile(Device& device, const std::string& name, const std::vector<uint32_t>& words,
+                           const std::vector<SpecConstant>& constants, bool uses_subgroups, vk::PipelineLayout layout) {
+    try {
+        vk::ShaderModuleCreateInfo code;
+        code.setCode(words);
+        const auto module = device.handle().createShaderModuleUnique(code);
+        std::vector<vk::SpecializationMapEntry> entries;
+        for (uint32_t i = 0; i < constants.size(); ++i)
+            entries.emplace_back(constants[i].id, i * uint32_t(sizeof(SpecConstant)) + 4, 4);
+        const vk::SpecializationInfo specialization(uint32_t(entries.size()), entries.data(),
+                                                    constants.size() * sizeof(SpecConstant),
+                                                    constants.data());
+        vk::PipelineShaderStageRequiredSubgroupSizeCreateInfoEXT size(device.limits().subgroup_size);
+        vk::ComputePipelineCreateInfo create;
+        create.stage.setStage(vk::ShaderStageFlagBits::eCompute).setModule(*module).setPName("main");
+        create.stage.setPSpecializationInfo(&specialization);
+        // Without subgroup operations, the driver knows best how wide the shader runs.
+        if (device.subgroup_size_control() && uses_subgroups) {
+            create.stage.setPNext(&size);
+            create.stage.setFlags(vk::PipelineShaderStageCreateFlagBits::eRequireFullSubgroupsEXT);
+        }
+        create.setLayout(layout);
+        return std::move(device.handle().createComputePipelineUnique(device.pipeline_cache(), create).value);
+    } catch (const vk::SystemError& error) {
+        throw RunError("shader " + name + ": " + error.what());
+    }
+}
+
+}  // namespace
+
 Pipeline::Pipeline(Device& device, std::string name, std::span<const uint32_t> spirv,
                    const std::vector<SpecConstant>& constants)
     : name_(std::move(name)), reflection_(reflect(spirv)) {
@@ -207,32 +239,14 @@ Pipeline::Pipeline(Device& device, std::string name, std::span<const uint32_t> s
         layout.setSetLayouts(*set_layout_);
         if (reflection_.push_constant_bytes) layout.setPushConstantRanges(push);
         layout_ = device.handle().createPipelineLayoutUnique(layout);
-
-        vk::ShaderModuleCreateInfo code;
-        const std::vector<uint32_t> words =
-            with_float_modes(with_values(spirv, constants), device.float_modes());
-        code.setCode(words);
-        const auto module = device.handle().createShaderModuleUnique(code);
-        std::vector<vk::SpecializationMapEntry> entries;
-        for (uint32_t i = 0; i < constants.size(); ++i)
-            entries.emplace_back(constants[i].id, i * uint32_t(sizeof(SpecConstant)) + 4, 4);
-        const vk::SpecializationInfo specialization(uint32_t(entries.size()), entries.data(),
-                                                    constants.size() * sizeof(SpecConstant),
-                                                    constants.data());
-        vk::PipelineShaderStageRequiredSubgroupSizeCreateInfoEXT size(device.limits().subgroup_size);
-        vk::ComputePipelineCreateInfo create;
-        create.stage.setStage(vk::ShaderStageFlagBits::eCompute).setModule(*module).setPName("main");
-        create.stage.setPSpecializationInfo(&specialization);
-        // Without subgroup operations, the driver knows best how wide the shader runs.
-        if (device.subgroup_size_control() && reflection_.uses_subgroups) {
-            create.stage.setPNext(&size);
-            create.stage.setFlags(vk::PipelineShaderStageCreateFlagBits::eRequireFullSubgroupsEXT);
-        }
-        create.setLayout(*layout_);
-        pipeline_ = device.handle().createComputePipelineUnique(device.pipeline_cache(), create).value;
     } catch (const vk::SystemError& error) {
         throw RunError("shader " + name_ + ": " + error.what());
     }
+    const bool at_once = device.limits().cpu;
+    pipeline_ = std::async(at_once ? std::launch::deferred : std::launch::async, compile, std::ref(device), name_,
+                           with_float_modes(with_values(spirv, constants), device.float_modes()), constants,
+                           reflection_.uses_subgroups, *layout_);
+    if (at_once) pipeline_.get();
 }
 
 const Pipeline& PipelineStore::get(Device& device, const std::string& name, std::span<const uint32_t> spirv,

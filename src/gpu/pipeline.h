@@ -4,6 +4,7 @@
 #pragma once
 #include <compare>
 #include <cstdint>
+#include <future>
 #include <map>
 #include <mutex>
 #include <span>
@@ -54,13 +55,15 @@ std::vector<uint32_t> with_float_modes(std::span<const uint32_t> spirv, const Fl
 class Pipeline {
   public:
     /// constants: those that the shader does not declare are ignored. Throws std::logic_error if one that it
-    /// declares is missing, and RunError if the driver refuses the shader; both name the shader.
+    /// declares is missing. A CPU device compiles at once, any other in a thread of its own: a GPU's compiler takes up to
+    /// a second a shader, and a recording asks for many.
     Pipeline(Device& device, std::string name, std::span<const uint32_t> spirv,
              const std::vector<SpecConstant>& constants);
 
     const std::string& name() const { return name_; }
     const Reflection& reflection() const { return reflection_; }
-    vk::Pipeline handle() const { return *pipeline_; }
+    /// Waits for the compiler. Throws RunError, which names the shader, if the driver refuses it.
+    vk::Pipeline handle() const { return *pipeline_.get(); }
     vk::PipelineLayout layout() const { return *layout_; }
     vk::DescriptorSetLayout set_layout() const { return *set_layout_; }
 
@@ -69,11 +72,11 @@ class Pipeline {
     Reflection reflection_;
     vk::UniqueDescriptorSetLayout set_layout_;
     vk::UniquePipelineLayout layout_;
-    vk::UniquePipeline pipeline_;
+    std::shared_future<vk::UniquePipeline> pipeline_;
 };
 
-/// The pipelines of a device, which live as long as it. Each is compiled at its first use, for all who share the device. Calls
-/// may come from any thread.
+/// The pipelines of a device, which live as long as it. Each is compiled once, for all who share the device. Calls may come
+/// from any thread.
 class PipelineStore {
   public:
     /// spirv: a module that outlives the device; its address stands for it. Throws as Pipeline's constructor does.
