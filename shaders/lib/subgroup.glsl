@@ -51,6 +51,13 @@ float subgroup_sum(float x) {
     return x;
 }
 
+// Turns of a scan whose loads are on their way together. A GPU waits long for each; a CPU does not.
+#ifdef EWA_TEXEL_BUFFERS
+const uint SCAN_AHEAD = 1u;
+#else
+const uint SCAN_AHEAD = 8u;
+#endif
+
 // Sum over lanes 0 to this one, inclusive.
 uint subgroup_inclusive_sum(uint x) {
     const uint lane = LANE;

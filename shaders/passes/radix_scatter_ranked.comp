@@ -17,14 +17,14 @@ layout(constant_id = SPEC_MODE) const uint MODE = 0;
 const bool OWN_INDICES = (MODE & SORT_OWN_INDICES) != 0u, DROP_KEYS = (MODE & SORT_DROP_KEYS) != 0u,
            TRACKED = (MODE & SORT_TRACKED) != 0u, FIRST = (MODE & SORT_FIRST) != 0u, LAST = (MODE & SORT_LAST) != 0u;
 
-WORD_TEXELS(0, keys);
-WORD_TEXELS(1, values);
+WORDS(0, keys);
+WORDS(1, values);
 layout(set = 0, binding = 2, scalar) readonly buffer Counters { uint counters[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Bases { uint bases[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer CountsBlock { Counts counts; };
 layout(set = 0, binding = 5, scalar) writeonly buffer KeysOut { uint keys_out[]; };
 layout(set = 0, binding = 6, scalar) writeonly buffer ValuesOut { uint values_out[]; };
-WORD_TEXELS(7, indices);
+WORDS(7, indices);
 layout(set = 0, binding = 8, scalar) writeonly buffer IndicesOut { uint indices_out[]; };
 layout(push_constant, scalar) uniform Push { SortPush push; };
 
@@ -87,11 +87,9 @@ void main() {
     for (uint c = gl_LocalInvocationID.x; c < GROUP_SIZE / SUBGROUP * DIGITS; c += GROUP_SIZE) own_counts[c] = 0u;
     barrier();
     uint key[RANKED_ROUNDS], place[RANKED_ROUNDS];
-    [[unroll]] for (uint r = 0; r < RANKED_ROUNDS; ++r) {
-        const uint at = begin + min(read_at(r), max(items, 1u) - 1u);
-        key[r] = fetch(keys, at / 4u)[at % 4u];
-        place[r] = rank_of(digit_of(key[r], push.shift), read_at(r) < items);
-    }
+    // All keys are on their way before the first barrier, which no load passes.
+    [[unroll]] for (uint r = 0; r < RANKED_ROUNDS; ++r) key[r] = fetch_word(keys, begin + min(read_at(r), max(items, 1u) - 1u));
+    [[unroll]] for (uint r = 0; r < RANKED_ROUNDS; ++r) place[r] = rank_of(digit_of(key[r], push.shift), read_at(r) < items);
     barrier();
     scan_counts();
     [[unroll]] for (uint r = 0; r < RANKED_ROUNDS; ++r) {
@@ -111,7 +109,7 @@ void main() {
     barrier();
     [[unroll]] for (uint r = 0; r < RANKED_ROUNDS; ++r) {
         const uint at = begin + read_at(r);
-        if (read_at(r) < items) exchange[place[r]] = OWN_INDICES ? at : fetch(values, at / 4u)[at % 4u];
+        if (read_at(r) < items) exchange[place[r]] = OWN_INDICES ? at : fetch_word(values, at);
     }
     barrier();
     [[unroll]] for (uint r = 0; r < RANKED_ROUNDS; ++r) {
@@ -121,7 +119,7 @@ void main() {
     barrier();
     [[unroll]] for (uint r = 0; r < RANKED_ROUNDS; ++r) {
         const uint at = begin + read_at(r);
-        if (read_at(r) < items) exchange[place[r]] = FIRST ? at : fetch(indices, at / 4u)[at % 4u];
+        if (read_at(r) < items) exchange[place[r]] = FIRST ? at : fetch_word(indices, at);
     }
     barrier();
     [[unroll]] for (uint r = 0; r < RANKED_ROUNDS; ++r) {

@@ -22,14 +22,20 @@ void main() {
     if (begin >= push.items) return;
     const uint end = min(begin + push.block, push.items);
     uint carry = 0u;
-    for (uint base = begin; base < end; base += SUBGROUP) {
-        const uint e = base + LANE;
-        uint value = 0u;
-        if (e < end) value = source[MODE == SCAN_GATHERED ? order[e] : e];
-        if (MODE == SCAN_FLAGS) value = min(value, 1u);
-        const uint sum = subgroup_inclusive_sum(value);
-        if (e < end) prefix[e] = carry + sum - value;
-        carry += subgroupShuffle(sum, SUBGROUP - 1u);
+    for (uint base = begin; base < end; base += SCAN_AHEAD * SUBGROUP) {
+        uint value[SCAN_AHEAD];
+        [[unroll]] for (uint a = 0; a < SCAN_AHEAD; ++a) {
+            const uint e = base + a * SUBGROUP + LANE;
+            value[a] = 0u;
+            if (e < end) value[a] = source[MODE == SCAN_GATHERED ? order[e] : e];
+            if (MODE == SCAN_FLAGS) value[a] = min(value[a], 1u);
+        }
+        [[unroll]] for (uint a = 0; a < SCAN_AHEAD; ++a) {
+            const uint e = base + a * SUBGROUP + LANE;
+            const uint sum = subgroup_inclusive_sum(value[a]);
+            if (e < end) prefix[e] = carry + sum - value[a];
+            carry += subgroupShuffle(sum, SUBGROUP - 1u);
+        }
     }
     if (LANE == 0u) totals[block] = carry;
 }

@@ -14,15 +14,21 @@ layout(push_constant, scalar) uniform Push { ScanTotalsPush push; };
 
 void main() {
     uint carry = 0u, low = 0u, high = 0u;
-    for (uint base = 0u; base < push.blocks; base += SUBGROUP) {
-        const uint e = base + LANE;
-        uint value = 0u;
-        if (e < push.blocks) value = totals[e];
-        low += value & 0xffffu;
-        high += value >> 16;
-        const uint sum = subgroup_inclusive_sum(value);
-        if (e < push.blocks) totals[e] = carry + sum - value;
-        carry += subgroupShuffle(sum, SUBGROUP - 1u);
+    for (uint base = 0u; base < push.blocks; base += SCAN_AHEAD * SUBGROUP) {
+        uint value[SCAN_AHEAD];
+        [[unroll]] for (uint a = 0; a < SCAN_AHEAD; ++a) {
+            const uint e = base + a * SUBGROUP + LANE;
+            value[a] = 0u;
+            if (e < push.blocks) value[a] = totals[e];
+        }
+        [[unroll]] for (uint a = 0; a < SCAN_AHEAD; ++a) {
+            const uint e = base + a * SUBGROUP + LANE;
+            low += value[a] & 0xffffu;
+            high += value[a] >> 16;
+            const uint sum = subgroup_inclusive_sum(value[a]);
+            if (e < push.blocks) totals[e] = carry + sum - value[a];
+            carry += subgroupShuffle(sum, SUBGROUP - 1u);
+        }
     }
     low = subgroupShuffle(subgroup_inclusive_sum(low), SUBGROUP - 1u);
     high = subgroupShuffle(subgroup_inclusive_sum(high), SUBGROUP - 1u);
