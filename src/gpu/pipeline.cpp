@@ -189,7 +189,8 @@ vk::DescriptorType descriptor_type(BindingKind kind) {
 namespace {
 
 vk::UniquePipeline compile(Device& device, const std::string& name, const std::vector<uint32_t>& words,
-                           const std::vector<SpecConstant>& constants, bool uses_subgroups, vk::PipelineLayout layout) {
+                           const std::vector<SpecConstant>& constants, bool uses_subgroups,
+                           vk::PipelineLayout layout) {
     try {
         vk::ShaderModuleCreateInfo code;
         code.setCode(words);
@@ -243,9 +244,9 @@ Pipeline::Pipeline(Device& device, std::string name, std::span<const uint32_t> s
         throw RunError("shader " + name_ + ": " + error.what());
     }
     const bool at_once = device.limits().cpu;
-    pipeline_ = std::async(at_once ? std::launch::deferred : std::launch::async, compile, std::ref(device), name_,
-                           with_float_modes(with_values(spirv, constants), device.float_modes()), constants,
-                           reflection_.uses_subgroups, *layout_);
+    pipeline_ = std::async(at_once ? std::launch::deferred : std::launch::async, compile, std::ref(device),
+                           name_, with_float_modes(with_values(spirv, constants), device.float_modes()),
+                           constants, reflection_.uses_subgroups, *layout_);
     if (at_once) pipeline_.get();
 }
 
@@ -256,6 +257,11 @@ const Pipeline& PipelineStore::get(Device& device, const std::string& name, std:
     const auto found = pipelines_.find(key);
     if (found != pipelines_.end()) return found->second;
     return pipelines_.emplace(key, Pipeline(device, name, spirv, constants)).first->second;
+}
+
+size_t PipelineStore::count() const {
+    const std::lock_guard lock(mutex_);
+    return pipelines_.size();
 }
 
 }  // namespace ewa::gpu

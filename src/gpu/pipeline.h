@@ -82,9 +82,11 @@ class PipelineStore {
     /// spirv: a module that outlives the device; its address stands for it. Throws as Pipeline's constructor does.
     const Pipeline& get(Device& device, const std::string& name, std::span<const uint32_t> spirv,
                         const std::vector<SpecConstant>& constants);
+    /// Those that were asked for so far.
+    size_t count() const;
 
   private:
-    std::mutex mutex_;
+    mutable std::mutex mutex_;
     std::map<std::pair<const uint32_t*, std::vector<SpecConstant>>, Pipeline> pipelines_;
 };
 

@@ -24,6 +24,7 @@ struct KernelConfig {
     uint32_t sort_chunk = 512;                 // least number of items of a sorting lane
     uint32_t sort_group = 64;                  // invocations of a sorting workgroup
     bool ranked_sort = false;                  // keys are ranked in shared memory; sort_lanes_max is not used
+    uint32_t scan_turns = 64;       // items that a lane scans
     uint32_t tile_interleave = 1;  // distance of neighbouring workgroups' tiles, or groups of splats
     uint32_t max_groups = 65535;   // workgroups along one dimension
     uint32_t loop_limit = 65535;   // iterations of a loop in one invocation
@@ -58,6 +59,9 @@ inline KernelConfig config_for(const gpu::Limits& limits) {
         config.sort_lanes_max = 16384;
         config.sort_chunk = 64;
         config.frames_in_flight = 2;
+        // A third fewer instances than with 64 pixels. A lane of 32 has registers for four pixels.
+        if (config.subgroup == 32) config.tile_width = 16;
+        config.scan_turns = 16;
         config.broadcast = limits.scalar_loads ? shared::BROADCAST_UNIFORM : shared::BROADCAST_SHARED;
         config.ranked_sort = limits.ballots && limits.shared_bytes >= kRankedBytes &&
                              limits.max_invocations >= shared::RANKED_SUBGROUPS * config.subgroup;

@@ -165,7 +165,7 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
     check_image(config, request, s);
     s.stride = divide_up(request.width, 4) * 4;
     s.plane_floats = s.stride * request.height;
-    s.scan_block = 64 * config.subgroup;
+    s.scan_block = config.scan_turns * config.subgroup;
     s.scan_blocks = divide_up(std::max(request.splats, 1u), s.scan_block);
     s.depth_sort = radix_cut(config, request.splats, 32);
     // One more than there are tiles: the sentinel tile.

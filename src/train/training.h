@@ -133,6 +133,8 @@ class Training {
     void record_fused(gpu::Recording& recording, int step, size_t index, const portions::StepView& view);
     /// Submits a step. Afterwards at most frames_in_flight steps are in flight.
     void submit(int step);
+    /// A GPU compiles the kernels of the next SH degree while it works at this one.
+    void compile_next_degree(int step, size_t index, ImageCache& seen);
     /// Waits for the oldest step. If it had too many instances, neither it nor later ones have changed the model: they are
     /// all repeated, one by one, with more capacity.
     void finish_oldest();
@@ -172,6 +174,7 @@ class Training {
     Learned learned_;
     std::deque<Flight> in_flight_;
     StepLog log_;
+    int compiled_degree_ = -1;  // the highest SH degree whose kernels were asked for
 };
 
 }  // namespace ewa::train

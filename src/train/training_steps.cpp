@@ -130,8 +130,18 @@ void Training::submit(int step) {
     tools_.frame.record_counts(recording, slot_of(step));
     tools_.executor.submit(recording, is_timed(step));
     in_flight_.push_back({step, view.weight()});
+    compile_next_degree(step, index, seen);
     // An image from disk may be gone when its step has to be repeated: no other step follows before it is done.
     if (!seen.cached(index)) finish_all();
+}
+
+void Training::compile_next_degree(int step, size_t index, ImageCache& seen) {
+    const int next = schedule_.degree(step) + 1;
+    if (device_->limits().cpu || !seen.cached(index) || next <= compiled_degree_) return;
+    if (next > schedule_.degree(options_.steps)) return;
+    compiled_degree_ = next;
+    gpu::Recording unused(device_->limits());
+    record_fused(unused, step, index, view_of(step, seen, next));
 }
 
 void Training::finish_oldest() {

@@ -34,7 +34,7 @@ struct Drawn {
     std::vector<uint32_t> splats, tile_starts;
     bench::BlendLists lists;
 
-    explicit Drawn(int tile_width) {
+    Drawn(int tile_width, int tile_height) {
         bench::Case one;
         one.layout = bench::Layout::capture;
         one.splats = 1500;
@@ -44,7 +44,7 @@ struct Drawn {
         RenderOptions options;
         options.background = {0.1f, 0.2f, 0.3f};
         rendered =
-            reference::render(scene.gaussians, scene.camera, options, {tile_width, 64 / tile_width, {}});
+            reference::render(scene.gaussians, scene.camera, options, {tile_width, tile_height, {}});
         for (const reference::Projected& splat : rendered.projected) add_record(splat);
         for (const reference::Instance& instance : rendered.instances.sorted)
             splats.push_back(instance.splat);
@@ -55,6 +55,7 @@ struct Drawn {
         lists.width = uint32_t(one.width);
         lists.height = uint32_t(one.height);
         lists.tile_width = uint32_t(tile_width);
+        lists.tile_height = uint32_t(tile_height);
         lists.tiles_x = uint32_t(rendered.instances.grid.columns());
         for (size_t c = 0; c < 3; ++c) lists.background[c] = options.background[c];
     }
@@ -83,8 +84,8 @@ struct Drawn {
 };
 
 TEST(Ceiling, BlendsAndCountsAsTheReferenceDoes) {
-    for (const int tile_width : {4, 8}) {
-        const Drawn drawn(tile_width);
+    for (const auto& [width, height] : {std::pair(4, 16), std::pair(8, 8), std::pair(16, 8)}) {
+        const Drawn drawn(width, height);
         const uint32_t tiles = drawn.rendered.instances.grid.count();
         std::vector<float> planes;
         bench::time_blend(drawn.lists, tiles, 1, planes);

@@ -14,7 +14,7 @@ namespace ewa::bench {
 namespace {
 
 constexpr unsigned kLanes = EWA_BENCH_LANES;
-constexpr unsigned kTilePixels = 64;
+constexpr unsigned kStripPixels = 64;
 constexpr unsigned kVectors = 4;  // processed together; their state fills 16 registers
 constexpr unsigned kBatch = 8;    // splats between two checks whether all pixels are saturated
 typedef float Float __attribute__((vector_size(4 * EWA_BENCH_LANES)));
@@ -46,15 +46,28 @@ struct Pixels {
     Float r[kVectors], g[kVectors], b[kVectors];
 };
 
-inline void open_pixels(Pixels& pixels, const BlendLists& lists, unsigned tile, unsigned first) {
-    const unsigned x0 = tile % lists.tiles_x * lists.tile_width;
-    const unsigned y0 = tile / lists.tiles_x * (kTilePixels / lists.tile_width);
-    const unsigned rows = kLanes / lists.tile_width;  // of one vector
-    pixels.y_step = float(rows);
+/// Pixels go through a strip of a tile row by row, and then through the next strip.
+struct Strip {
+    unsigned x0, y0, width, first;  // px; the first pixel's number in the strip
+};
+
+inline Strip strip_at(const BlendLists& lists, unsigned tile, unsigned first) {
+    Strip strip;
+    strip.width = kStripPixels / lists.tile_height;
+    strip.x0 = tile % lists.tiles_x * lists.tile_width + first / kStripPixels * strip.width;
+    strip.y0 = tile / lists.tiles_x * lists.tile_height;
+    strip.first = first % kStripPixels;
+    return strip;
+}
+
+inline unsigned pixels_of_tile(const BlendLists& lists) { return lists.tile_width * lists.tile_height; }
+
+inline void open_pixels(Pixels& pixels, const BlendLists& lists, const Strip& strip) {
+    pixels.y_step = float(kLanes / strip.width);  // rows of one vector
     for (unsigned v = 0; v < kVectors; ++v) {
         for (unsigned l = 0; l < kLanes; ++l) {
-            const unsigned index = first + v * kLanes + l;
-            const unsigned x = x0 + index % lists.tile_width, y = y0 + index / lists.tile_width;
+            const unsigned index = strip.first + v * kLanes + l;
+            const unsigned x = strip.x0 + index % strip.width, y = strip.y0 + index / strip.width;
             pixels.T[v][l] = x < lists.width && y < lists.height ? 1.0f : -1.0f;
             if (v == 0) pixels.x[l] = float(x) + 0.5f, pixels.y[l] = float(y) + 0.5f;
         }
@@ -108,15 +121,12 @@ inline void walk(Pixels& pixels, const BlendLists& lists, unsigned tile, Int& ev
     }
 }
 
-inline void store_pixels(const Pixels& pixels, const BlendLists& lists, unsigned tile, unsigned first,
-                         float* planes) {
-    const unsigned x0 = tile % lists.tiles_x * lists.tile_width;
-    const unsigned y0 = tile / lists.tiles_x * (kTilePixels / lists.tile_width);
+inline void store_pixels(const Pixels& pixels, const BlendLists& lists, const Strip& strip, float* planes) {
     const unsigned long plane = (unsigned long)(lists.width) * lists.height;
     for (unsigned v = 0; v < kVectors; ++v) {
         for (unsigned l = 0; l < kLanes; ++l) {
-            const unsigned index = first + v * kLanes + l;
-            const unsigned x = x0 + index % lists.tile_width, y = y0 + index / lists.tile_width;
+            const unsigned index = strip.first + v * kLanes + l;
+            const unsigned x = strip.x0 + index % strip.width, y = strip.y0 + index / strip.width;
             if (x >= lists.width || y >= lists.height) continue;
             const unsigned long at = (unsigned long)(y)*lists.width + x;
             const float left = pixels.T[v][l] < 0 ? -pixels.T[v][l] : pixels.T[v][l];
@@ -132,21 +142,21 @@ inline void store_pixels(const Pixels& pixels, const BlendLists& lists, unsigned
 
 void EWA_BENCH_BLEND_TILE(const BlendLists& lists, std::uint32_t tile, float* planes) {
     Int unused = {};
-    for (unsigned first = 0; first < kTilePixels; first += kVectors * kLanes) {
+    for (unsigned first = 0; first < pixels_of_tile(lists); first += kVectors * kLanes) {
         Pixels pixels;
-        open_pixels(pixels, lists, tile, first);
+        open_pixels(pixels, lists, strip_at(lists, tile, first));
         walk<false>(pixels, lists, tile, unused, unused);
-        store_pixels(pixels, lists, tile, first, planes);
+        store_pixels(pixels, lists, strip_at(lists, tile, first), planes);
     }
 }
 
 #ifdef EWA_BENCH_COUNT_TILE
 PairCounts count_tile(const BlendLists& lists, std::uint32_t tile) {
     PairCounts counts;
-    for (unsigned first = 0; first < kTilePixels; first += kVectors * kLanes) {
+    for (unsigned first = 0; first < pixels_of_tile(lists); first += kVectors * kLanes) {
         Pixels pixels;
         Int evaluated = {}, blended = {};
-        open_pixels(pixels, lists, tile, first);
+        open_pixels(pixels, lists, strip_at(lists, tile, first));
         walk<true>(pixels, lists, tile, evaluated, blended);
         for (unsigned l = 0; l < kLanes; ++l) {
             counts.evaluated += std::uint64_t(evaluated[l]);
