@@ -24,7 +24,7 @@ struct KernelConfig {
     uint32_t sort_chunk = 512;                 // least number of items of a sorting lane
     uint32_t sort_group = 64;                  // invocations of a sorting workgroup
     bool ranked_sort = false;                  // keys are ranked in shared memory; sort_lanes_max is not used
-    uint32_t scan_turns = 64;       // items that a lane scans
+    uint32_t scan_turns = 64;                  // items that a lane scans
     uint32_t tile_interleave = 1;  // distance of neighbouring workgroups' tiles, or groups of splats
     uint32_t max_groups = 65535;   // workgroups along one dimension
     uint32_t loop_limit = 65535;   // iterations of a loop in one invocation

@@ -43,8 +43,7 @@ struct Drawn {
         scene = bench::make_scene(one);
         RenderOptions options;
         options.background = {0.1f, 0.2f, 0.3f};
-        rendered =
-            reference::render(scene.gaussians, scene.camera, options, {tile_width, tile_height, {}});
+        rendered = reference::render(scene.gaussians, scene.camera, options, {tile_width, tile_height, {}});
         for (const reference::Projected& splat : rendered.projected) add_record(splat);
         for (const reference::Instance& instance : rendered.instances.sorted)
             splats.push_back(instance.splat);

@@ -60,7 +60,9 @@ inline Strip strip_at(const BlendLists& lists, unsigned tile, unsigned first) {
     return strip;
 }
 
-inline unsigned pixels_of_tile(const BlendLists& lists) { return lists.tile_width * lists.tile_height; }
+inline unsigned pixels_of_tile(const BlendLists& lists) {
+    return lists.tile_width * lists.tile_height;
+}
 
 inline void open_pixels(Pixels& pixels, const BlendLists& lists, const Strip& strip) {
     pixels.y_step = float(kLanes / strip.width);  // rows of one vector

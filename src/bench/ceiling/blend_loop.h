@@ -11,7 +11,7 @@ struct BlendLists {
     const float* records = nullptr;         // 12 floats per splat, as in shaders/shared/layouts.h
     const std::uint32_t* splats = nullptr;  // of each sorted instance
     const std::uint32_t* tile_starts = nullptr;
-    std::uint32_t width = 0, height = 0;  // px
+    std::uint32_t width = 0, height = 0;                         // px
     std::uint32_t tile_width = 8, tile_height = 8, tiles_x = 0;  // px; tiles
     float background[3] = {0, 0, 0};
 };
