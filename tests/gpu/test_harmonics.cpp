@@ -96,7 +96,11 @@ TEST_P(HarmonicsPass, GradientsMatchTheReference) {
     EXPECT_LT(worst, 5e-6);
     const HarmonicsGradient without =
         harmonics_operators().spherical_harmonics_backward(arrays(), by_colors, false);
-    EXPECT_EQ(without.coefficients, actual.coefficients);
+    // The two kernels are compiled apart: a GPU's compiler may contract sums of one and not of the other.
+    const double apart = device()->limits().cpu ? 0 : 1e-6;
+    ASSERT_EQ(without.coefficients.size(), actual.coefficients.size());
+    for (size_t k = 0; k < actual.coefficients.size(); ++k)
+        EXPECT_NEAR(without.coefficients[k], actual.coefficients[k], apart) << k;
     EXPECT_TRUE(without.directions.empty());
 }
 

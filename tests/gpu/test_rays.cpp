@@ -79,10 +79,12 @@ TEST_P(RayChain, PictureMatchesTheReference) {
 TEST_P(RayChain, GradientMatchesTheReference) {
     const LossGradient actual = loss_gradient(device(), gaussians, camera, target, options);
     const auto expected = reference::loss_gradient(gaussians, camera, target, options);
-    EXPECT_NEAR(actual.loss, expected.loss, 1e-6);
+    // exp() of a GPU differs in its last digits, so a pixel in a thousand may blend one splat more or less.
+    const double others = device()->limits().cpu ? 1 : 3;
+    EXPECT_NEAR(actual.loss, expected.loss, others * 1e-6);
     GradientTolerance tolerance;
-    tolerance.cosine = 1e-6;
-    tolerance.norm = has_needles() ? 2e-4 : 1e-4;  // as for pictures
+    tolerance.cosine = others * 1e-6;
+    tolerance.norm = others * (has_needles() ? 2e-4 : 1e-4);  // as for pictures
     tolerance.element_relative = 1e-2;
     tolerance.element_absolute = 2e-4;
     EXPECT_TRUE(splat_gradients_agree(actual.gradient, expected.gradient, tolerance));
