@@ -11,8 +11,7 @@ as gsplat's example trainer and docs/training.md state them. Times are means ove
 gsplat needs a CUDA device, and the packages gsplat, torch, numpy and pillow. fused_ssim is used where it is installed. Without them
 the script prints one line and its exit status is 2.
 
-Not run so far: all that needs CUDA, for want of such a machine. Its calls follow the sources of gsplat 1.5.3. The reading of
-datasets and ewa's half were run.
+It ran with gsplat 1.5.3, PyTorch 2.11 and CUDA 13.0 on an NVIDIA H200, without fused_ssim.
 """
 import argparse, collections, json, math, pathlib, random, struct, subprocess, sys, tempfile, time
 
