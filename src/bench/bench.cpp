@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/ceiling/ceiling.h"
+#include "bench/kernel_choices.h"
 #include "bench/result.h"
 #include "bench/stability/stability.h"
 #include "core/json.h"
@@ -55,7 +56,8 @@ Result measure_all(const Options& options, const std::vector<std::string>& progr
     result.device = device_info(*device);
     print(header_text(result));
 
-    MeasureOptions measuring{options.runs, options.check, result.host.copies, program};
+    MeasureOptions measuring{options.runs, options.check, config_with(options.kernels, device->limits()),
+                             result.host.copies, program};
     measuring.first_step_command.insert(measuring.first_step_command.end(),
                                         {"--first-step", "--device", std::to_string(result.device.index)});
     for (const Case& one : cases) {
@@ -85,6 +87,11 @@ void add_options(CLI::App& app, Options& options) {
         ->type_name("N");
     app.add_option("--device", options.device, "Number of the device, or part of its name (see ewa devices)")
         ->type_name("NAME|N");
+    app.add_option(
+           "--kernels", options.kernels,
+           "Use other kernels than those for the device: tile=8x8, broadcast=shuffles|shared|uniform, "
+           "sort=ranked|counted, scan=N, elements=N, interleave=N")
+        ->type_name("NAME=VALUE,...");
     app.add_flag("--check", options.check,
                  "Compare the results with the CPU reference; exit with status 1 if one exceeds its bound");
     app.add_flag("--large", options.large, "Also run the cases that take gigabytes, or minutes on a CPU");

@@ -16,8 +16,9 @@ class App;
 namespace ewa::bench {
 
 struct Options {
-    std::string cases;   // patterns, see select_cases
-    std::string device;  // as in DeviceOptions
+    std::string cases;    // patterns, see select_cases
+    std::string device;   // as in DeviceOptions
+    std::string kernels;  // choices, see config_with
     int runs = 0;
     bool list = false, check = false, large = false, first_step = false;
     std::filesystem::path json;

@@ -98,8 +98,12 @@ std::vector<float> FrameRun::records() const {
     return frame_.records.download<float>(size_t(model_.splats) * shared::RECORD_TEXELS * 4);
 }
 
-SortRun::SortRun(std::shared_ptr<gpu::Device> device, uint32_t items)
-    : device_(std::move(device)), cache_(*device_), executor_(*device_), items_(items), input_(items) {
+SortRun::SortRun(std::shared_ptr<gpu::Device> device, uint32_t items, const passes::KernelConfig& config)
+    : device_(std::move(device)),
+      cache_(*device_, config),
+      executor_(*device_),
+      items_(items),
+      input_(items) {
     const Sizes sizes = sizes_for(cache_.config(), {.splats = items, .width = 8, .height = 8});
     cut_ = sizes.depth_sort;
     for (uint32_t i = 0; i < items; ++i) input_[i] = core::pcg4d({i, 0x736f7274u, 0, 0})[0];

@@ -77,7 +77,7 @@ class FrameRun {
 /// The radix sort of random 32-bit keys, each with its index as value.
 class SortRun {
   public:
-    SortRun(std::shared_ptr<gpu::Device> device, uint32_t items);
+    SortRun(std::shared_ptr<gpu::Device> device, uint32_t items, const passes::KernelConfig& config);
 
     /// Copies the input and sorts the copy.
     void run();

@@ -150,7 +150,7 @@ CaseResult measure_frame(const std::shared_ptr<gpu::Device>& device, const Case&
     CaseResult result;
     result.one = one;
     const BenchScene scene = make_scene(one);
-    FrameRun run(device, scene, one.kind != Kind::forward);
+    FrameRun run(device, scene, one.kind != Kind::forward, {}, options.kernels);
     run.run();
     if (one.kind == Kind::update) {
         time_passes(result, *device, options.runs, run, &FrameRun::run_update);
@@ -171,7 +171,7 @@ CaseResult measure_sort(const std::shared_ptr<gpu::Device>& device, const Case& 
                         const MeasureOptions& options) {
     CaseResult result;
     result.one = one;
-    SortRun run(device, one.splats);
+    SortRun run(device, one.splats, options.kernels);
     run.run();
     time_passes(result, *device, options.runs, run, &SortRun::run);
     pass_of(result, "sort").time.cpu = result.total.cpu;

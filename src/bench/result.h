@@ -11,6 +11,7 @@
 #include "bench/ceiling/ceiling.h"
 #include "bench/statistics.h"
 #include "ewa/device.h"
+#include "passes/kernel_config.h"
 
 namespace ewa::bench {
 
@@ -70,6 +71,7 @@ struct Result {
 struct MeasureOptions {
     int runs = 0;  // 0: see repeat()
     bool check = false;
+    passes::KernelConfig kernels;
     Bandwidth copies;                             // of the host
     std::vector<std::string> first_step_command;  // the command that calls run_first_step() for a device
 };

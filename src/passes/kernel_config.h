@@ -37,6 +37,12 @@ struct KernelConfig {
 
 constexpr uint32_t kRankedBytes = 32768;  // of shared memory, at most, in radix_scatter_ranked.comp
 
+/// Whether the device can rank the keys of a sort in shared memory.
+inline bool can_rank(const gpu::Limits& limits) {
+    return limits.ballots && limits.shared_bytes >= kRankedBytes &&
+           limits.max_invocations >= shared::RANKED_SUBGROUPS * limits.subgroup_size;
+}
+
 /// Throws std::logic_error unless the subgroup size is a power of two up to 64.
 inline KernelConfig config_for(const gpu::Limits& limits) {
     KernelConfig config;
@@ -63,8 +69,7 @@ inline KernelConfig config_for(const gpu::Limits& limits) {
         if (config.subgroup == 32) config.tile_width = 16;
         config.scan_turns = 16;
         config.broadcast = limits.scalar_loads ? shared::BROADCAST_UNIFORM : shared::BROADCAST_SHARED;
-        config.ranked_sort = limits.ballots && limits.shared_bytes >= kRankedBytes &&
-                             limits.max_invocations >= shared::RANKED_SUBGROUPS * config.subgroup;
+        config.ranked_sort = can_rank(limits);
     }
     return config;
 }
