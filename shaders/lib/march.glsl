@@ -32,8 +32,9 @@ struct Passing {
 Passing pass_by(RaySplat r, Ray ray) {
     Passing p;
     p.m = meet(r, ray);
-    p.depth = p.m.depth >= float(MARCH_DEPTH_MIN) ? p.m.depth : 0.0;
+    p.depth = p.m.depth >= float(MARCH_DEPTH_MIN) && sees(ray) ? p.m.depth : 0.0;
     p.sharpness = p.depth > 0.0 ? r.along * p.m.root : 0.0;
+    if (LENSES != 0u) p.sharpness /= abs(p.m.stretch);
     p.m.middle = p.depth > 0.0 ? p.m.middle : 0.0;
     return p;
 }

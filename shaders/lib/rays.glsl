@@ -35,6 +35,7 @@ struct Meeting {
     float root;   // of s
     float depth;  // optical depth of the whole ray
     float middle; // view depth
+    float stretch; // view depth over that of the splat's own camera; below 0 behind it
 };
 
 struct Ray {
@@ -116,7 +117,8 @@ Meeting meet(RaySplat r, Ray ray) {
     EXACT const float inverse = 1.0 / s, power = -(q * inverse);
     EXACT const float depth = (KERNEL == KERNEL_DENSITY ? r.shape.w * norm * (root * inverse) : r.shape.w) * exp(power);
     EXACT float middle = r.color.w * (h * inverse);
-    if (LENSES != 0u) middle *= at.z * ray.depth;
+    const float stretch = LENSES != 0u ? at.z * ray.depth : 1.0;
+    if (LENSES != 0u) middle *= stretch;
     m.u = u;
     m.v = v;
     m.q = q;
@@ -125,6 +127,7 @@ Meeting meet(RaySplat r, Ray ray) {
     m.root = root;
     m.depth = depth;
     m.middle = middle;
+    m.stretch = stretch;
     return m;
 }
 

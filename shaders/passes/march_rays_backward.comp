@@ -58,6 +58,8 @@ void add_group(uint tile, uint strip, Ray ray, bool open, float from, float to) 
             last = own;
             before = share;
         }
+        // Behind the splat's own camera, the ray goes against the direction in which that one sees it.
+        if (LENSES != 0u && p.m.stretch < 0.0) s1 = -s1;
         add_to_slot(r, p.m, open && p.depth > 0.0, g, s1, s2, color);
     END_SPLATS
 }

@@ -282,7 +282,7 @@ struct BlendFastRays : AlongRays {
     using Work = PerTile;
 };
 
-/// Marches along every ray, in intervals. Variant: SPEC_KERNEL, SPEC_MODE (intervals evaluated together).
+/// Marches along every ray, in intervals. Variant: SPEC_KERNEL, SPEC_LENSES, SPEC_MODE (intervals evaluated together).
 struct MarchRays : AlongRays {
     static constexpr char shader[] = "march_rays";
 };

@@ -263,7 +263,8 @@ void FramePasses::blend_backward(const Sorted& sorted) const {
     else if (plan.integrator == Integrator::fast_ray)
         fast_rays_backward(sorted);
     else if (plan.integrator == Integrator::march)
-        integrate_backward<passes::MarchRaysBackward>(sorted, {kernel(), {shared::SPEC_MODE, group}});
+        integrate_backward<passes::MarchRaysBackward>(sorted,
+                                                      {kernel(), {shared::SPEC_MODE, group}, lenses()});
     else if (plan.points())
         record(passes::BlendPointsBackward{buffers}, push, {mode, {shared::SPEC_NEAREST, plan.nearest}});
     else

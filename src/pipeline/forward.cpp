@@ -180,7 +180,7 @@ Sorted FramePasses::draw(uint32_t splats) const {
         else if (plan.integrator == Integrator::fast_ray)
             record(passes::BlendFastRays{along}, push, {kernel(), mode, lenses()});
         else
-            record(passes::MarchRays{along}, rays, {kernel(), {shared::SPEC_MODE, group}});
+            record(passes::MarchRays{along}, rays, {kernel(), {shared::SPEC_MODE, group}, lenses()});
     } else if (plan.points()) {
         record(passes::BlendPoints{buffers}, push, {mode, {shared::SPEC_NEAREST, plan.nearest}});
     } else {

@@ -148,9 +148,10 @@ void compile_rays(Compiler& compiler) {
     compiler.compile<passes::BlendFastRays>(
         {{SPEC_KERNEL, kernels}, {SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH}}, {SPEC_LENSES, lenses}});
     compiler.compile<passes::BlendFastRaysBackward>({{SPEC_KERNEL, kernels}, {SPEC_LENSES, lenses}});
-    compiler.compile<passes::MarchRays>({{SPEC_KERNEL, kernels}, {SPEC_MODE, chunks}});
+    compiler.compile<passes::MarchRays>({{SPEC_KERNEL, kernels}, {SPEC_MODE, chunks}, {SPEC_LENSES, lenses}});
     compiler.compile<passes::BlendRaysBackward>({{SPEC_KERNEL, kernels}, {SPEC_LENSES, lenses}});
-    compiler.compile<passes::MarchRaysBackward>({{SPEC_KERNEL, kernels}, {SPEC_MODE, chunks}});
+    compiler.compile<passes::MarchRaysBackward>(
+        {{SPEC_KERNEL, kernels}, {SPEC_MODE, chunks}, {SPEC_LENSES, lenses}});
     const uint32_t packed = UPDATE_PACKED_MOMENTS, statistics = UPDATE_STATISTICS;
     compiler.compile<passes::UpdateRays>({{SPEC_SH_DEGREE, kDegrees},
                                           {SPEC_KERNEL, all_kernels},
