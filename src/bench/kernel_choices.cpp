@@ -23,7 +23,8 @@ uint32_t number_in(const std::string& choice, const std::string& text, uint32_t 
     return value;
 }
 
-uint32_t one_of(const std::string& choice, const std::string& text, const std::map<std::string, uint32_t>& values) {
+uint32_t one_of(const std::string& choice, const std::string& text,
+                const std::map<std::string, uint32_t>& values) {
     const auto found = values.find(text);
     if (found != values.end()) return found->second;
     std::string names;
@@ -38,7 +39,8 @@ void set_tile(passes::KernelConfig& config, const std::string& choice, const std
     config.tile_height = number_in(choice, value.substr(cross + 1), 32);
     const uint32_t pixels = config.tile_width * config.tile_height;
     // Lanes are side by side in rows of the tile. A lane keeps its pixels in registers.
-    if (config.subgroup % config.tile_width != 0 || pixels % config.subgroup != 0 || pixels > 16 * config.subgroup)
+    if (config.subgroup % config.tile_width != 0 || pixels % config.subgroup != 0 ||
+        pixels > 16 * config.subgroup)
         refuse(choice, "a tile of rows of a subgroup's " + std::to_string(config.subgroup) +
                            " lanes, with at most 16 pixels a lane");
 }
