@@ -56,8 +56,7 @@ void check_lens(const RenderOptions& render, const Camera& camera) {
     if (moves(camera) && (!option.empty() || render.sky))
         throw InputError(std::string(option.empty() ? "--background sky" : option) +
                          " draws no images of a rolling shutter");
-    const bool shot =
-        render.integrator != Integrator::splat && camera.distortion.lens != Lens::orthographic;
+    const bool shot = render.integrator != Integrator::splat && camera.distortion.lens != Lens::orthographic;
     if (!option.empty() && !shot)
         throw InputError(std::string(option) +
                          " draws through pinholes only; take --lens undistort for images of another lens");

@@ -373,7 +373,8 @@ TEST_P(RayChainThroughALens, LargeSplatsAreEverywhereThatTheyShow) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, RayChainThroughALens, testing::Values(Integrator::ray, Integrator::fast_ray, Integrator::march),
+INSTANTIATE_TEST_SUITE_P(All, RayChainThroughALens,
+                         testing::Values(Integrator::ray, Integrator::fast_ray, Integrator::march),
                          [](const auto& each) {
                              return each.param == Integrator::ray     ? "ray"
                                     : each.param == Integrator::march ? "march"
