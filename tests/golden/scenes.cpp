@@ -245,6 +245,11 @@ GoldenScene through_lens(const std::string& name, const Distortion& lens, double
     return s;
 }
 
+GoldenScene along_rays(Integrator integrator, GoldenScene scene) {
+    scene.options.integrator = integrator;
+    return scene;
+}
+
 /// The points of the scene that comes with ewa, as training starts from them.
 GoldenScene still_life() {
     const Dataset dataset = load_dataset(source_folder() / "scenes/still_life", {.downscale = 4});
@@ -310,6 +315,11 @@ std::vector<GoldenScene> golden_scenes() {
         through_lens("native_fisheye_220", {.k1 = 0.02, .k2 = -0.01, .lens = Lens::fisheye}, 220),
         through_lens("native_360", {.lens = Lens::equirectangular}, 0),
         through_lens("native_orthographic", {.lens = Lens::orthographic}, 0),
+        along_rays(Integrator::ray, through_lens("ray_brown", {.k1 = -0.1, .k2 = 0.02, .p1 = 0.02}, 0)),
+        along_rays(Integrator::ray,
+                   through_lens("ray_fisheye_220", {.k1 = 0.02, .lens = Lens::fisheye}, 220)),
+        along_rays(Integrator::fast_ray, through_lens("fast_ray_360", {.lens = Lens::equirectangular}, 0)),
+        along_rays(Integrator::march, through_lens("march_360", {.lens = Lens::equirectangular}, 0)),
         rolling_shutter(),
     };
     for (GoldenScene& scene : scenes)
