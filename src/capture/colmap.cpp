@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cameras by COLMAP: features, matches, then a model. Each program's output is in log.txt, and gives the progress.
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <regex>
 
+#include "capture/panoramas.h"
 #include "capture/steps.h"
 #include "core/atomic_file.h"
 #include "core/file_reader.h"
@@ -17,7 +19,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kLeastBlock = 4;  // photos
+constexpr int kLeastBlock = 4;                 // photos
+constexpr const char* kMostFeatures = "3000";  // of a view; a 360° photo has six
+constexpr int kRounds = 2;                     // of a rig's bundle adjustment, each with new points
+constexpr std::array kKnownLens{"--Mapper.ba_refine_focal_length", "0", "--Mapper.ba_refine_extra_params",
+                                "0"};
 constexpr const char* kOverlap =
     "photos need two thirds of their content in common with a neighbour, from another place";
 
@@ -84,8 +90,38 @@ std::string argument(const fs::path& path) {
     return fs::absolute(path).string();
 }
 
-/// A run for each lens: the option that lets photos share a camera holds for a whole run.
-void extract_features(const Colmap& colmap, const Photos& photos, const fs::path& work) {
+const char* units(const PanoramaViews* views) {
+    return views ? "views" : "photos";
+}
+
+/// The options of COLMAP for a group of photos.
+struct LensWords {
+    std::vector<fs::path> photos;
+    std::vector<std::string> words;
+};
+
+std::vector<LensWords> lens_words(const Photos& photos, const PanoramaViews* views) {
+    std::vector<LensWords> all;
+    if (views)
+        for (const auto& [width_and_k, names] : views->cameras) {
+            const std::string half = std::to_string(0.5 * width_and_k.first);
+            all.push_back({names,
+                           {"--ImageReader.single_camera", "1", "--ImageReader.camera_model", "PINHOLE",
+                            "--ImageReader.camera_params", half + "," + half + "," + half + "," + half,
+                            "--SiftExtraction.max_num_features", kMostFeatures}});
+        }
+    else
+        for (LensGroup& group : lenses_of(photos.folder, photos.names))
+            all.push_back({std::move(group.photos),
+                           {"--ImageReader.single_camera", group.shared ? "1" : "0",
+                            "--ImageReader.camera_model", group.tangential ? "OPENCV" : "SIMPLE_RADIAL"}});
+    return all;
+}
+
+/// A run for each lens: the option that lets photos share a camera holds for a whole run. views: those that the photos are; null:
+/// they are none.
+void extract_features(const Colmap& colmap, const Photos& photos, const PanoramaViews* views,
+                      const fs::path& work) {
     if (core::is_file(work / "features.done")) return;
     // COLMAP 3.13 has moved the option.
     const std::string gpu = colmap.has_option("feature_extractor", "FeatureExtraction.use_gpu")
@@ -93,15 +129,17 @@ void extract_features(const Colmap& colmap, const Photos& photos, const fs::path
                                 : "--SiftExtraction.use_gpu";
     static const std::regex pattern(R"(Processed file \[(\d+)/(\d+)\])");
     int before = 0;
-    for (const LensGroup& group : lenses_of(photos.folder, photos.names)) {
+    for (const LensWords& group : lens_words(photos, views)) {
         std::string list;
         for (const fs::path& name : group.photos) list += name.string() + "\n";
         core::write_text_file(work / "photos.txt", list);
-        colmap.run({"colmap", "feature_extractor", "--database_path", argument(work / "database.db"),
-                    "--image_path", argument(photos.folder), "--image_list_path",
-                    argument(work / "photos.txt"), "--ImageReader.single_camera", group.shared ? "1" : "0",
-                    "--ImageReader.camera_model", group.tangential ? "OPENCV" : "SIMPLE_RADIAL", gpu, "0"},
-                   {CapturePhase::features, "searched", "photos", before, int(photos.names.size()), {}},
+        std::vector<std::string> words{
+            "colmap",       "feature_extractor",     "--database_path",   argument(work / "database.db"),
+            "--image_path", argument(photos.folder), "--image_list_path", argument(work / "photos.txt")};
+        words.insert(words.end(), group.words.begin(), group.words.end());
+        words.insert(words.end(), {gpu, "0"});
+        colmap.run(std::move(words),
+                   {CapturePhase::features, "searched", units(views), before, int(photos.names.size()), {}},
                    [before](const std::string& line) -> std::optional<int> {
                        const auto numbers = numbers_in(line, pattern);
                        return numbers ? std::optional(before + numbers->first) : std::nullopt;
@@ -127,13 +165,36 @@ std::vector<int> pairs_after_steps(int count, int block) {
     return pairs;
 }
 
+std::string matching_gpu(const Colmap& colmap, const std::string& command) {
+    return colmap.has_option(command, "FeatureMatching.use_gpu") ? "--FeatureMatching.use_gpu"
+                                                                 : "--SiftMatching.use_gpu";
+}
+
+/// A run for each photo shows the progress.
+void match_views(const Colmap& colmap, const Photos& panoramas, const fs::path& work) {
+    const fs::path done = work / "matches.done", list = work / "pairs.txt";
+    if (core::is_file(done)) return;
+    const std::string gpu = matching_gpu(colmap, "matches_importer");
+    const std::vector<std::string> pairs = view_pairs(panoramas);
+    const auto lines = [](const std::string& text) { return int(std::ranges::count(text, '\n')); };
+    int before = 0, total = 0;
+    for (const std::string& text : pairs) total += lines(text);
+    for (const std::string& text : pairs) {
+        core::write_text_file(list, text);
+        colmap.run({"colmap", "matches_importer", "--database_path", argument(work / "database.db"),
+                    "--match_list_path", argument(list), "--match_type", "pairs", gpu, "0"},
+                   {CapturePhase::matches, "matched", "pairs", before, total, {}},
+                   [](const std::string&) { return std::nullopt; });
+        before += lines(text);
+    }
+    mark(done);
+}
+
 void match(const Colmap& colmap, const Photos& photos, const fs::path& work) {
     const fs::path done = work / "matches.done";
     if (core::is_file(done)) return;
     const std::string command = photos.in_sequence ? "sequential_matcher" : "exhaustive_matcher";
-    const std::string gpu = colmap.has_option(command, "FeatureMatching.use_gpu")
-                                ? "--FeatureMatching.use_gpu"
-                                : "--SiftMatching.use_gpu";
+    const std::string gpu = matching_gpu(colmap, command);
     std::vector<std::string> words{"colmap", command, "--database_path", argument(work / "database.db"),
                                    gpu,      "0"};
     const int count = int(photos.names.size());
@@ -187,7 +248,9 @@ std::vector<Model> models_in(const fs::path& folder) {
     return models;
 }
 
-std::vector<Model> map(const Colmap& colmap, const Photos& photos, const fs::path& work) {
+/// views: the photos are such, whose lens is known.
+std::vector<Model> map(const Colmap& colmap, const Photos& photos, const PanoramaViews* views,
+                       const fs::path& work) {
     const fs::path folder = work / "models";
     fs::remove_all(folder);
     core::make_folder(folder);
@@ -202,8 +265,10 @@ std::vector<Model> map(const Colmap& colmap, const Photos& photos, const fs::pat
                                    argument(folder)};
     // By default COLMAP throws models of fewer than 10 images away.
     if (!glomap) words.insert(words.end(), {"--Mapper.min_model_size", "3"});
+    if (!glomap && views) words.insert(words.end(), kKnownLens.begin(), kKnownLens.end());
     static const std::regex pattern(R"(Registering image #\d+ \((\d+)\)|num_reg_frames=(\d+))");
-    colmap.run(std::move(words), {CapturePhase::cameras, "placed", "photos", 0, int(photos.names.size()), {}},
+    colmap.run(std::move(words),
+               {CapturePhase::cameras, "placed", units(views), 0, int(photos.names.size()), {}},
                [](const std::string& line) -> std::optional<int> {
                    const auto numbers = numbers_in(line, pattern);
                    return numbers ? std::optional(std::max(numbers->first, numbers->second)) : std::nullopt;
@@ -220,6 +285,65 @@ std::string sizes_text(const std::vector<Model>& models) {
     return text;
 }
 
+/// Moves the views of each photo together. `model`: a folder for the model of all views; its points are new. Returns the poses.
+RigPoses adjust_rig(const Colmap& colmap, const PanoramaViews& views, RigPoses poses, const fs::path& work,
+                    const fs::path& model) {
+    const fs::path start = work / "rig", rig = work / "rig.json", points = work / "rig_points";
+    const bool adjusts = colmap.has_option("rig_bundle_adjuster", "rig_config_path");
+    for (int round = 0; round < kRounds; ++round) {
+        write_rig(poses.photos, views, start, rig);
+        for (const fs::path& folder : {points, model}) {
+            fs::remove_all(folder);
+            core::make_folder(folder);
+        }
+        const CaptureProgress now{CapturePhase::cameras, "adjusted", "rounds", round, kRounds, {}};
+        const auto nothing = [](const std::string&) { return std::nullopt; };
+        std::vector<std::string> words{"colmap",          "point_triangulator",
+                                       "--database_path", argument(work / "database.db"),
+                                       "--image_path",    argument(views.photos.folder),
+                                       "--input_path",    argument(start),
+                                       "--output_path",   argument(adjusts ? points : model),
+                                       "--clear_points",  "1"};
+        words.insert(words.end(), kKnownLens.begin(), kKnownLens.end());
+        colmap.run(std::move(words), now, nothing);
+        if (!adjusts) break;
+        colmap.run(
+            {"colmap", "rig_bundle_adjuster", "--input_path", argument(points), "--output_path",
+             argument(model), "--rig_config_path", argument(rig), "--estimate_rig_relative_poses", "0",
+             "--RigBundleAdjustment.refine_relative_poses", "0", "--BundleAdjustment.refine_focal_length",
+             "0", "--BundleAdjustment.refine_extra_params", "0"},
+            now, nothing);
+        poses.photos = rig_poses(model).photos;
+    }
+    return poses;
+}
+
+void copy_model(const fs::path& from, const fs::path& to) {
+    for (const char* file : {"cameras.bin", "images.bin", "points3D.bin"})
+        fs::copy_file(from / file, to / file);
+}
+
+/// The model of the photos, from that of their views. Returns remarks.
+std::vector<std::string> model_of_panoramas(const Colmap& colmap, const Photos& photos,
+                                            const PanoramaViews& views, const fs::path& views_model,
+                                            const fs::path& work, const fs::path& model) {
+    RigPoses poses = rig_poses(views_model);
+    std::vector<std::string> remarks{"the photos show all directions: COLMAP has placed " +
+                                     std::to_string(poses.views) + " of their " +
+                                     std::to_string(views.photos.names.size()) + " views"};
+    if (poses.photos.size() < 2)
+        throw InputError("COLMAP has placed the views of the 360° photos inconsistently; " +
+                         std::string(kOverlap) + " (" + colmap.log_name() + ")");
+    if (poses.dropped > 0)
+        remarks.push_back(std::to_string(poses.dropped) +
+                          (poses.dropped == 1 ? " view disagrees" : " views disagree") +
+                          " with others of the same photo");
+    const fs::path adjusted = work / "rig_model";
+    poses = adjust_rig(colmap, views, std::move(poses), work, adjusted);
+    join_views(poses.photos, adjusted, photos, model);
+    return remarks;
+}
+
 }  // namespace
 
 void require_colmap() {
@@ -228,33 +352,49 @@ void require_colmap() {
             "photos without cameras need COLMAP, which is not installed (Debian: apt install colmap)");
 }
 
-std::vector<std::string> place_photos(const Photos& photos, const fs::path& work, const fs::path& model,
+std::vector<std::string> place_photos(const Photos& given, const fs::path& work, const fs::path& model,
                                       const ProgressFunction& progress) {
     const Colmap colmap(work, progress);
-    extract_features(colmap, photos, work);
-    match(colmap, photos, work);
+    const fs::path views_folder = work / "views";
+    // A search that has begun continues with the same images.
+    std::optional<PanoramaViews> cut;
+    if (core::is_folder(views_folder) ||
+        (!core::is_file(work / "database.db") && are_panoramas(given.folder, given.names)))
+        cut = views_of_panoramas(given, views_folder, progress);
+    const PanoramaViews* views = cut ? &*cut : nullptr;
+    const Photos& photos = views ? views->photos : given;
+    extract_features(colmap, photos, views, work);
+    if (views)
+        match_views(colmap, given, work);
+    else
+        match(colmap, photos, work);
     std::vector<Model> models;
     try {
-        models = map(colmap, photos, work);
+        models = map(colmap, photos, views, work);
     } catch (const RunError&) {
         // COLMAP's mapper fails, too, where it finds no pair of images to begin with.
         if (!core::is_folder(work / "models") || !models_in(work / "models").empty()) throw;
     }
     if (models.empty() || models.front().images < 2)
-        throw InputError("COLMAP could not place the " + std::to_string(photos.names.size()) +
+        throw InputError("COLMAP could not place the " + std::to_string(given.names.size()) +
                          " photos: too few of their details match; " + kOverlap + " (" + colmap.log_name() +
                          ")");
     std::vector<std::string> remarks;
     if (models.size() > 1 && models.front().images < photos.names.size())
-        remarks.push_back("the photos fall into " + std::to_string(models.size()) + " separate models of " +
-                          sizes_text(models) +
-                          " photos. The largest is used. Photos between them would join them");
+        remarks.push_back(std::string("the ") + units(views) + " fall into " + std::to_string(models.size()) +
+                          " separate models of " + sizes_text(models) + " " + units(views) +
+                          ". The largest is used. Photos between them would join them");
     fs::path partial = model;
     partial += ".partial";
     fs::remove_all(partial);
     core::make_folder(partial);
-    for (const char* file : {"cameras.bin", "images.bin", "points3D.bin"})
-        fs::copy_file(models.front().folder / file, partial / file);
+    if (views) {
+        const std::vector<std::string> more =
+            model_of_panoramas(colmap, given, *views, models.front().folder, work, partial);
+        remarks.insert(remarks.end(), more.begin(), more.end());
+    } else {
+        copy_model(models.front().folder, partial);
+    }
     fs::rename(partial, model);
     return remarks;
 }

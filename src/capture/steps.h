@@ -126,7 +126,8 @@ struct Photos {
 };
 
 /// Runs COLMAP in `work` and leaves its largest model in `model` (cameras.bin, images.bin, points3D.bin). Throws
-/// InputError if nothing can be placed, RunError, Stopped. Returns remarks.
+/// InputError if nothing can be placed, RunError, Stopped. Returns remarks. COLMAP gets views of
+/// 360° photos, and the model is that of the photos.
 std::vector<std::string> place_photos(const Photos& photos, const std::filesystem::path& work,
                                       const std::filesystem::path& model, const ProgressFunction& progress);
 

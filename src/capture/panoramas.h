@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// Photos of all directions (360°, equirectangular). COLMAP knows no such lens, so it gets pinhole views of each photo. They have
+// one place, and turn against each other by known angles: a rig.
+#pragma once
+#include <filesystem>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "capture/steps.h"
+#include "ewa/image.h"
+
+namespace ewa::capture {
+
+constexpr int kPanoramaViews = 6;  // pinholes that look at the horizon, 90 degrees wide
+
+/// Whether all photos are twice as wide as high, and are 360° photos: their XMP says so, or their left borders continue in the
+/// right ones. Throws InputError where a photo cannot be read.
+bool are_panoramas(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& names);
+
+/// Photo axes to the axes of view k. The views look from the middle of the photo to the right, in equal steps.
+glm::dmat3 view_rotation(int k);
+
+/// View k of a photo: a pinhole with the photo's pixels per degree in its middle.
+Image panorama_view(const Image& photo, int k);
+
+/// The name of view k of a photo, which has no white space, and back. Empty for another name.
+std::filesystem::path view_name(int k, const std::filesystem::path& photo);
+std::pair<int, std::string> photo_of_view(const std::string& view);
+
+/// The views of panoramas, which COLMAP gets in their place. One camera is one view of the photos of one width.
+struct PanoramaViews {
+    Photos photos;
+    std::map<std::pair<int, int>, std::vector<std::filesystem::path>>
+        cameras;  // by width of the views, px, and k
+};
+
+/// Writes the pinhole views of all photos into the folder. Those that are there stay. Throws RunError, Stopped.
+PanoramaViews views_of_panoramas(const Photos& photos, const std::filesystem::path& folder,
+                                 const ProgressFunction& progress);
+
+/// The pairs of views to compare, a text for each photo: of two photos each, since those of one photo have no baseline.
+std::vector<std::string> view_pairs(const Photos& photos);
+
+/// The place and the direction of a photo.
+struct Pose {
+    glm::dquat rotation{1, 0, 0, 0};  // world to camera
+    glm::dvec3 center{0};
+};
+
+/// The pose that most of the poses agree with: turned by at most a degree or so, and centres near its own. scale: a length of the
+/// model. Returns the number of those that agree.
+int agreed(const std::vector<Pose>& poses, double scale, Pose& pose);
+
+/// The photos' poses that follow from a model of their views. A photo whose views all disagree has none.
+struct RigPoses {
+    std::map<std::string, Pose> photos;  // by name
+    int views = 0, dropped = 0;          // placed ones, and those that disagree with others of their photo
+};
+RigPoses rig_poses(const std::filesystem::path& model);
+
+/// Writes a model (.txt) of all views of the placed photos, without points, and the rig's description for COLMAP.
+void write_rig(const std::map<std::string, Pose>& poses, const PanoramaViews& views,
+               const std::filesystem::path& model, const std::filesystem::path& rig);
+
+/// Writes the model of the photos, with EQUIRECTANGULAR cameras, and with the points of the views' model.
+void join_views(const std::map<std::string, Pose>& poses, const std::filesystem::path& views_model,
+                const Photos& photos, const std::filesystem::path& model);
+
+}  // namespace ewa::capture
