@@ -44,8 +44,10 @@ struct Frame {
     Camera camera;          // of load_frame_image's result: a pinhole, or with LensUse::native the lens
     Camera source;          // the camera of the file's pixels, before undistortion and downscaling
     bool reduced = false;   // DatasetOptions::max_width has made `source` smaller than the file
-    std::filesystem::path mask_path;  // empty: none
-    MaskUse masks = MaskUse::cut;     // the use of the file's alpha and mask; never automatic
+    std::filesystem::path mask_path;   // empty: none
+    MaskUse masks = MaskUse::cut;      // the use of the file's alpha and mask; never automatic
+    std::filesystem::path depth_path;  // a depth map of the file, .exr in world units or .png; empty: none
+    double depth_unit = 0.001;         // world units of a level of a .png
     /// A further mask of `camera`'s image, of one channel and any size. Black pixels do not count and grey ones count
     /// less, whatever `masks` says. Null: none.
     std::shared_ptr<const Image> left_out;

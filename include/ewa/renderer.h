@@ -69,9 +69,9 @@ class Renderer {
 
 struct LossGradient {
     double loss = 0, l1 = 0;
-    double l2 = 0, ssim = 0, alpha = 0;  // 0 if their weight is 0
-    LossWeights weights;                 // that apply to this view: that of alpha is not automatic
-    Gaussians gradient;                  // dL/d(stored value) in place of each stored value
+    double l2 = 0, ssim = 0, alpha = 0, depth = 0;  // 0 if their weight is 0
+    LossWeights weights;                            // that apply to this view: that of alpha is not automatic
+    Gaussians gradient;                             // dL/d(stored value) in place of each stored value
     /// dL/d(each value of the camera's motion), for no motion. Zero with `points`, ray and march. By log_focal, the bounds of the
     /// Jacobian's tangents move with a pinhole, and stay with another lens; it is zero where the camera moves during its readout.
     CameraMotion camera;
@@ -79,10 +79,12 @@ struct LossGradient {
 };
 
 /// The training loss of one view and its gradient. target: RGB, or RGBA that is composited over the
-/// background or, with alpha_is_weight, in which alpha says how much a pixel counts; of the camera's size.
+/// background or, with alpha_is_weight, in which alpha says how much a pixel counts; of the camera's size. depths: its
+/// depth map of one channel, for that term of the loss; 0 where it has no depth. Empty: none.
 LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
                            const Camera& camera, const Image& target, const RenderOptions& options,
-                           bool alpha_is_weight = false, const LossWeights& weights = {});
+                           bool alpha_is_weight = false, const LossWeights& weights = {},
+                           const Image& depths = {});
 
 /// What a Renderer of this scene skips, in colour images with these options.
 std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options);

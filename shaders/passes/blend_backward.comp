@@ -87,9 +87,9 @@ void main() {
                     bool blended;
                     const float before = T[p];
                     const float weight = composite(alpha, T[p], blended);
-                    const float shade = dot(s.color, gradient[p]);
-                    float own = weight * shade;
-                    if (WITH_FOURTH) own += weight * s.z * fourth[p];
+                    float shade = dot(s.color, gradient[p]);
+                    if (WITH_FOURTH) shade += s.z * fourth[p];
+                    const float own = weight * shade;
                     rest[p] -= own;
                     // dL/d(power), which is zero where alpha is clamped: alpha dL/d(alpha), or depth (1 - alpha) dL/d(alpha).
                     float g = 0.0;

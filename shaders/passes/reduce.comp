@@ -29,4 +29,5 @@ void main() {
     if (push.target == REDUCE_TO_L1 && row == 2u) counts.l2 = sum;
     if (push.target == REDUCE_TO_SSIM) counts.ssim = sum;
     if (push.target == REDUCE_TO_ALPHA) counts.alpha = sum;
+    if (push.target == REDUCE_TO_DEPTH) counts.depth = sum;
 }

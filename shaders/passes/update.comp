@@ -21,7 +21,8 @@
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
-const bool GRADIENT_ONLY = (MODE & UPDATE_GRADIENT_ONLY) != 0u, MOTION = (MODE & UPDATE_MOTION) != 0u;
+const bool GRADIENT_ONLY = (MODE & UPDATE_GRADIENT_ONLY) != 0u, MOTION = (MODE & UPDATE_MOTION) != 0u,
+           BY_DEPTH_PLANE = (MODE & UPDATE_DEPTH) != 0u;
 
 TEXELS(0, params);
 TEXELS(2, records);
@@ -98,7 +99,7 @@ MotionGradients update_splat(uint i) {
     const vec4 p0 = fetch(params, index_of(0, i)), p1 = fetch(params, index_of(1, i)),
                p2 = fetch(params, index_of(2, i));
     vec4 sum[SLOT_TEXELS];
-    sum_slots(visible ? first_instances[i] : 0u, count, ABSOLUTE, sum);
+    sum_slots(visible ? first_instances[i] : 0u, count, ABSOLUTE || BY_DEPTH_PLANE, sum);
     Sums s = Sums(sum[0].x, sum[0].yz, vec3(sum[0].w, sum[1].xy), vec3(sum[1].zw, sum[2].x), sum[2].yz);
     const StoredSplat splat = StoredSplat(p0.xyz, p0.w, p1, p2.xyz);
     const StoredProjection stored = project_splat(splat);
@@ -113,7 +114,12 @@ MotionGradients update_splat(uint i) {
     const float red_gradient = move_sh(i, color_gradient, direction, direction_gradient);
 
     const FootprintGradient f = footprint_gradient(s, p);
-    const SplatGradient g = splat_gradient(f, stored, splat, s.g, direction, direction_gradient);
+    SplatGradient g = splat_gradient(f, stored, splat, s.g, direction, direction_gradient);
+    if (BY_DEPTH_PLANE) {
+        const vec3 by_depth = vec3(0.0, 0.0, sum[2].w);
+        g.view += by_depth;
+        g.mean += transpose(camera_rotation()) * by_depth;
+    }
     const float depth = visible ? depth_of_splat(p) : 3.4e38;
 
     const vec4 zero = vec4(0.0);

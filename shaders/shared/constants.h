@@ -85,6 +85,8 @@ EWA_REAL(SSIM_C1, 0.01 * 0.01);
 EWA_REAL(SSIM_C2, 0.03 * 0.03);
 // SSIM clamps values to this, and squares of larger differences grow linearly: digits are left for SSIM_C2.
 EWA_REAL(SSIM_LIMIT, 16.0);
+// Pixels of a lower opacity have no mean depth that could be compared with a depth map.
+EWA_REAL(DEPTH_OPACITY_MIN, 0.1);
 EWA_REAL(SSIM_SIGMA, 1.5);  // standard deviation of the window (px)
 EWA_UINT(SSIM_RADIUS, 5u);  // window of 2 * SSIM_RADIUS + 1 taps, zero padded
 

@@ -150,6 +150,8 @@ EWA_UINT(UPDATE_ABSOLUTE, 8u);
 EWA_UINT(UPDATE_PACKED_MOMENTS, 16u);  // moments1 holds both moments in 16 bits each
 EWA_UINT(UPDATE_MOTION, 32u);          // also writes sums of the gradient by the camera's motion
 EWA_UINT(UPDATE_BANDS, 64u);  // of update_views.comp alone: a view has several lists, one of each band
+EWA_UINT(UPDATE_DEPTH,
+         128u);  // of update.comp alone: the slots have the gradient by the depth as a fourth channel
 // project_views.comp, project_views_backward.comp, bits; SHAPE_WHITENERS too
 EWA_UINT(VIEWS_COVARIANCES, 1u);  // shapes are covariances, not quaternions and scales
 EWA_UINT(VIEWS_OPACITIES, 2u);    // the radii depend on the opacities
@@ -177,6 +179,7 @@ EWA_UINT(REDUCE_TO_SUMS, 0u);   // sums[block]
 EWA_UINT(REDUCE_TO_L1, 1u);     // Counts.l1, of further rows Counts.squared and Counts.l2
 EWA_UINT(REDUCE_TO_SSIM, 2u);   // Counts.ssim
 EWA_UINT(REDUCE_TO_ALPHA, 3u);  // Counts.alpha
+EWA_UINT(REDUCE_TO_DEPTH, 4u);  // Counts.depth
 
 // ---- Loss: what one invocation owns ----
 // A pass down the columns: one texel (4 pixels) of LOSS_ROWS rows. A pass along the rows: LOSS_TEXELS texels
@@ -308,6 +311,7 @@ struct Counts {
     uint unfinished;         // strips of tiles with more splats than rays can walk
     float l2;                // mean (x - y)^2, with LOSS_SQUARES
     float alpha;             // mean |1 - T - alpha of the training image|
+    float depth;             // mean |ln(depth / depth of the training image)|
     // Not cleared by a frame that may begin before the host has read the counts of the one before. Once a frame
     // has too many instances, this is 1, later frames report 2^32 - 1 instances, and no pass changes the model.
     uint overflowed;
@@ -509,6 +513,11 @@ struct AlphaPush {
     uint first_pixel;  // of the photo: the image's first
     uint own[2];       // first and one-past-last of the rows that the loss counts
     float scale;       // d(loss)/d|difference of the alphas| of one pixel
+};
+
+struct DepthPush {
+    ImageLayout image;
+    float scale;  // d(loss)/d|difference of the logarithms| of one pixel
 };
 
 struct ReducePush {

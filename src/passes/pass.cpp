@@ -11,7 +11,7 @@ namespace ewa::shared {
 // The scalar block layout packs these structs without padding, and so does C++.
 static_assert(sizeof(CameraBlock) == 4 * (9 + 9 + 3 + 3 + 8 + 4 + 4 + 24 + 2 + 9));
 static_assert(offsetof(CameraBlock, size) == 4 * (9 + 9 + 3 + 3 + 8 + 4));
-static_assert(sizeof(Counts) == 52 && offsetof(Counts, l1) == 16);
+static_assert(sizeof(Counts) == 56 && offsetof(Counts, l1) == 16);
 static_assert(sizeof(ProjectPush) == 12 && sizeof(SortPush) == 16 && sizeof(ScanPush) == 8);
 static_assert(sizeof(ViewBlock) == 184 && sizeof(ViewsPush) == 32 && sizeof(HarmonicsPush) == 16);
 static_assert(sizeof(ScanTotalsPush) == 12 && sizeof(EmitPush) == 32 && sizeof(TileStartsPush) == 8);
@@ -19,7 +19,7 @@ static_assert(sizeof(BlendPush) == 48 && offsetof(BlendPush, capacity) == 44);
 static_assert(sizeof(RayPush) == 56);
 static_assert(sizeof(CollectPush) == 20 && sizeof(GatherPush) == 12);
 static_assert(sizeof(UnpackPush) == 32 && sizeof(MaskPush) == 20 && sizeof(LossPush) == 36 &&
-              sizeof(AlphaPush) == 32 && sizeof(ReducePush) == 20);
+              sizeof(AlphaPush) == 32 && sizeof(DepthPush) == 20 && sizeof(ReducePush) == 20);
 static_assert(sizeof(ImageLayout) == 16 && sizeof(PackPush) == 4 && sizeof(ExposurePush) == 20 &&
               sizeof(ExposureUpdatePush) == 28);
 static_assert(sizeof(PpispPush) == 24 && sizeof(PpispUpdatePush) == 36 && sizeof(PpispCameraPush) == 24 &&

@@ -400,6 +400,14 @@ struct AlphaLoss {
     gpu::BufferPart photo, planes, image_gradient, partials;
 };
 
+/// Gradient of the loss by the sums of depths and by the transmittance, from a training image's depth map, and partial sums of
+/// the differences. It adds to dL/dT.
+struct DepthLoss {
+    static constexpr char shader[] = "depth_loss";
+    using Work = PerElement<loss_row_items<shared::DepthPush>>;
+    gpu::BufferPart planes, depths, image_gradient, partials;
+};
+
 /// Adds the floats of each row in a fixed order.
 struct Reduce {
     static constexpr char shader[] = "reduce";

@@ -43,6 +43,7 @@ uint32_t update_mode(const Plan& plan) {
     if (plan.absolute) mode |= shared::UPDATE_ABSOLUTE;
     if (plan.packed_moments) mode |= shared::UPDATE_PACKED_MOMENTS;
     if (plan.motion) mode |= shared::UPDATE_MOTION;
+    if (plan.loss.depth > 0) mode |= shared::UPDATE_DEPTH;
     return mode;
 }
 
@@ -87,13 +88,14 @@ void Exposures::set(uint32_t photo, std::span<const uint64_t> words) {
 }
 
 LossTerms terms_of(const shared::Counts& counts) {
-    return {counts.l1, counts.l2, counts.ssim, counts.alpha};
+    return {counts.l1, counts.l2, counts.ssim, counts.alpha, counts.depth};
 }
 
 double loss_of(const LossWeights& weights, const LossTerms& terms) {
     double loss = weights.l1 * terms.l1 + weights.ssim * (1 - terms.ssim);
     if (weights.l2 > 0) loss += weights.l2 * terms.l2;
     if (weights.alpha > 0) loss += weights.alpha * terms.alpha;
+    if (weights.depth > 0) loss += weights.depth * terms.depth;
     return loss;
 }
 
@@ -176,8 +178,24 @@ void FramePasses::compare_alpha(const gpu::Buffer& photo, bool cut, const shared
     mean_of_partials(shared::REDUCE_TO_ALPHA, frame.sizes.partials / 3, 1, float(share));
 }
 
+/// The depth map of a photo as a term of the loss, and the gradient by the planes of depth and transmittance.
+void FramePasses::compare_depth(const gpu::Buffer* depths) const {
+    const shared::ImageLayout image = frame.sizes.image();
+    const uint64_t plane = uint64_t(image.plane_floats) * 4;
+    if (plan.loss.alpha == 0) recording.fill(frame.image_gradient, 0, shared::PLANE_T * plane, plane);
+    if (!depths) return recording.fill(frame.image_gradient, 0, shared::PLANE_DEPTH * plane, plane);
+    const double share = 1.0 / (double(image.size[0]) * image.size[1]);
+    record(passes::DepthLoss{.planes = frame.planes,
+                             .depths = *depths,
+                             .image_gradient = frame.image_gradient,
+                             .partials = frame.partials},
+           {.image = image, .scale = float(plan.loss.depth * share)});
+    // The partial sums of one channel.
+    mean_of_partials(shared::REDUCE_TO_DEPTH, frame.sizes.partials / 3, 1, float(share));
+}
+
 void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse* exposure,
-                       const AppearanceUse* appearance, bool cut) const {
+                       const AppearanceUse* appearance, bool cut, const gpu::Buffer* depths) const {
     const shared::ImageLayout layout = frame.sizes.image();
     const Band whole{.rows = layout.size[1], .own_end = layout.size[1]};
     const Band& band = inputs.band.rows > 0 ? inputs.band : whole;
@@ -216,6 +234,7 @@ void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse*
         record(passes::MaskGradient{.photo = photo, .image_gradient = frame.image_gradient}, mask, colors);
     mean_of_partials(shared::REDUCE_TO_L1, frame.sizes.partials, plan.loss.l2 > 0 ? 3 : 2, float(share));
     if (plan.loss.alpha > 0) compare_alpha(photo, cut, mask, push);
+    if (plan.loss.depth > 0) compare_depth(depths);
     if (exposure) expose_backward(*exposure);
     if (appearance) appearance_backward(*appearance);
 }
@@ -254,9 +273,11 @@ void FramePasses::fast_rays_backward(const Sorted& sorted) const {
 void FramePasses::blend_backward(const Sorted& sorted) const {
     const passes::BlendBackwardBuffers buffers = blend_buffers(frame, sorted);
     const shared::BlendPush push = blend_push(cache.config(), frame, inputs.background);
+    const bool depth = plan.loss.depth > 0;
     const gpu::SpecConstant mode{shared::SPEC_MODE,
                                  (plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0) |
-                                     (plan.loss.alpha > 0 ? shared::BLEND_BACKWARD_ALPHA : 0)};
+                                     (plan.loss.alpha > 0 || depth ? shared::BLEND_BACKWARD_ALPHA : 0) |
+                                     (depth ? shared::BLEND_BACKWARD_FOURTH : 0)};
     const uint32_t group = march_group(inputs.samples, 8);
     if (plan.integrator == Integrator::ray)
         integrate_backward<passes::BlendRaysBackward>(sorted, {kernel(), lenses()});

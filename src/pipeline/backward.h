@@ -53,7 +53,7 @@ uint32_t update_mode(const Plan& plan);
 
 /// Terms of a loss before they are weighted.
 struct LossTerms {
-    double l1 = 0, l2 = 0, ssim = 0, alpha = 0;
+    double l1 = 0, l2 = 0, ssim = 0, alpha = 0, depth = 0;
 };
 LossTerms terms_of(const shared::Counts& counts);
 double loss_of(const LossWeights& weights, const LossTerms& terms);

@@ -50,8 +50,10 @@ struct FramePasses : passes::Recorder {
     /// exposure, appearance: of the training image, one of them if it is learned. It takes its own step of Adam; `frame`
     /// must be reserved with its model.
     /// cut: the photo is composited, and its alpha is compared with the render's if the loss has that term.
+    /// depths: width * height floats, the photo's depth map, if the loss has that term; 0 where it has no depth.
     void loss(const gpu::Buffer& photo, bool masked = false, const ExposureUse* exposure = nullptr,
-              const AppearanceUse* appearance = nullptr, bool cut = false) const;
+              const AppearanceUse* appearance = nullptr, bool cut = false,
+              const gpu::Buffer* depths = nullptr) const;
 
     /// After the loss: leaves the gradient by the sky in the slot of its view in the step.
     void sky_gradient(const LearnedSky& sky, uint32_t slot) const;
@@ -92,6 +94,7 @@ struct FramePasses : passes::Recorder {
     void compare(const gpu::Buffer& image, const shared::LossPush& push, float share) const;
     void compare_alpha(const gpu::Buffer& photo, bool cut, const shared::MaskPush& at,
                        const shared::LossPush& loss) const;
+    void compare_depth(const gpu::Buffer* depths) const;
     void mean_of_partials(uint32_t target, uint32_t items, uint32_t rows, float scale) const;
     void expose_backward(const ExposureUse& use) const;
     void apply_appearance(const AppearanceUse& use) const;

@@ -171,7 +171,7 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
     // One more than there are tiles: the sentinel tile.
     s.tile_sort = radix_cut(config, request.instances, uint32_t(std::bit_width(s.tiles)));
     s.strip_rows = std::min(s.tiles_y, (config.loop_limit - s.tiles_y) / (s.tiles_x + 2));
-    s.image_planes = request.fifth_plane ? 5 : 4;
+    s.image_planes = request.fifth_plane || request.loss.depth > 0 ? 5 : 4;
 
     const uint64_t word = 4, texel = 16;
     s.records = std::max<uint64_t>(request.splats, 1) * shared::RECORD_TEXELS * texel;
@@ -199,7 +199,11 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
             s.moments = uint64_t(s.plane_floats) * 3 * shared::MOMENT_PLANES * word;
             s.derivatives = uint64_t(s.plane_floats) * 3 * shared::DERIVATIVE_PLANES * word;
         }
-        s.image_gradient = uint64_t(s.plane_floats) * (request.loss.alpha > 0 ? 4 : 3) * word;
+        s.image_gradient = uint64_t(s.plane_floats) *
+                           (request.loss.depth > 0   ? 5
+                            : request.loss.alpha > 0 ? 4
+                                                     : 3) *
+                           word;
         const uint64_t rows = request.loss.l2 > 0 ? 3 : 2;  // see LossBackwardRows
         s.partial_sums = rows * s.partials * word;
         s.reduced = rows * s.reduce_blocks * word;

@@ -73,6 +73,9 @@ Plan plan_for(const PlanRequest& request) {
         plan.loss.alpha = 0;
     else if (plan.loss.alpha == kAutomaticAlphaWeight)
         plan.loss.alpha = kUsualAlphaWeight;
+    // The depth of spheres and along rays has no gradient.
+    if (!request.depths || request.render.points || plan.rays()) plan.loss.depth = 0;
+    if (plan.loss.depth > 0) plan.drawing = Drawing::depth;
     plan.masks = request.masks;
     plan.appearance = request.appearance;
     // Spheres and integration along rays have no gradient by the camera.

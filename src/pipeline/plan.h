@@ -34,6 +34,7 @@ struct PlanRequest {
     LossWeights loss{};
     bool masks = false;                                  // training images in which some pixels count less
     bool alpha = false;                                  // training images whose alpha cuts pixels out
+    bool depths = false;                                 // training images with depth maps
     AppearanceModel appearance = AppearanceModel::none;  // of the training images, which is learned
     bool motion = false;  // the gradient by the camera's motion; in a training it is learned
     bool sky = false;     // in a training: it is learned

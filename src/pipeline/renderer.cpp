@@ -308,12 +308,15 @@ std::vector<PassTime> Renderer::pass_times() const {
 
 LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
                            const Camera& camera, const Image& target, const RenderOptions& options,
-                           bool alpha_is_weight, const LossWeights& weights) {
+                           bool alpha_is_weight, const LossWeights& weights, const Image& depths) {
     if (target.width != camera.width || target.height != camera.height || target.channels < 3)
         throw InputError("the training image is " + std::to_string(target.width) + "x" +
                          std::to_string(target.height) + " with " + std::to_string(target.channels) +
                          " channels, the camera " + std::to_string(camera.width) + "x" +
                          std::to_string(camera.height) + " RGB");
+    if (!depths.pixels.empty() && (depths.width != camera.width || depths.height != camera.height ||
+                                   depths.channels != 1 || !camera.distortion.none() || camera.readout))
+        throw InputError("a depth map has one channel and the size of its camera, which is a pinhole");
     scene::check_lens(options, camera);
     passes::PassCache cache(*device);
     gpu::Executor executor(*device);
@@ -324,10 +327,16 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                                 .loss = weights,
                                 .masks = alpha_is_weight && target.channels == 4,
                                 .alpha = cut,
+                                .depths = !depths.pixels.empty(),
                                 .motion = true});
     const Model model = upload_model(*device, gaussians, plan.moment_buffers(), false);
     const gpu::Buffer block = upload_camera(*device, camera, cache.config(), model.origin);
     const gpu::Buffer photo = upload_photo(*device, target);
+    gpu::Buffer map;
+    if (plan.loss.depth > 0) {
+        map = gpu::Buffer(*device, "depth map", 4 * depths.pixels.size());
+        map.upload(std::span<const float>(depths.pixels));
+    }
     const SkyTexels sky = options.sky ? SkyTexels(*device, *options.sky) : SkyTexels();
     FrameInputs inputs = inputs_of(block, camera, options);
     if (options.sky) inputs.sky = &sky;
@@ -347,7 +356,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
         run_until_it_fits(cache, executor, frame, size, [&](const passes::Recorder& recorder) {
             const FramePasses on{recorder, plan, frame, inputs};
             const Sorted sorted = on.forward(model);
-            on.loss(photo, plan.masks, nullptr, nullptr, cut);
+            on.loss(photo, plan.masks, nullptr, nullptr, cut, map ? &map : nullptr);
             on.backward(model, sorted, {});
         });
     LossGradient result;
@@ -355,6 +364,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
     result.l2 = counts.l2;
     result.ssim = counts.ssim;
     result.alpha = counts.alpha;
+    result.depth = counts.depth;
     result.weights = plan.loss;
     result.loss = loss_of(plan.loss, counts);
     result.gradient = download_model(model, model.moments1);

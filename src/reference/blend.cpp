@@ -164,6 +164,7 @@ Moments& Moments::operator+=(const Moments& other) {
     svv += other.svv;
     color += other.color;
     absolute += other.absolute;
+    z += other.z;
     return *this;
 }
 
@@ -178,12 +179,14 @@ ScreenGradient screen_gradient(const Projected& splat, const Moments& m) {
     out.opacity = m.s0 / splat.opacity;
     out.color = m.color;
     out.absolute = m.absolute;
+    out.z = m.z;
     return out;
 }
 
 BlendGradients blend_backward(std::span<const Projected> projected, const Instances& instances,
                               const Blended& blended, const Raster& image_gradient,
-                              const Smoothing& smoothing, const Raster& transmittance_gradient) {
+                              const Smoothing& smoothing, const Raster& transmittance_gradient,
+                              const Raster& depth_gradient) {
     const int width = instances.grid.image_width, height = instances.grid.image_height;
     assert(image_gradient.width == width && image_gradient.height == height && image_gradient.channels == 3);
     BlendGradients out;
@@ -198,12 +201,16 @@ BlendGradients blend_backward(std::span<const Projected> projected, const Instan
             const double by_left = transmittance_gradient.values.empty()
                                        ? 0
                                        : *transmittance_gradient.at(x, y) * *blended.transmittance.at(x, y);
+            const double by_depth = depth_gradient.values.empty() ? 0 : *depth_gradient.at(x, y);
+            double deeper = *blended.depth_sum.at(x, y);
             walk_pixel(projected, whiteners, instances, x, y, smoothing, [&](const Contribution& c) {
-                const double weight = c.alpha.value * c.transmittance;
+                const double weight = c.alpha.value * c.transmittance, z = projected[c.splat].z;
                 const glm::dvec3& color = projected[c.splat].color;
                 behind -= weight * color;
+                deeper -= weight * z;
                 const double by_alpha =
-                    glm::dot(pixel_gradient, c.transmittance * color - behind / (1 - c.alpha.value)) -
+                    glm::dot(pixel_gradient, c.transmittance * color - behind / (1 - c.alpha.value)) +
+                    by_depth * (c.transmittance * z - deeper / (1 - c.alpha.value)) -
                     by_left / (1 - c.alpha.value);
                 const double g = by_alpha * c.alpha.slope * c.sample.raw;
                 const double u = c.sample.u, v = c.sample.v;
@@ -216,7 +223,8 @@ BlendGradients blend_backward(std::span<const Projected> projected, const Instan
                                               g * u * v,
                                               g * v * v,
                                               weight * pixel_gradient,
-                                              glm::abs(by_mean)};
+                                              glm::abs(by_mean),
+                                              weight * by_depth};
             });
         }
     }

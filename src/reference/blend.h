@@ -207,6 +207,7 @@ struct Moments {
     double s0 = 0, su = 0, sv = 0, suu = 0, suv = 0, svv = 0;  // of g times 1, u, v, uu, uv, vv
     glm::dvec3 color{0};                                       // dL/dcolour
     glm::dvec2 absolute{0};                                    // sum of |dL/dmean2d|, by component
+    double z = 0;                                              // dL/dz
     Moments& operator+=(const Moments& other);
 };
 
@@ -219,10 +220,12 @@ struct BlendGradients {
 
 /// `blended` is blend()'s result for the same arguments, `image_gradient` is dL/d(RGB) of each pixel, and
 /// `transmittance_gradient` is dL/dT. T is behind all splats, as the background is: S has T more, times dL/dT in place of
-/// dL/dC. Without entries it is 0.
+/// dL/dC. Without entries it is 0. `depth_gradient` is dL/d(depth_sum), and depths are one more channel of the colour, without
+/// a background.
 BlendGradients blend_backward(std::span<const Projected> projected, const Instances& instances,
                               const Blended& blended, const Raster& image_gradient,
-                              const Smoothing& smoothing = {}, const Raster& transmittance_gradient = {});
+                              const Smoothing& smoothing = {}, const Raster& transmittance_gradient = {},
+                              const Raster& depth_gradient = {});
 
 /// The largest weight alpha T that each splat has at a pixel; 0 for one that no pixel shows (Niemeyer et al. 2024, RadSplat).
 std::vector<double> largest_weights(std::span<const Projected> projected, const Instances& instances,

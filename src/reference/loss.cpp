@@ -151,6 +151,22 @@ AlphaLoss alpha_loss(const Raster& transmittance, const Raster& alpha) {
     return out;
 }
 
+DepthLoss depth_loss(const Raster& depth_sum, const Raster& transmittance, const Raster& depths) {
+    assert(depths.values.size() == transmittance.values.size() && depths.channels == 1);
+    const double count = double(depths.values.size());
+    DepthLoss out{0, Raster(depths.width, depths.height, 1), Raster(depths.width, depths.height, 1)};
+    for (size_t i = 0; i < depths.values.size(); ++i) {
+        const double opacity = 1 - transmittance.values[i], sum = depth_sum.values[i];
+        if (!(depths.values[i] > 0 && opacity >= DEPTH_OPACITY_MIN)) continue;
+        const double difference = std::log(sum / opacity) - std::log(depths.values[i]);
+        const double slope = double((difference > 0) - (difference < 0)) / count;
+        out.difference += std::abs(difference) / count;
+        out.by_sum.values[i] = slope / sum;
+        out.by_left.values[i] = slope / opacity;
+    }
+    return out;
+}
+
 Raster exposed(const Raster& image, const Exposure& e) {
     Raster out(image.width, image.height, 3);
     for (int y = 0; y < image.height; ++y)

@@ -42,6 +42,13 @@ struct AlphaLoss {
 /// Both of one channel and one size.
 AlphaLoss alpha_loss(const Raster& transmittance, const Raster& alpha);
 
+struct DepthLoss {
+    double difference = 0;   // mean |ln(depth_sum / (1 - T)) - ln(depth)| over all pixels
+    Raster by_sum, by_left;  // d(difference)/d(depth_sum) and by T, one channel each
+};
+/// All of one channel and one size. Pixels whose depth is 0 or whose opacity 1 - T is below DEPTH_OPACITY_MIN count as 0.
+DepthLoss depth_loss(const Raster& depth_sum, const Raster& transmittance, const Raster& depths);
+
 /// The window's 2 * SSIM_RADIUS + 1 taps along one axis.
 std::vector<double> ssim_window();
 

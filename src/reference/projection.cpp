@@ -374,7 +374,8 @@ Splat project_backward(const Splat& splat, const Camera& camera, const RenderOpt
     const double by_log = projected.density ? gradient.opacity * projected.opacity : 0;
     const glm::dvec3 by_offset = direction_backward(s, by_direction);
     glm::dvec3 by_velocity(0);
-    const glm::dvec3 by_view = view_backward(s, gradient, by_m, by_log, by_offset, by_velocity);
+    glm::dvec3 by_view = view_backward(s, gradient, by_m, by_log, by_offset, by_velocity);
+    by_view.z += gradient.z;
     if (projected.density) shadow_backward(s, by_log, out.log_scale);
     out.mean = glm::transpose(s.camera_rotation) * by_view + by_offset;
     if (by_motion && s.readout.moves) {

@@ -122,6 +122,7 @@ struct ScreenGradient {
     double a = 0, b = 0, c = 0;
     double opacity = 0;
     glm::dvec3 color{0};
+    double z = 0;
     glm::dvec2 absolute{0};  // sum over pixels of |dL/dmean2d|, by component (Ye et al. 2024, AbsGS, eq. 7)
 };
 

@@ -77,8 +77,20 @@ ReferenceGradient loss_gradient(const Values& values, const Camera& camera, cons
         by_left = of_alpha.gradient;
         for (double& value : by_left.values) value *= reference.loss.alpha;
     }
+    Raster by_depth;
+    if (reference.loss.depth > 0) {
+        const Blended& blended = out.rendered.blended;
+        const DepthLoss of_depth = depth_loss(blended.depth_sum, blended.transmittance, reference.depths);
+        out.depth = of_depth.difference;
+        out.loss += reference.loss.depth * of_depth.difference;
+        by_depth = of_depth.by_sum;
+        for (double& value : by_depth.values) value *= reference.loss.depth;
+        if (!cut) by_left = Raster(target.width, target.height, 1);
+        for (size_t i = 0; i < by_left.values.size(); ++i)
+            by_left.values[i] += reference.loss.depth * of_depth.by_left.values[i];
+    }
     out.blend = blend_backward(out.rendered.projected, out.rendered.instances, out.rendered.blended,
-                               loss.gradient, reference.smoothing, by_left);
+                               loss.gradient, reference.smoothing, by_left, by_depth);
     out.gradient = zeros_like(values);
     for (size_t i = 0; i < values.size(); ++i)
         write_splat(

@@ -15,6 +15,7 @@ struct ReferenceOptions {
     int tile_width = 16, tile_height = 16;  // px
     Smoothing smoothing;
     LossWeights loss{};
+    Raster depths{};  // of the training image, with a weight of depth
 };
 
 struct Rendered {
@@ -26,7 +27,7 @@ struct Rendered {
 };
 
 struct ReferenceGradient {
-    double loss = 0, l1 = 0, l2 = 0, ssim = 0, alpha = 0;
+    double loss = 0, l1 = 0, l2 = 0, ssim = 0, alpha = 0, depth = 0;
     Values gradient;               // dL/d(stored value) for each stored value
     CameraMotion camera;           // dL/d(each value of the camera's motion), for no motion
     std::vector<uint8_t> in_view;  // per splat: it had a tile

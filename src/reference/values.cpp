@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "reference/values.h"
 
+#include <algorithm>
 #include <cassert>
 
 namespace ewa::reference {
@@ -68,11 +69,11 @@ void write_splat(Values& values, size_t i, const Splat& splat) {
 }
 
 Raster to_double(const Image& image) {
-    assert(image.channels >= 3);
-    Raster raster(image.width, image.height, 3);
+    assert(image.channels != 2);
+    Raster raster(image.width, image.height, std::min(image.channels, 3));
     for (int y = 0; y < image.height; ++y)
         for (int x = 0; x < image.width; ++x)
-            for (int k = 0; k < 3; ++k) raster.at(x, y)[k] = image.at(x, y)[k];
+            for (int k = 0; k < raster.channels; ++k) raster.at(x, y)[k] = image.at(x, y)[k];
     return raster;
 }
 

@@ -54,7 +54,7 @@ struct Raster {
     const double* at(int x, int y) const { return &values[(size_t(y) * width + x) * channels]; }
 };
 
-/// The RGB of an image with 3 or more channels.
+/// The RGB of an image with 3 or more channels, or its one channel.
 Raster to_double(const Image& image);
 
 }  // namespace ewa::reference

@@ -36,7 +36,7 @@ const std::vector<Stage>& stages() {
         {"loss",
          "compares the render with the training image, and finds how each pixel should change",
          {"unpack_target", "mask_images", "loss_columns", "loss_rows", "reduce", "loss_backward_columns",
-          "loss_backward_rows", "alpha_loss", "mask_gradient"}},
+          "loss_backward_rows", "alpha_loss", "depth_loss", "mask_gradient"}},
         {"blend backward",
          "finds how each splat should change for that",
          {"blend_backward", "blend_points_backward", "blend_rays_backward", "blend_fast_rays_backward"}},

@@ -100,6 +100,10 @@ std::string dataset_fingerprint(const Dataset& dataset, const Split& split) {
             hash.add(int(frame.mask_path.empty()));
             if (frame.image_exists) core::add_file(hash, frame.image_path);
             if (!frame.mask_path.empty()) core::add_file(hash, frame.mask_path);
+            if (!frame.depth_path.empty()) {
+                hash.add(frame.depth_unit);
+                core::add_file(hash, frame.depth_path);
+            }
         }
     }
     return core::digits_of(hash);

@@ -151,7 +151,20 @@ std::optional<std::string> idle_ranks_remark(const TrainOptions& options, int ra
         (ranks + options.batch - 1) / options.batch);
 }
 
+/// Depth maps that the loss does not compare are dropped, and noted.
+void settle_depths(RunInput& input) {
+    if (input.options.train.loss.depth > 0) return;
+    uint64_t maps = 0;
+    for (Frame& frame : input.dataset.frames) {
+        maps += !frame.depth_path.empty();
+        frame.depth_path.clear();
+    }
+    if (maps > 0)
+        input.notes.push_back(core::counted(maps, "depth map") + " not used; --loss depth=2 compares them");
+}
+
 void add_remarks(RunInput& input) {
+    settle_depths(input);
     const Dataset& dataset = input.dataset;
     if (const auto remark = idle_ranks_remark(input.options.train, input.options.ranks->size()))
         input.remarks.push_back(*remark);

@@ -9,6 +9,7 @@ std::vector<core::NamedFile> files_of(const Dataset& dataset, const std::string&
     for (const Frame& frame : dataset.frames) {
         files.push_back({"an image of " + what, frame.image_path});
         files.push_back({"a mask of " + what, frame.mask_path});
+        files.push_back({"a depth map of " + what, frame.depth_path});
     }
     return files;
 }

@@ -274,6 +274,11 @@ Camera undistorted_camera(const Camera& source, const Distortion& distortion) {
     }
 }
 
+glm::dvec2 source_pixel(const Camera& source, const Distortion& distortion, const Camera& camera,
+                        const glm::dvec2& pixel) {
+    return source_pixel(source, distortion, normalized(camera, pixel.x, pixel.y));
+}
+
 Image undistort_image(const Image& image, const Camera& source, const Distortion& distortion,
                       const Camera& camera) {
     Image result(camera.width, camera.height, image.channels);

@@ -52,6 +52,10 @@ Distortion for_longer_focal(Distortion distortion, double factor);
 /// Throws InputError if no such rectangle exists because the model folds over.
 Camera undistorted_camera(const Camera& source, const Distortion& distortion);
 
+/// Where the pixel of `camera`, an undistorted image of `source`, lies in the image of `source`.
+glm::dvec2 source_pixel(const Camera& source, const Distortion& distortion, const Camera& camera,
+                        const glm::dvec2& pixel);
+
 /// The image of `camera`, sampled bilinearly from the image of `source`.
 Image undistort_image(const Image& image, const Camera& source, const Distortion& distortion,
                       const Camera& camera);

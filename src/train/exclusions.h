@@ -37,6 +37,10 @@ inline constexpr std::array kExclusions{
               [](const TrainOptions& options) { return options.refine_poses; },
               {true, true, true, true},
               "a camera learns while the splats of its own step are moved"},
+    Exclusion{"--loss depth",
+              [](const TrainOptions& options) { return options.loss.depth > 0; },
+              {true, true, true, true},
+              "the gradient by the depth of a splat is gathered within the one picture that shows it"},
     Exclusion{"--appearance",
               [](const TrainOptions& options) {
                   const AppearanceModel model = appearance_of(options);
@@ -67,6 +71,18 @@ inline constexpr std::array kPointExclusions{
     core::Exclusion<TrainOptions>{"--points", has_points, core::Relation::excludes, "--refine-poses",
                                   [](const TrainOptions& options) { return options.refine_poses; },
                                   "spheres have no gradient by the camera"}};
+
+inline bool compares_depths(const TrainOptions& options) {
+    return options.loss.depth > 0;
+}
+
+inline constexpr std::array kDepthExclusions{
+    core::Exclusion<TrainOptions>{"--loss depth", compares_depths, core::Relation::excludes, "--points",
+                                  has_points, "the depth of a sphere has no gradient"},
+    core::Exclusion<TrainOptions>{
+        "--loss depth", compares_depths, core::Relation::excludes, "--integrator",
+        [](const TrainOptions& options) { return options.render.integrator != Integrator::splat; },
+        "depths along rays have no gradient"}};
 
 inline bool shoots_rays(const TrainOptions& options) {
     return options.render.integrator != Integrator::splat;

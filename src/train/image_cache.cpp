@@ -11,6 +11,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "pipeline/frame_inputs.h"
+#include "scene/depth_map.h"
 #include "scene/frame_images.h"
 #include "train/schedule.h"
 
@@ -24,32 +25,52 @@ double mean_weight(const Image& image) {
     return sum / (double(image.width) * image.height);
 }
 
+bool has_depths(const Frame& frame, bool depths) {
+    return depths && !frame.depth_path.empty();
+}
+
+LoadedPhoto load_photo(const Frame& frame, bool depths) {
+    LoadedPhoto loaded{load_frame_image(frame), {}};
+    if (!has_depths(frame, depths)) return loaded;
+    loaded.depths = load_depth_map(frame);
+    drop_masked(loaded.depths, loaded.image);
+    return loaded;
+}
+
 /// Loads images on all cores and hands them out in order.
 class ParallelLoader {
   public:
-    explicit ParallelLoader(std::vector<const Frame*> frames) : frames_(std::move(frames)) {
+    ParallelLoader(std::vector<const Frame*> frames, bool depths)
+        : frames_(std::move(frames)), depths_(depths) {
         ahead_ = std::min<size_t>(scene::images_at_once(frames_),
                                   std::max(1u, std::thread::hardware_concurrency()));
     }
 
-    /// Throws what load_frame_image throws for this image.
-    Image next() {
+    /// Throws what load_frame_image and load_depth_map throw for this image.
+    LoadedPhoto next() {
         for (; started_ < frames_.size() && loading_.size() < ahead_; ++started_)
             // Without a policy, an image whose thread cannot start is loaded by get.
-            loading_.push_back(std::async([frame = frames_[started_]] { return load_frame_image(*frame); }));
-        std::future<Image> first = std::move(loading_.front());
+            loading_.push_back(
+                std::async([frame = frames_[started_], this] { return load_photo(*frame, depths_); }));
+        std::future<LoadedPhoto> first = std::move(loading_.front());
         loading_.pop_front();
         return first.get();
     }
 
   private:
     std::vector<const Frame*> frames_;
+    bool depths_;
     size_t started_ = 0;
     size_t ahead_ = 1;
-    std::deque<std::future<Image>> loading_;
+    std::deque<std::future<LoadedPhoto>> loading_;
 };
 
 }  // namespace
+
+uint64_t photo_bytes_of(const Frame& frame, int width, int height, bool depths) {
+    const uint64_t map = has_depths(frame, depths) ? 4 * uint64_t(width) * uint64_t(height) : 0;
+    return pipeline::photo_bytes(width, height, frame.eight_bit) + map;
+}
 
 bool may_be_cut(const Frame& frame) {
     const std::string type = core::lower(frame.image_path.extension().string());
@@ -59,8 +80,8 @@ bool may_be_cut(const Frame& frame) {
 
 ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, const Dataset& dataset,
                        const std::vector<int>& frames, uint64_t cache_bytes, const glm::dvec3& origin,
-                       int reduction)
-    : device_(device), photos_(frames.size()) {
+                       int reduction, bool depths)
+    : device_(device), depths_(depths), photos_(frames.size()) {
     const uint64_t align = std::max<uint64_t>(device.limits().uniform_alignment, 16);
     camera_stride_ = (sizeof(shared::CameraBlock) + align - 1) / align * align;
     std::vector<std::byte> blocks(camera_stride_ * std::max<size_t>(frames.size(), 1));
@@ -75,8 +96,8 @@ ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, 
         }
         const shared::CameraBlock block = pipeline::camera_block(frame.camera, config, origin);
         std::memcpy(&blocks[i * camera_stride_], &block, sizeof(block));
-        const uint64_t bytes =
-            pipeline::photo_bytes(frame.camera.width, frame.camera.height, frame.eight_bit);
+        const uint64_t bytes = photo_bytes_of(frame, frame.camera.width, frame.camera.height, depths);
+        any_depths_ = any_depths_ || has_depths(frame, depths);
         if (cached_bytes + bytes <= cache_bytes) {
             cached_bytes += bytes;
             cached.push_back(i);
@@ -88,7 +109,7 @@ ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, 
     }
     std::vector<const Frame*> to_load;
     for (const size_t i : cached) to_load.push_back(&frames_[i]);
-    ParallelLoader loader(std::move(to_load));
+    ParallelLoader loader(std::move(to_load), depths);
     for (const size_t i : cached) {
         photos_[i] = upload(frames_[i], loader.next());
         any_masked_ = any_masked_ || photos_[i].masked;
@@ -98,26 +119,34 @@ ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, 
     cameras_.upload(std::span<const std::byte>(blocks));
 }
 
-ImageCache::Photo ImageCache::upload(const Frame& frame, const Image& image) const {
+ImageCache::Photo ImageCache::upload(const Frame& frame, const LoadedPhoto& loaded) const {
+    const Image& image = loaded.image;
     if (image.width != frame.camera.width || image.height != frame.camera.height)
         throw InputError("frame " + frame.name + " changed its size while it was read");
     const bool partly = pipeline::transparent(image), masked = partly && frame.alpha_weighs();
+    gpu::Buffer depths;
+    if (!loaded.depths.pixels.empty()) {
+        depths = gpu::Buffer(device_, "depth map", 4 * loaded.depths.pixels.size());
+        depths.upload(std::span<const float>(loaded.depths.pixels));
+    }
     return {pipeline::upload_photo(device_, image, frame.eight_bit), masked,
-            partly && !masked && frame.masks == MaskUse::cut, masked ? mean_weight(image) : 1};
+            partly && !masked && frame.masks == MaskUse::cut, masked ? mean_weight(image) : 1,
+            std::move(depths)};
 }
 
 const ImageCache::Photo& ImageCache::photo(size_t i) {
     if (photos_[i].texels) return photos_[i];
     prepare(i);
-    const Image image = reading_.get();
+    const LoadedPhoto loaded = reading_.get();
     visitor_ = {};  // frees its memory first
-    return visitor_ = upload(frames_[i], image);
+    return visitor_ = upload(frames_[i], loaded);
 }
 
 void ImageCache::prepare(size_t i) {
     if (photos_[i].texels || (reading_.valid() && coming_ == i)) return;
     coming_ = i;
-    reading_ = std::async(std::launch::async, [&frame = frames_[i]] { return load_frame_image(frame); });
+    reading_ = std::async(std::launch::async,
+                          [&frame = frames_[i], depths = depths_] { return load_photo(frame, depths); });
 }
 
 pipeline::CameraUse ImageCache::camera(size_t i) const {
@@ -129,8 +158,8 @@ ImageLevels::ImageLevels(gpu::Device& device, const passes::KernelConfig& config
                          const std::vector<int>& frames, const TrainOptions& options,
                          const glm::dvec3& origin) {
     for (int level = 0; level <= options.halvings; ++level)
-        levels_.emplace_back(device, config, dataset, frames, cache_share(options, level), origin,
-                             1 << level);
+        levels_.emplace_back(device, config, dataset, frames, cache_share(options, level), origin, 1 << level,
+                             options.loss.depth > 0);
 }
 
 ImageCache& ImageLevels::at(size_t level) {

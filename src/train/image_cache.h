@@ -15,16 +15,25 @@ namespace ewa::train {
 /// Whether an image that is not read yet may have transparent pixels that cut it out.
 bool may_be_cut(const Frame& frame);
 
+/// A frame's image on the host, and its depth map if the loss reads it; else that has no pixels.
+struct LoadedPhoto {
+    Image image, depths;
+};
+
+/// Device bytes of a photo of this size.
+uint64_t photo_bytes_of(const Frame& frame, int width, int height, bool depths);
+
 /// Caches decoded images on the device up to a number of bytes: the first frames that fit. The others are read
 /// again at each use. Which images are cached changes no result. Besides the cache, one image is on the device
 /// and one is being read.
 class ImageCache {
   public:
     /// Loads and uploads the cached images, with their sides divided by `reduction`. frames: indices into
-    /// dataset.frames. origin: of the model's positions. Throws InputError that names the frame.
+    /// dataset.frames. origin: of the model's positions. depths: depth maps are loaded with the images. Throws InputError
+    /// that names the frame.
     ImageCache(gpu::Device& device, const passes::KernelConfig& config, const Dataset& dataset,
                const std::vector<int>& frames, uint64_t cache_bytes, const glm::dvec3& origin,
-               int reduction = 1);
+               int reduction = 1, bool depths = false);
 
     size_t count() const { return photos_.size(); }
     /// Whether photo(i) returns at once.
@@ -37,6 +46,7 @@ class ImageCache {
         bool masked = false;  // its alpha weights the pixels, and some weigh less than 1
         bool cut = false;     // its alpha cuts pixels out
         double weight = 1;    // with a mask: mean square of the pixels' weights
+        gpu::Buffer depths;   // the depth map, as the loss reads it; empty: none
     };
     /// Reads image i if it is not cached. The device must be idle. Throws InputError.
     const Photo& photo(size_t i);
@@ -45,21 +55,24 @@ class ImageCache {
 
     /// Whether an image may be masked.
     bool any_masked() const { return any_masked_; }
+    /// Whether depth maps are loaded, and some image has one.
+    bool any_depths() const { return any_depths_; }
     /// Whether an image may be cut out by its alpha.
     bool any_cut() const { return any_cut_; }
     pipeline::CameraUse camera(size_t i) const;
 
   private:
-    Photo upload(const Frame& frame, const Image& image) const;
+    Photo upload(const Frame& frame, const LoadedPhoto& loaded) const;
 
     gpu::Device& device_;
+    bool depths_;  // whether depth maps are loaded
     std::vector<Frame> frames_;
     std::vector<Photo> photos_;
     size_t on_disk_ = 0;
-    bool any_masked_ = false, any_cut_ = false;
+    bool any_masked_ = false, any_cut_ = false, any_depths_ = false;
     Photo visitor_;  // the last one from disk
     size_t coming_ = 0;
-    std::future<Image> reading_;
+    std::future<LoadedPhoto> reading_;
     gpu::Buffer cameras_;
     uint64_t camera_stride_ = 0;
 };

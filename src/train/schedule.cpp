@@ -57,6 +57,7 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
             .loss = options.loss,
             .masks = masks,
             .alpha = cut,
+            .depths = true,
             .appearance = appearance_of(options),
             .motion = options.refine_poses,
             .sky = options.sky,
@@ -85,6 +86,7 @@ void check_training(const TrainOptions& options, int ranks) {
     check_exclusions(options, ranks);
     scene::check_look({.render = options.render});
     core::check_exclusions(kPointExclusions, options);
+    core::check_exclusions(kDepthExclusions, options);
     core::check_exclusions(kRayExclusions, options);
     core::check_exclusions(kSkyExclusions, options);
     if (options.exposure && options.appearance != AppearanceModel::none &&

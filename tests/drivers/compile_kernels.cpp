@@ -82,7 +82,8 @@ void compile_splatting(Compiler& compiler) {
          {SPEC_MODE,
           {UPDATE_GRADIENT_ONLY, UPDATE_GRADIENT_ONLY | UPDATE_MOTION, packed | UPDATE_MOTION, 0,
            UPDATE_STATISTICS, packed, packed | UPDATE_STATISTICS, packed | UPDATE_REGULARISED,
-           packed | UPDATE_STATISTICS | UPDATE_ABSOLUTE}}});
+           packed | UPDATE_STATISTICS | UPDATE_ABSOLUTE, packed | UPDATE_STATISTICS | UPDATE_DEPTH,
+           packed | UPDATE_REGULARISED | UPDATE_DEPTH}}});
     compiler.compile<passes::BandTiles>();
     compiler.compile<passes::CollectVisible>();
     compiler.compile<passes::ReceiveRecords>();
@@ -115,7 +116,8 @@ void compile_splatting(Compiler& compiler) {
          {SPEC_KERNEL, {KERNEL_PEAK, KERNEL_ANTIALIAS, KERNEL_DENSITY}}});
     compiler.compile<passes::BlendBackward>(
         {{SPEC_MODE,
-          {0, BLEND_BACKWARD_ABSOLUTE, BLEND_BACKWARD_ALPHA, BLEND_BACKWARD_ABSOLUTE | BLEND_BACKWARD_ALPHA}},
+          {0, BLEND_BACKWARD_ABSOLUTE, BLEND_BACKWARD_ALPHA, BLEND_BACKWARD_ABSOLUTE | BLEND_BACKWARD_ALPHA,
+           BLEND_BACKWARD_ALPHA | BLEND_BACKWARD_FOURTH}},
          {SPEC_KERNEL, {KERNEL_PEAK, KERNEL_ANTIALIAS, KERNEL_DENSITY}}});
     compiler.compile<passes::Pack>();
 }
@@ -172,6 +174,7 @@ void compile_training(Compiler& compiler) {
     compiler.compile<passes::LossBackwardRows>(
         {{SPEC_MODE, {0, LOSS_SSIM, LOSS_SQUARES, LOSS_SSIM | LOSS_SQUARES}}});
     compiler.compile<passes::AlphaLoss>({{SPEC_COLOR_FLOATS, {0, 1}}});
+    compiler.compile<passes::DepthLoss>();
     compiler.compile<passes::Reduce>();
     compiler.compile<passes::Expose>();
     compiler.compile<passes::ExposeBackward>();

@@ -68,6 +68,29 @@ TEST_P(Chain, GradientMatchesTheReference) {
     EXPECT_TRUE(splat_gradients_agree(actual.gradient, expected.gradient, tolerance));
 }
 
+TEST_P(Chain, GradientOfDepthsMatchesTheReference) {
+    const ChainCase& c = GetParam();
+    reference::ReferenceOptions with;
+    with.loss = {0.2, 0, 0, 0, 0.9};
+    const Image depths = random_depths(c.seed + 3, c.width, c.height);
+    with.depths = reference::to_double(depths);
+    const LossGradient actual =
+        loss_gradient(device(), gaussians, camera, target, options, false, with.loss, depths);
+    const auto expected = reference::loss_gradient(gaussians, camera, target, options, with);
+    EXPECT_NEAR(actual.depth, expected.depth, 2e-6);
+    for (const auto part : {&CameraMotion::rotation, &CameraMotion::shift}) {
+        const glm::dvec3 &is = actual.camera.*part, &want = expected.camera.*part;
+        EXPECT_LE(glm::length(is - want), 1e-4 * glm::length(want) + 1e-7);
+    }
+    EXPECT_NEAR(actual.loss, expected.loss, 1e-6);
+    GradientTolerance tolerance;
+    tolerance.cosine = 1e-6;
+    tolerance.norm = 2e-4;
+    tolerance.element_relative = 1e-2;
+    tolerance.element_absolute = 1e-4;
+    EXPECT_TRUE(splat_gradients_agree(actual.gradient, expected.gradient, tolerance));
+}
+
 std::vector<ChainCase> cases() {
     std::vector<ChainCase> all;
     uint64_t seed = 200;  // scenes without a contribution that rounding takes across the 1/255 cut

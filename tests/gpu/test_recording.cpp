@@ -417,11 +417,12 @@ struct FrameParts {
 SharedByTests<FrameParts>* const frame_parts = SharedByTests<FrameParts>::add();
 
 void record_gradient(const FrameParts& parts, gpu::Recording& recording, const pipeline::PlanRequest& request,
-                     const pipeline::FrameInputs& inputs, bool masked = false, bool cut = false) {
+                     const pipeline::FrameInputs& inputs, bool masked = false, bool cut = false,
+                     bool depths = false) {
     const auto plan = plan_for(request);
     const pipeline::FramePasses on{{recording, rig().cache}, plan, parts.frame, inputs};
     const auto sorted = on.forward(parts.model);
-    on.loss(parts.photo, masked, nullptr, nullptr, cut);
+    on.loss(parts.photo, masked, nullptr, nullptr, cut, depths ? &parts.photo : nullptr);
     on.backward(parts.model, sorted, {});
 }
 
@@ -453,7 +454,7 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
                    .overlaid = true,
                    .motion = true,
                    .rays = true,
-                   .loss = {.l2 = 1, .alpha = 1}});
+                   .loss = {.l2 = 1, .alpha = 1, .depth = 1}});
     const pipeline::FrameInputs inputs{.camera = {&camera, 0, 61, 47}};
     std::vector<std::vector<Command>> out;
 
@@ -541,13 +542,15 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     out.push_back(gradient.commands());
 
     // All terms of a loss.
-    request.alpha = true;
-    request.loss = {.l2 = 1, .alpha = 1};
+    request.alpha = request.depths = true;
+    request.loss = {.l2 = 1, .alpha = 1, .depth = 1};
     gpu::Recording terms = r.recording();
-    record_gradient(parts, terms, request, inputs, false, true);
+    record_gradient(parts, terms, request, inputs, false, true, true);
+    record_gradient(parts, terms, request, inputs);
+    request.alpha = false;
     record_gradient(parts, terms, request, inputs);
     out.push_back(terms.commands());
-    request.alpha = false;
+    request.depths = false;
     request.loss = {};
 
     request.render.points = true;

@@ -140,6 +140,14 @@ Gaussians random_gaussians(uint64_t seed, size_t count, SplatKind kind, const Ca
     return gaussians;
 }
 
+Image random_depths(uint64_t seed, int width, int height) {
+    Random random(seed ^ 0xde9745ull);
+    Image depths(width, height, 1);
+    for (size_t i = 0; i < depths.pixels.size(); ++i)
+        depths.pixels[i] = i % 5 == 4 ? 0.0f : float(std::exp(random.uniform(0, 2.3)));
+    return depths;
+}
+
 Image random_target(uint64_t seed, int width, int height) {
     Random random(seed ^ 0x7a49e7ull);
     Image image(width, height, 3);

@@ -47,6 +47,9 @@ Image random_target(uint64_t seed, int width, int height);
 /// The RGB image with an alpha: 0 in each third column, random elsewhere.
 Image cut_out(const Image& image, uint64_t seed);
 
+/// Depths of 1 to 10, one channel, and 0 in each fifth pixel.
+Image random_depths(uint64_t seed, int width, int height);
+
 /// For SCOPED_TRACE.
 std::string seed_text(uint64_t seed);
 const char* name_of(SplatKind kind);

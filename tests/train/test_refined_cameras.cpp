@@ -217,8 +217,12 @@ TEST(RefinedCameras, ARunWritesThemAndAlignsWhatItHeldOut) {
     TempFolder folder;
     std::vector<io::ImageRecord> records;
     for (const Frame& frame : wrong.frames)
-        records.push_back(
-            {.name = frame.name, .path = {}, .camera = frame.camera, .mask = {}, .distortion = {}});
+        records.push_back({.name = frame.name,
+                           .path = {},
+                           .camera = frame.camera,
+                           .mask = {},
+                           .depth = {},
+                           .distortion = {}});
     io::write_colmap(folder / "data/sparse/0", records, wrong.points);
     std::filesystem::create_directory_symlink(small_capture().folder / "images", folder / "data/images");
     RunOptions options;

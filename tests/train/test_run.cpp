@@ -443,12 +443,12 @@ TEST(RunOptions, TableReadsWhatItWrites) {
 TEST(RunOptions, ALossHasTheTermsThatItNames) {
     EXPECT_EQ(train::parse_loss(" L1 = 0.5 , ssim=1e-1"), (LossWeights{0.5, 0, 0.1}));
     EXPECT_EQ(train::parse_loss("l2=1,ssim=0"), (LossWeights{0, 1, 0}));
-    EXPECT_EQ(train::parse_loss("alpha=0"), (LossWeights{0.8, 0, 0.2, 0}));
-    EXPECT_EQ(train::parse_loss("alpha=2,l2=1"), (LossWeights{0, 1, 0, 2}));
+    EXPECT_EQ(train::parse_loss("alpha=0,depth=1"), (LossWeights{0.8, 0, 0.2, 0, 1}));
+    EXPECT_EQ(train::parse_loss("alpha=2,l2=1,depth=0.1"), (LossWeights{0, 1, 0, 2, 0.1}));
     EXPECT_EQ(train::loss_text({0.8, 0, 0.2, 0}), "l1=0.8,ssim=0.2,alpha=0");
     EXPECT_EQ(train::loss_text({}), "l1=0.8,ssim=0.2");
     const std::pair<const char*, const char*> wrong[] = {
-        {"", "'' is no term of the loss; l1, l2, ssim and alpha are"},
+        {"", "'' is no term of the loss; l1, l2, ssim, alpha and depth are"},
         {"sim=1", "did you mean ssim?"},
         {"l1=1,", "'' is no term"},
         {"l1", "'l1' has no weight; l1=0.5 has one"},

@@ -20,6 +20,11 @@ struct Chain {
 
     double loss() const {
         const Rendered rendered = render(values, camera, options, reference);
+        const Blended& blended = rendered.blended;
+        if (reference.loss.depth > 0)
+            return image_loss(blended.color, to_double(target)).loss +
+                   reference.loss.depth *
+                       depth_loss(blended.depth_sum, blended.transmittance, reference.depths).difference;
         if (reference.loss.alpha <= 0) return image_loss(rendered.blended.color, to_double(target)).loss;
         Raster alpha(target.width, target.height, 1), seen(target.width, target.height, 3);
         for (size_t i = 0; i < alpha.values.size(); ++i) {
@@ -98,6 +103,15 @@ TEST(ReferenceChain, AlphaOfACutOutImage) {
     chain.target = test::cut_out(chain.target, 71);
     chain.reference.loss.alpha = 0.6;
     check(chain);
+}
+
+TEST(ReferenceChain, DepthMap) {
+    for (const Footprint kernel : {Footprint::peak, Footprint::density}) {
+        Chain chain = random_chain(74, test::SplatKind::ordinary, 12, 1, kernel);
+        chain.reference.loss.depth = 0.6;
+        chain.reference.depths = to_double(test::random_depths(75, 21, 17));
+        check(chain);
+    }
 }
 
 TEST(ReferenceChain, TheModelItselfWhereNothingJumps) {

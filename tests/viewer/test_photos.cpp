@@ -27,6 +27,7 @@ class Photos : public SessionTest {
                               .path = {},
                               .camera = frame.camera,
                               .mask = {},
+                              .depth = {},
                               .distortion = {},
                               .split = 0});
         io::write_colmap(folder_ / "model", images, dataset.points);

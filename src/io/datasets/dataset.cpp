@@ -88,6 +88,22 @@ fs::path find_mask(const io::ImageRecord& image, const fs::path& folder, int dow
     return below ? find_mask_in(root / "masks", inside) : fs::path();
 }
 
+/// The depth map of an image: the model's, or the one in depth or depths. Empty if there is none.
+fs::path find_depth(const io::ImageRecord& image, const fs::path& folder) {
+    if (!image.depth.empty()) return image.depth;
+    const fs::path inside = image.path.lexically_relative(folder), root = folder.parent_path();
+    if (inside.empty() || *inside.begin() == "..") return {};
+    for (const char* maps : {"depth", "depths"})
+        for (const char* type : {".exr", ".png"}) {
+            fs::path replaced = inside, added = inside;
+            replaced.replace_extension(type);
+            added += type;
+            for (const fs::path& name : {added, replaced})
+                if (has_file(root / maps, name)) return root / maps / name;
+        }
+    return {};
+}
+
 /// Resolves MaskUse::automatic once for the whole dataset.
 void settle_masks(Dataset& dataset, MaskUse wanted) {
     const bool files = std::any_of(dataset.frames.begin(), dataset.frames.end(),
@@ -346,7 +362,10 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
         const bool usable = image.camera.width > 0 && (file.exists || !options.need_images);
         if (!usable) continue;
         dataset.frames.push_back(make_frame(image, file, options, cameras));
-        dataset.frames.back().mask_path = find_mask(image, model.folder, options.downscale);
+        Frame& frame = dataset.frames.back();
+        frame.mask_path = find_mask(image, model.folder, options.downscale);
+        frame.depth_path = find_depth(image, model.folder);
+        frame.depth_unit = image.depth_unit;
     }
     settle_masks(dataset, options.masks);
     check_positions(dataset);

@@ -18,6 +18,8 @@ struct ImageRecord {
     std::filesystem::path path;  // of the image
     Camera camera;               // OpenCV axes; width and height are 0 if neither model nor image states them
     std::filesystem::path mask;  // the mask that the model names; empty: none
+    std::filesystem::path depth;  // the depth map that the model names; empty: none
+    double depth_unit = Frame().depth_unit;
     Distortion distortion;
     int split = 0;  // Frame::split
 };

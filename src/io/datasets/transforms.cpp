@@ -13,6 +13,8 @@
 //                                  which is not read
 //   file_path                      relative to the file's folder; may lack .png, .jpg or .jpeg
 //   mask_path                      the image's mask
+//   depth_file_path                the image's depth map: .exr in world units, or .png of 16 bits
+//   depth_unit_scale_factor        world units of a level of such a .png; 0.001 without
 //   ply_file_path                  points, at the top of the file
 //   view_dependent                 at the top: false if no colour depends on the direction of view
 #include <algorithm>
@@ -208,6 +210,13 @@ void find_image(const Entry& entry, const std::filesystem::path& folder, ImageRe
     }
 }
 
+void read_depth(const Entry& entry, const std::filesystem::path& folder, ImageRecord& image) {
+    if (const auto depth = named_file(entry, "depth_file_path", folder); !depth.empty())
+        image.depth = folder / depth;
+    image.depth_unit = entry.number("depth_unit_scale_factor").value_or(image.depth_unit);
+    if (!(image.depth_unit > 0)) entry.fail("\"depth_unit_scale_factor\" is not above 0");
+}
+
 int whole_size(const Entry& entry, const char* key, double value) {
     if (!(value >= 1 && value <= kLongestSide) || value != std::floor(value))
         entry.fail(std::string("\"") + key + "\" is not a whole number of pixels in 1..1048576");
@@ -328,6 +337,7 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
         find_image(entry, folder, image);
         if (const auto mask = named_file(entry, "mask_path", folder); !mask.empty())
             image.mask = folder / mask;
+        read_depth(entry, folder, image);
         read_poses(entry, image.camera);
         unused_poses =
             unused_poses || (entry.find("transform_matrix_start") && !entry.find("rolling_shutter"));

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+// Training on images with depth maps.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "ewa/renderer.h"
+#include "ewa/trainer.h"
+#include "gpu/test_device.h"
+#include "support/temp_folder.h"
+#include "train/synthetic.h"
+
+namespace ewa::test {
+namespace {
+
+/// Images of grey splats, which say little about depth, with depth maps that have holes of every kind.
+const Synthetic& measured() {
+    static const Synthetic* const made = [] {
+        static Synthetic data;
+        make_synthetic(data, 60, 8, 64, 48, 31);
+        std::filesystem::create_directories(data.folder / "depth");
+        for (const Frame& frame : data.dataset.frames) {
+            const auto blended = reference::render(data.truth, frame.camera, {}).blended;
+            Image map(64, 48, 1);
+            for (size_t i = 0; i < map.pixels.size(); ++i)
+                map.pixels[i] = blended.transmittance.values[i] < 0.5 ? float(blended.depth.values[i]) : 0.0f;
+            map.pixels[0] = std::nanf("");
+            map.pixels[1] = INFINITY;
+            map.pixels[2] = -3;
+            save_image(data.folder / "depth" / frame.image_path.filename().replace_extension(".exr"), map);
+        }
+        data.dataset = load_dataset(data.folder.path(), {});
+        return &data;
+    }();
+    return *made;
+}
+
+Gaussians moved_start() {
+    Gaussians start = measured().truth;
+    Random random(5);
+    for (float& x : start.means) x += float(random.uniform(-0.15, 0.15));
+    return start;
+}
+
+/// Mean |ln D - ln d| of the renders, over the pixels with a depth.
+double depth_error(const Gaussians& splats) {
+    Renderer renderer(device(), splats, {});
+    double sum = 0, pixels = 0;
+    for (const Frame& frame : measured().dataset.frames) {
+        const auto truth = reference::render(measured().truth, frame.camera, {}).blended;
+        const Image depth = renderer.render(frame.camera, true).depth;
+        for (size_t i = 0; i < depth.pixels.size(); ++i)
+            if (truth.transmittance.values[i] < 0.5 && depth.pixels[i] > 0) {
+                sum += std::abs(std::log(double(depth.pixels[i]) / truth.depth.values[i]));
+                ++pixels;
+            }
+    }
+    return sum / pixels;
+}
+
+TrainerState train_depths(const TrainOptions& options, int steps, const TrainerState* from = nullptr,
+                          Gaussians* splats = nullptr) {
+    const Dataset& dataset = measured().dataset;
+    Trainer trainer(device(), dataset, all_frames(dataset), moved_start(), options);
+    if (from) trainer.restore(*from);
+    while (trainer.steps_done() < steps) trainer.step();
+    if (splats) *splats = trainer.gaussians();
+    return trainer.state();
+}
+
+TEST(Depths, MoveTheSplats) {
+    TrainOptions options = quick(80);
+    Gaussians without, with;
+    train_depths(options, 80, nullptr, &without);
+    options.loss.depth = 0.5;
+    train_depths(options, 80, nullptr, &with);
+    const double before = depth_error(moved_start()), usual = depth_error(without), own = depth_error(with);
+    printf("    %.4f at the start, %.4f without depth maps, %.4f with them\n", before, usual, own);
+    EXPECT_LT(own, 0.7 * usual);
+}
+
+/// From disk, and after a pause.
+TEST(Depths, HaveTheSameBytesHoweverTheTrainingGoes) {
+    TrainOptions options = quick(12);
+    options.loss.depth = 0.5;
+    const TrainerState whole = train_depths(options, 12), half = train_depths(options, 6);
+    const TrainerState resumed = train_depths(options, 12, &half);
+    options.image_cache_bytes = 0;
+    const TrainerState from_disk = train_depths(options, 12);
+    for (const TrainerState* other : {&resumed, &from_disk}) {
+        EXPECT_EQ(other->report.loss, whole.report.loss);
+        ASSERT_EQ(other->arrays.size(), whole.arrays.size());
+        for (size_t i = 0; i < whole.arrays.size(); ++i)
+            EXPECT_TRUE(other->arrays[i].bytes == whole.arrays[i].bytes);
+    }
+}
+
+/// Maps that the loss does not compare are not read, and change nothing.
+TEST(Depths, AreNotUsedWithoutAWeight) {
+    Dataset lost = measured().dataset;
+    for (Frame& frame : lost.frames) frame.depth_path = "nowhere.exr";
+    Gaussians trained[2];
+    for (const bool with : {false, true}) {
+        Trainer trainer(device(), with ? lost : measured().dataset, all_frames(lost), moved_start(),
+                        quick(4));
+        while (trainer.steps_done() < 4) trainer.step();
+        trained[with] = trainer.gaussians();
+    }
+    EXPECT_EQ(trained[0].means, trained[1].means);
+    EXPECT_EQ(trained[0].opacity_logits, trained[1].opacity_logits);
+}
+
+TEST(Depths, SomeImagesMayHaveNone) {
+    Dataset some = measured().dataset;
+    TrainOptions options = quick(8);
+    options.loss.depth = 0.5;
+    for (size_t i = 1; i < some.frames.size(); ++i) some.frames[i].depth_path.clear();
+    Trainer trainer(device(), some, all_frames(some), moved_start(), options);
+    while (trainer.steps_done() < 8) trainer.step();
+    EXPECT_TRUE(std::isfinite(trainer.report().loss));
+    for (Frame& frame : some.frames) frame.depth_path.clear();
+    expect_error<InputError>([&] { Trainer(device(), some, all_frames(some), moved_start(), options); },
+                             {"no training image has a depth map"});
+}
+
+TEST(Depths, ExclusionsAreNamed) {
+    TrainOptions options = quick(4);
+    options.loss.depth = 0.5;
+    const Dataset& dataset = measured().dataset;
+    const auto refuse = [&](const TrainOptions& asked, const std::string& other) {
+        expect_error<InputError>(
+            [&] { Trainer(device(), dataset, all_frames(dataset), moved_start(), asked); },
+            {"--loss depth", other});
+    };
+    TrainOptions asked = options;
+    asked.batch = 2;
+    refuse(asked, "--batch");
+    asked = options;
+    asked.bands = 2;
+    refuse(asked, "--bands");
+    asked = options;
+    asked.device_memory_bytes = 1 << 30;
+    refuse(asked, "--device-memory");
+    asked = options;
+    asked.render.points = true;
+    refuse(asked, "--points");
+    asked = options;
+    asked.render.integrator = Integrator::fast_ray;
+    refuse(asked, "--integrator");
+}
+
+}  // namespace
+}  // namespace ewa::test
