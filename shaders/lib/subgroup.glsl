@@ -57,6 +57,7 @@ const uint SCAN_AHEAD = 1u;
 #else
 const uint SCAN_AHEAD = 8u;
 #endif
+const uint SCANNED = SCAN_AHEAD * SUBGROUP;  // entries of these turns
 
 // Sum over lanes 0 to this one, inclusive.
 uint subgroup_inclusive_sum(uint x) {

@@ -22,7 +22,7 @@ void main() {
     if (begin >= push.items) return;
     const uint end = min(begin + push.block, push.items);
     uint carry = 0u;
-    for (uint base = begin; base < end; base += SCAN_AHEAD * SUBGROUP) {
+    for (uint base = begin; base < end; base += SCANNED) {
         uint value[SCAN_AHEAD];
         [[unroll]] for (uint a = 0; a < SCAN_AHEAD; ++a) {
             const uint e = base + a * SUBGROUP + LANE;

@@ -14,7 +14,7 @@ layout(push_constant, scalar) uniform Push { ScanTotalsPush push; };
 
 void main() {
     uint carry = 0u, low = 0u, high = 0u;
-    for (uint base = 0u; base < push.blocks; base += SCAN_AHEAD * SUBGROUP) {
+    for (uint base = 0u; base < push.blocks; base += SCANNED) {
         uint value[SCAN_AHEAD];
         [[unroll]] for (uint a = 0; a < SCAN_AHEAD; ++a) {
             const uint e = base + a * SUBGROUP + LANE;
