@@ -166,6 +166,7 @@ Frame frame_of(const FrameState& state) {
             .reduced = n[5] != 0,
             .mask_path = mask_path.value_or(std::filesystem::path()),
             .masks = MaskUse(n[1]),
+            .depth_path = {},
             .left_out = nullptr,
             .behind = std::nullopt,
             .distortion = distortion_of(n[4], k),

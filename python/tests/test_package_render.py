@@ -104,8 +104,8 @@ def test_what_is_no_lens_is_refused():
             ewa.render(make_splats(), viewmat, k, width, height, **kwargs)
     with pytest.raises((TypeError, ValueError), match="Ks"):
         ewa.render(make_splats(), viewmat, None, width, height)
-    with pytest.raises(ValueError, match="pinholes only"):
-        ewa.render(make_splats(), viewmat, k, width, height, camera_model="fisheye", integrator="march")
+    with pytest.raises(ValueError, match="parallel rays"):
+        ewa.render(make_splats(), viewmat, k, width, height, camera_model="orthographic", integrator="march")
 
 
 def test_a_rolling_shutter_needs_an_order_and_its_last_poses():

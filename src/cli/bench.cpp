@@ -20,6 +20,7 @@
 #include "ewa/evaluation.h"
 #include "ewa/splat_files.h"
 #include "ewa/trainer.h"
+#include "scene/readout.h"
 
 namespace ewa::cli {
 namespace {
@@ -129,6 +130,8 @@ void check_files(const BenchArguments& arguments) {
 report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& device,
                                         const Gaussians& gaussians, const Camera& camera,
                                         const RenderOptions& options, bool quiet) {
+    if (!camera.distortion.none() || scene::moves(camera))
+        throw InputError("--accuracy measures pinholes at rest only; take --lens undistort");
     const bench::Accuracy accuracy = bench::measure_accuracy(device, gaussians, camera, options, quiet);
     report::WorkPrecision diagram;
     diagram.title = "Rendering: error against run time";

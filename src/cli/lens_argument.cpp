@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/lens_argument.h"
 
+#include <cmath>
 #include <sstream>
 #include <vector>
 
@@ -16,7 +17,8 @@ LensArgument lens_of(const std::string& text) {
     std::stringstream list(colon == std::string::npos ? "" : text.substr(colon + 1));
     for (std::string word; std::getline(list, word, ',');) {
         const auto number = core::parse_number(word);
-        if (!number) throw InputError("--lens: '" + word + "' is not a number; expected " + kLensForms);
+        if (!number || !std::isfinite(*number))
+            throw InputError("--lens: '" + word + "' is not a number; expected " + kLensForms);
         numbers.push_back(*number);
     }
     const size_t most = name == "fisheye" ? 1 : name == "opencv" ? 4 : 0;

@@ -65,10 +65,10 @@ std::vector<Camera> cameras_of(const Dataset& dataset) {
     std::vector<Camera> cameras;
     for (const Frame& frame : dataset.frames) {
         if (!frame.camera.distortion.none())
-            throw InputError("ewa mesh takes pinholes, and " + core::one_line(frame.name) +
+            throw InputError("a mesh needs pinholes, and " + core::one_line(frame.name) +
                              " cannot be undistorted to one");
         if (scene::moves(frame.camera))
-            throw InputError("ewa mesh takes cameras at rest, and " + core::one_line(frame.name) +
+            throw InputError("a mesh needs cameras at rest, and " + core::one_line(frame.name) +
                              " has a rolling shutter");
         cameras.push_back(frame.camera);
     }

@@ -29,6 +29,7 @@
 #include "run/option_table.h"
 #include "run/run_input.h"
 #include "run/share_machine.h"
+#include "scene/readout.h"
 
 namespace ewa::cli {
 namespace {
@@ -183,6 +184,8 @@ std::unique_ptr<Progress> place_photos(TrainArguments& arguments) {
 }
 
 std::string accuracy_section(const RunScene& scene) {
+    if (!scene.camera.distortion.none() || scene::moves(scene.camera))
+        return "<p>Error against run time is measured for pinholes at rest only.</p>";
     return report::work_precision_html(
         rendering_diagram(scene.device, scene.gaussians, scene.camera, scene.options, false));
 }

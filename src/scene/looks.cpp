@@ -57,6 +57,9 @@ void check_lens(const RenderOptions& render, const Camera& camera) {
         throw InputError(std::string(option.empty() ? "--background sky" : option) +
                          " draws no images of a rolling shutter");
     const bool shot = render.integrator != Integrator::splat && camera.distortion.lens != Lens::orthographic;
+    if (option == "--integrator" && !shot)
+        throw InputError(
+            "--integrator splat alone draws parallel rays; the others need a lens with a centre");
     if (!option.empty() && !shot)
         throw InputError(std::string(option) +
                          " draws through pinholes only; take --lens undistort for images of another lens");
