@@ -116,11 +116,16 @@ void set_normals(TriangleMesh& mesh) {
         const glm::dvec3 n = glm::cross(b - a, c - a);
         for (const uint32_t i : t) sums[i] += n;
     }
+    // Where no triangle has an area: those of the neighbours. Programs refuse normals of another length than 1.
+    const std::vector<glm::dvec3> of_areas = sums;
+    for (const auto& t : mesh.triangles)
+        for (const uint32_t to : t)
+            for (const uint32_t from : t)
+                if (!(glm::length(of_areas[to]) > 0) && glm::length(of_areas[from]) > 0)
+                    sums[to] += glm::normalize(of_areas[from]);
     mesh.normals.clear();
-    for (const glm::dvec3& sum : sums) {
-        const double length = glm::length(sum);
-        mesh.normals.emplace_back(length > 0 ? sum / length : glm::dvec3(0));
-    }
+    for (const glm::dvec3& sum : sums)
+        mesh.normals.emplace_back(glm::length(sum) > 0 ? glm::normalize(sum) : glm::dvec3(0, 0, 1));
 }
 
 }  // namespace ewa::mesh

@@ -23,7 +23,8 @@ size_t drop_small_parts(scene::TriangleMesh& mesh, double least);
 /// At most `most` triangles, as far as the topology allows it. Throws RunError where the module is not here.
 void simplify(scene::TriangleMesh& mesh, size_t most);
 
-/// Fills mesh.normals with means over the triangles at a vertex, weighted by their area.
+/// Fills mesh.normals with means over the triangles at a vertex, weighted by their area. Where none has an area, they are means over the
+/// neighbours, or z.
 void set_normals(scene::TriangleMesh& mesh);
 
 }  // namespace ewa::mesh

@@ -11,7 +11,7 @@ namespace ewa::scene {
 struct TriangleMesh {
     glm::dvec3 origin{0};                            // world; positions are relative to it
     std::vector<glm::vec3> positions;                // world units
-    std::vector<glm::vec3> normals;                  // of length 1, or 0 where no triangle has an area
+    std::vector<glm::vec3> normals;                  // of length 1
     std::vector<std::array<uint8_t, 3>> colors;      // sRGB; one a vertex, or none
     std::vector<std::array<uint32_t, 3>> triangles;  // counter-clockwise from the front
 };

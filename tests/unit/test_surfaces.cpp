@@ -190,6 +190,22 @@ TEST(MeshParts, SmallOnesAreDropped) {
     EXPECT_GT(mesh::topology_of(m).crowded_edges, 0u);
 }
 
+TEST(MeshParts, NormalsHaveALengthOfOneEverywhere) {
+    TriangleMesh m = square(1, 0);
+    // A triangle without an area beside the square, and one that is alone.
+    m.positions.insert(m.positions.end(), {{1, 1, 0}, {7, 7, 7}, {7, 7, 7}, {7, 7, 7}});
+    m.triangles.push_back({3, 4, 3});
+    m.triangles.push_back({5, 6, 7});
+    mesh::set_normals(m);
+    ASSERT_EQ(m.normals.size(), 8u);
+    for (const glm::vec3& n : m.normals) EXPECT_EQ(n, glm::vec3(0, 0, 1));
+    std::swap(m.triangles[0][0], m.triangles[0][1]);
+    std::swap(m.triangles[1][0], m.triangles[1][1]);
+    mesh::set_normals(m);
+    EXPECT_EQ(m.normals[4], glm::vec3(0, 0, -1)) << "that of its neighbour";
+    EXPECT_EQ(m.normals[5], glm::vec3(0, 0, 1)) << "any";
+}
+
 TEST(MeshParts, FewerTriangles) {
     TriangleMesh m = fused_sphere(8, 0.03).mesh;
     const mesh::Topology before = mesh::topology_of(m);
