@@ -20,7 +20,7 @@
 #include "ewa/error.h"
 #include "ewa/image.h"
 #include "io/datasets/dataset_folders.h"
-#include "io/gltf/mesh.h"
+#include "io/meshes/mesh_files.h"
 #include "report/pictures.h"
 #include "scene/dataset_files.h"
 
@@ -266,12 +266,12 @@ int run(const CompareArguments& arguments) {
 
 /// Whether both sides are meshes. Throws InputError where one side is, or another option than theirs is given.
 bool compares_meshes(const CLI::App& app, const CompareArguments& arguments) {
-    const bool a = io::is_gltf_mesh(arguments.inputs.a), b = io::is_gltf_mesh(arguments.inputs.b);
+    const bool a = io::is_mesh(arguments.inputs.a), b = io::is_mesh(arguments.inputs.b);
     if (a != b)
         throw InputError(core::one_line((a ? arguments.inputs.a : arguments.inputs.b).string()) +
                          " is a mesh, and the other side is none");
     if (!a) {
-        if (arguments.distance) throw InputError("--distance is for two meshes (.gltf, .glb)");
+        if (arguments.distance) throw InputError("--distance is for two meshes (.gltf, .glb, .ply, .obj)");
         return false;
     }
     for (const CLI::Option* option : app.get_options())
@@ -312,8 +312,8 @@ Action add_compare(CLI::App& app) {
         ->type_name("OUT");
     app.add_option(
            "--distance", arguments->distance,
-           "Of two meshes (.gltf, .glb), of which B is the true one: points within this distance count "
-           "in the F-score, in the scene's units [0.005 of B's diagonal]")
+           "Of two meshes (.gltf, .glb, .ply, .obj), of which B is the true one: points within this distance "
+           "count in the F-score, in the scene's units [0.005 of B's diagonal]")
         ->transform(in_range(1e-12, 1e12))
         ->type_name("D");
     app.add_option("--heat-scale", arguments->heat_scale, "Error that the heat map shows brightest")

@@ -7,7 +7,7 @@
 #include "cli/output.h"
 #include "core/text.h"
 #include "core/typing.h"
-#include "io/gltf/mesh.h"
+#include "io/meshes/mesh_files.h"
 #include "mesh/distance.h"
 #include "mesh/parts.h"
 
@@ -35,7 +35,7 @@ report::Json to_json(const mesh::Topology& topology, size_t triangles) {
 
 void compare_meshes(const MeshComparison& comparison) {
     check_command_outputs({{"--json", comparison.json}}, {{"A", comparison.a}, {"B", comparison.b}});
-    const scene::MeshScene a = io::read_gltf_mesh(comparison.a), b = io::read_gltf_mesh(comparison.b);
+    const scene::MeshScene a = io::read_mesh(comparison.a), b = io::read_mesh(comparison.b);
     const mesh::Surface of_a(a), of_b(b);
     const double threshold = comparison.distance.value_or(kUsualDistance * of_b.diagonal());
     const mesh::SurfaceDifference d = mesh::difference(of_a, of_b, threshold);

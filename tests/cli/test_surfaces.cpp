@@ -81,6 +81,12 @@ TEST(Mesh, OfAllFormatsAndTheSameTwice) {
     expect_success(mesh(folder, "c.obj", {"--voxel", "0.08"}));
     const std::string obj = read_file(folder / "c.obj");
     EXPECT_EQ(size_t(std::ranges::count(obj, '\n')), 1 + 2 * vertices + faces);
+    expect_success(
+        run_ewa({"compare", folder / "a.ply", folder / "c.obj", "--json", folder / "formats.json"}));
+    const auto formats = read_json(folder / "formats.json");
+    EXPECT_LT(formats["chamfer"], 1e-6);
+    EXPECT_EQ(formats["a"], formats["b"]);
+    EXPECT_EQ(formats["a"]["triangles"], faces);
     const Outcome told = run_ewa({"mesh", folder / "shell.ply", "-o", folder / "d.glb", "--cameras",
                                   folder / "data", "--voxel", "0.08", "--triangles", "200"});
     expect_success(told);

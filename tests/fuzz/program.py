@@ -177,6 +177,8 @@ def make_cases(ewa, folder):
             cases.append(Case(name, file, read + to_any))
     for file in sorted(SEEDS.glob("read_gltf_mesh/*.gl*")):
         cases.append(Case("meshes", file, read))
+    for file in [*sorted(SEEDS.glob("read_ply_mesh/*")), *sorted(SEEDS.glob("read_obj_mesh/*"))]:
+        cases.append(Case("meshes", file, ["compare {} {good} --json {out}.json"]))
     for file in [*sorted(SEEDS.glob("read_picture/*")), *sorted(SEEDS.glob("read_jpeg/*"))]:
         cases.append(Case("images", file, ["info {}", "compare {} {good} --json {out}.json"]))
     look = ["info {}", "info {} --json", "train {} --check-options --steps 3 -o {out}"]

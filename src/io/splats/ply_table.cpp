@@ -208,7 +208,17 @@ void PlyTable::read(const std::vector<size_t>& columns,
     }
 }
 
-void PlyTable::read_row(const PlyElement& element, std::vector<double>& values) {
+void PlyTable::read_lists(size_t list, const std::function<void(std::span<const double>)>& row) {
+    const PlyElement& element = elements_[next_element_++];
+    std::vector<double> all(element.properties.size()), kept;
+    for (uint64_t i = 0; i < element.count; ++i) {
+        read_row(element, all, list, &kept);
+        row(kept);
+    }
+}
+
+void PlyTable::read_row(const PlyElement& element, std::vector<double>& values, std::optional<size_t> keep,
+                        std::vector<double>* kept) {
     for (size_t p = 0; p < element.properties.size(); ++p) {
         const PlyProperty& property = element.properties[p];
         if (!property.list_count) {
@@ -217,10 +227,23 @@ void PlyTable::read_row(const PlyElement& element, std::vector<double>& values) 
         }
         const uint64_t count = read_list_count(property);
         values[p] = static_cast<double>(count);
-        if (format_ == Format::ascii)
-            for (uint64_t i = 0; i < count; ++i) read_ascii_value(property.name);
-        else
-            reader_.skip(count * bytes_of(property.type), "the list \"" + property.name + "\"");
+        read_list_values(property, count, keep == p ? kept : nullptr);
+    }
+}
+
+void PlyTable::read_list_values(const PlyProperty& property, uint64_t count, std::vector<double>* kept) {
+    const size_t bytes = bytes_of(property.type);
+    if (!kept && format_ != Format::ascii)
+        return reader_.skip(count * bytes, "the list \"" + property.name + "\"");
+    if (kept) {
+        // The last value of a text may lack its separator.
+        reader_.require_room(format_ == Format::ascii ? 2 * std::max<uint64_t>(count, 1) - 1 : count,
+                             format_ == Format::ascii ? 1 : bytes, "values of \"" + property.name + "\"");
+        kept->clear();
+    }
+    for (uint64_t i = 0; i < count; ++i) {
+        const double value = read_value(property.type, property.name);
+        if (kept) kept->push_back(value);
     }
 }
 

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The PLY container (Turk 1994): a text header declares elements and their properties, and their rows follow.
-// ply.cpp, compressed_ply.cpp and datasets/image_records.cpp interpret the properties.
+// ply.cpp, compressed_ply.cpp, datasets/image_records.cpp and meshes/ply_mesh.cpp interpret the properties.
 #pragma once
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -54,6 +55,9 @@ class PlyTable {
     /// indices of properties that are not lists. Double holds every PLY type exactly.
     void read(const std::vector<size_t>& columns, const std::function<void(size_t, const double*)>& row);
 
+    /// The same for one list: calls row with the values of property `list`.
+    void read_lists(size_t list, const std::function<void(std::span<const double>)>& row);
+
     [[noreturn]] void fail(std::string_view text) const { reader_.fail(text); }
 
   private:
@@ -64,8 +68,10 @@ class PlyTable {
     void parse_element(std::string_view rest);
     void parse_property(std::string_view rest);
     void skip_rows(const PlyElement& element);
-    void read_row(const PlyElement& element,
-                  std::vector<double>& values);  // the value of a list is its length
+    /// The value of a list is its length. kept: gets the values of the list `keep`.
+    void read_row(const PlyElement& element, std::vector<double>& values,
+                  std::optional<size_t> keep = std::nullopt, std::vector<double>* kept = nullptr);
+    void read_list_values(const PlyProperty& property, uint64_t count, std::vector<double>* kept);
     double read_value(PlyType type, std::string_view what);
     uint64_t read_list_count(const PlyProperty& property);
     double read_ascii_value(std::string_view what);
