@@ -11,6 +11,7 @@
 
 #include "cli/arguments.h"
 #include "cli/command.h"
+#include "cli/depth_figures.h"
 #include "cli/metric_arguments.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
@@ -30,6 +31,7 @@ struct EvalArguments {
     AppearanceArguments appearance;
     std::optional<live::Run> run;  // that of SPLATS, if its dataset is used
     int test_every = 8;
+    bool depth = false;
 };
 
 report::Json to_json(const Evaluation& evaluation, const io::RefinedUse& refined,
@@ -69,12 +71,18 @@ int run(const EvalArguments& arguments) {
     const std::vector<Appearance> appearances =
         appearances_of(arguments.appearance, arguments.run, dataset, frames);
 
+    if (arguments.depth) train::check_depth_evaluation(dataset, frames, options);
+
     // The lines of the frames follow: a file gets no others.
-    Progress progress("evaluated", int(frames.size()), "views", !core::redraws());
+    Progress progress("evaluated", int(frames.size()) * (arguments.depth ? 2 : 1), "views", !core::redraws());
     int begun = 0;
-    const Evaluation evaluation = evaluate(
-        open_device(arguments.views.device), gaussians, dataset, frames, options, appearances,
-        [&] { progress.update(begun++); }, measures);
+    const auto before_frame = [&] { progress.update(begun++); };
+    const auto device = open_device(arguments.views.device);
+    const Evaluation evaluation =
+        evaluate(device, gaussians, dataset, frames, options, appearances, before_frame, measures);
+    std::optional<train::DepthEvaluation> depths;
+    if (arguments.depth)
+        depths = train::evaluate_depths(device, gaussians, dataset, frames, options, before_frame);
     progress.clear();
     for (const EvalFrame& frame : evaluation.frames)
         fmt::print("{}  PSNR {:.3f} dB  SSIM {:.5f}\n", core::one_line(frame.name), frame.psnr, frame.ssim);
@@ -87,8 +95,12 @@ int run(const EvalArguments& arguments) {
                core::counted(evaluation.frames.size(), "frame"), arguments.split, evaluation.psnr,
                evaluation.ssim, evaluation.seconds);
     print_figures(evaluation, arguments.metrics);
-    if (!arguments.json.empty())
-        write_json(arguments.json, to_json(evaluation, refined, arguments.metrics.protocol));
+    if (depths) fmt::print("{}", depth_table(*depths));
+    if (!arguments.json.empty()) {
+        report::Json json = to_json(evaluation, refined, arguments.metrics.protocol);
+        if (depths) add_depths(json, *depths);
+        write_json(arguments.json, json);
+    }
     return 0;
 }
 
@@ -104,6 +116,8 @@ Action add_eval(CLI::App& app) {
     add_appearance_options(app, arguments->appearance);
     add_metric_options(app, arguments->metrics);
     add_protocol_option(app, arguments->metrics);
+    app.add_flag("--depth", arguments->depth,
+                 "Compare the depth of the renders with the dataset's depth maps, too");
     app.add_option("--json", arguments->json, "Write the results to this file")->type_name("FILE");
     add_view_options(app, arguments->views);
     return [&app, arguments] {

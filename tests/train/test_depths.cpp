@@ -7,6 +7,7 @@
 #include "ewa/renderer.h"
 #include "ewa/trainer.h"
 #include "gpu/test_device.h"
+#include "run/depth_evaluation.h"
 #include "support/temp_folder.h"
 #include "train/synthetic.h"
 
@@ -150,4 +151,16 @@ TEST(Depths, ExclusionsAreNamed) {
 }
 
 }  // namespace
+TEST(Depths, ErrorsCountPixelsThatTheMapHas) {
+    Image map(5, 2, 1), drawn(5, 2, 1);
+    map.pixels = {0, 1, 2, 4, 0, 1, 1, 2, 0, 0};
+    drawn.pixels = {7, 1, 2.01f, 4.1f, 0, 0, 2, 2.2f, 0, 1};
+    // 0, 0.005, 0.025, 1, 1 and 0.1
+    const train::DepthErrors errors = train::depth_errors(drawn, map);
+    EXPECT_NEAR(errors.median, 0.1, 1e-6) << "the upper one of the two in the middle";
+    EXPECT_NEAR(errors.mean, (0.005 + 0.025 + 2 + 0.1) / 6, 1e-6);
+    EXPECT_NEAR(errors.within_1, 2 / 6.0, 1e-12);
+    EXPECT_NEAR(errors.within_5, 3 / 6.0, 1e-12);
+}
+
 }  // namespace ewa::test
