@@ -14,7 +14,7 @@ namespace ewa {
 std::string_view name_of(SplatFormat format);
 
 /// The format of an extension, in upper or lower case: .ply .compressed.ply .splat .ksplat .spz .glb .gltf
-/// .sog, or of the name meta.json. Throws InputError for any other.
+/// .sog .usda .usdz, or of the name meta.json. Throws InputError for any other.
 SplatFormat format_of_name(const std::filesystem::path& path);
 
 /// The same for a file to write. Throws InputError also for .ksplat, which ewa only reads.

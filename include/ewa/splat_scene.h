@@ -11,7 +11,7 @@
 namespace ewa {
 
 /// The sources in src/io/splats describe the layouts. sog is one file, sog_meta a meta.json with images beside it.
-enum class SplatFormat { ply, compressed_ply, splat, spz, glb, gltf, sog, sog_meta, ksplat };
+enum class SplatFormat { ply, compressed_ply, splat, spz, glb, gltf, sog, sog_meta, usda, usdz, ksplat };
 
 struct SplatScene {
     Gaussians gaussians;  // in the frame of an INRIA PLY (x right, y down, z forward), whatever the file uses

@@ -251,13 +251,13 @@ void add_editing_options(CLI::App& app, ConvertArguments& arguments) {
 
 Action add_convert(CLI::App& app) {
     const auto arguments = std::make_shared<ConvertArguments>();
-    app.add_option(
-           "FILES", arguments->files,
-           "One or more inputs, which are joined, then the output unless -o names it. Formats: .ply "
-           ".compressed.ply .splat .spz .sog meta.json .glb .gltf, inputs also .ksplat, and an output "
-           "also .html, a page that shows the scene in a browser. An input may be the folder of a "
-           "training run. IN:STEP, as in b.ply:move=1,0,0, moves one input alone; more steps follow "
-           "after more colons")
+    app.add_option("FILES", arguments->files,
+                   "One or more inputs, which are joined, then the output unless -o names it. Formats: .ply "
+                   ".compressed.ply .splat .spz .sog meta.json .glb .gltf .usda .usdz, inputs also .ksplat, "
+                   "and an output "
+                   "also .html, a page that shows the scene in a browser. An input may be the folder of a "
+                   "training run. IN:STEP, as in b.ply:move=1,0,0, moves one input alone; more steps follow "
+                   "after more colons")
         ->required()
         ->expected(1, -1)
         ->type_name("IN... OUT");

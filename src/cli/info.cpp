@@ -439,11 +439,11 @@ int run(const InfoArguments& arguments) {
 
 Action add_info(CLI::App& app) {
     const auto arguments = std::make_shared<InfoArguments>();
-    app.add_option(
-           "PATH", arguments->path,
-           "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json .glb .gltf), COLMAP folder, "
-           "transforms.json, cameras of another program, zip archive of one of these, "
-           "glTF file of meshes, image, or folder of a training run")
+    app.add_option("PATH", arguments->path,
+                   "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json .glb .gltf .usda "
+                   ".usdz), COLMAP folder, "
+                   "transforms.json, cameras of another program, zip archive of one of these, "
+                   "glTF file of meshes, image, or folder of a training run")
         ->required();
     add_test_every_option(app, arguments->test_every);
     app.add_flag("--json", arguments->json, "Print JSON");

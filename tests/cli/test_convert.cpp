@@ -261,7 +261,7 @@ TEST(Convert, SaysWhatToWriteInstead) {
     for (const char* name : {"o.obj", "o.ksplat"}) {
         const Outcome outcome = run_ewa({"convert", folder / "s.ply", folder / name});
         expect_failure(outcome, 2,
-                       ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, .glb, .gltf\n");
+                       ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, .glb, .gltf, .usda, .usdz\n");
     }
     EXPECT_EQ(files_below(folder / ""), Names{"s.ply"});
 }

@@ -5,6 +5,7 @@
 #include <zip.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <new>
 
@@ -104,6 +105,15 @@ uint64_t ArchiveReader::bytes() const {
     return state_->file.bytes.size();
 }
 
+std::string ArchiveReader::first_entry() const {
+    std::array<char, 256> name{};
+    if (unzGoToFirstFile(state_->zip) != UNZ_OK ||
+        unzGetCurrentFileInfo64(state_->zip, nullptr, name.data(), name.size() - 1, nullptr, 0, nullptr, 0) !=
+            UNZ_OK)
+        throw InputError(state_->name + ": the archive has no entries");
+    return name.data();
+}
+
 std::string ArchiveReader::read(const std::string& entry, uint64_t most) const {
     const unzFile zip = state_->zip;
     const std::string where = state_->name + ": \"" + core::one_line(entry) + "\"";
@@ -151,13 +161,24 @@ ArchiveWriter::~ArchiveWriter() {
     if (state_->zip) zipClose(state_->zip, nullptr);
 }
 
-void ArchiveWriter::add(const std::string& entry, const std::string& bytes) {
+void ArchiveWriter::add(const std::string& entry, const std::string& bytes, size_t alignment) {
     constexpr int kStored = 0;
     zip_fileinfo info{};
     info.dosDate = 1 << 21 | 1 << 16;  // the first day that the format knows
     const bool large = bytes.size() > 0xffffffff;
-    require_added(zipOpenNewFileInZip64(state_->zip, entry.c_str(), &info, nullptr, 0, nullptr, 0, nullptr,
-                                        kStored, 0, large));
+    // The content follows a header of 30 bytes, the name, and an extra field of at least its own header.
+    constexpr size_t kHeader = 30, kExtraHeader = 4;
+    constexpr uint16_t kPadding = 0x1986;  // what OpenUSD calls its padding
+    std::string extra;
+    if (const size_t past = (state_->file.bytes.size() + kHeader + entry.size()) % alignment; past != 0) {
+        size_t missing = alignment - past;
+        if (missing < kExtraHeader) missing += alignment;
+        const uint16_t head[2] = {kPadding, uint16_t(missing - kExtraHeader)};
+        extra.assign(reinterpret_cast<const char*>(head), sizeof(head));
+        extra.resize(missing, '\0');
+    }
+    require_added(zipOpenNewFileInZip64(state_->zip, entry.c_str(), &info, extra.data(),
+                                        unsigned(extra.size()), nullptr, 0, nullptr, kStored, 0, large));
     constexpr size_t kPiece = size_t(1) << 30;  // minizip counts in 32 bits
     for (size_t at = 0; at < bytes.size(); at += kPiece)
         require_added(

@@ -20,6 +20,9 @@ class ArchiveReader {
 
     uint64_t bytes() const;  // of the archive
 
+    /// The name of the first entry of the directory. Throws InputError without one.
+    std::string first_entry() const;
+
     /// The content of the entry with this name. Throws InputError without such an entry, or if it unpacks to more
     /// than `most` bytes.
     std::string read(const std::string& entry, uint64_t most) const;
@@ -38,8 +41,8 @@ class ArchiveWriter {
     ArchiveWriter(const ArchiveWriter&) = delete;
     ArchiveWriter& operator=(const ArchiveWriter&) = delete;
 
-    ///
-    void add(const std::string& entry, const std::string& bytes);
+    /// The content begins at a multiple of `alignment` bytes of the archive, at most 64.
+    void add(const std::string& entry, const std::string& bytes, size_t alignment = 1);
     std::string finish();  // call once, last
 
   private:

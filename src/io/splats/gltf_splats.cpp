@@ -28,6 +28,7 @@
 #include "ewa/splat_edit.h"
 #include "io/gltf/document.h"
 #include "io/splats/formats.h"
+#include "io/splats/linear_colors.h"
 #include "io/splats/splat_values.h"
 #include "scene/color.h"
 
@@ -38,20 +39,10 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 const std::string kPrefix = kSplatExtension + ":";
-constexpr double kLeastOpacity = 1e-30, kMostOpacity = 1 - 0x1p-25;  // half a step below 1 in float32
-constexpr int kMostPlacedPrimitives = 4096;                          // each reads its attributes again
+constexpr int kMostPlacedPrimitives = 4096;  // each reads its attributes again
 
 std::string sh_name(int degree, int coefficient) {
     return kPrefix + "SH_DEGREE_" + std::to_string(degree) + "_COEF_" + std::to_string(coefficient);
-}
-
-/// sRGB's curve, mirrored for negative values, and its slope.
-double signed_srgb(double v) {
-    return std::copysign(scene::srgb_of_linear(std::abs(v)), v);
-}
-double srgb_slope(double v) {
-    const double a = std::abs(v);
-    return a <= 0.0031308 ? 12.92 : 1.055 / 2.4 * std::pow(a, 1 / 2.4 - 1);
 }
 
 double opacity_logit(int component_type, double opacity) {
@@ -60,7 +51,7 @@ double opacity_logit(int component_type, double opacity) {
                            : component_type == TINYGLTF_COMPONENT_TYPE_SHORT          ? 32767
                            : component_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT ? 65535
                                                                                       : 0;
-    return steps ? logit_of_steps(opacity, steps) : logit(opacity, kLeastOpacity, kMostOpacity);
+    return steps ? logit_of_steps(opacity, steps) : logit_of_opacity(opacity);
 }
 
 class SplatReader {
@@ -142,7 +133,7 @@ class SplatReader {
             g.opacity_logits[i] = float(opacity_logit(opacity.componentType, v[0]));
         });
         read_sh(primitive, g);
-        if (linear) to_srgb(g);
+        if (linear) remark(linear_colors_to_srgb(g));
         return g;
     }
 
@@ -200,19 +191,6 @@ class SplatReader {
                                 for (size_t channel = 0; channel < 3; ++channel)
                                     sh[channel] = float(v[channel]);
                             });
-            }
-    }
-
-    /// Converts the base colour exactly, and view dependence by the slope of the curve there.
-    void to_srgb(Gaussians& g) {
-        remark("colours are in linear light and become sRGB values; splats that overlap blend in these" +
-               std::string(g.sh_degree > 0 ? ", and view dependence is taken to first order" : ""));
-        for (size_t i = 0; i < g.size(); ++i)
-            for (size_t channel = 0; channel < 3; ++channel) {
-                float* sh = &g.sh[g.sh_stride() * i + channel];
-                const double color = color_of_sh0(sh[0]);
-                sh[0] = float(sh0_of_color(signed_srgb(color)));
-                for (size_t k = 3; k < g.sh_stride(); k += 3) sh[k] = float(sh[k] * srgb_slope(color));
             }
     }
 

@@ -42,6 +42,8 @@ constexpr Kind kKinds[] = {
     {SplatFormat::gltf, ".gltf", "glTF", {"{"}, io::read_gltf_splats, io::write_gltf_splats},
     {SplatFormat::sog, ".sog", "SOG", {"PK\x03\x04"}, io::read_sog, io::write_sog},
     {SplatFormat::sog_meta, "meta.json", "SOG", {}, io::read_sog_meta, io::write_sog_meta},
+    {SplatFormat::usda, ".usda", "USD", {"#usd", "PXR-"}, io::read_usda, io::write_usda},
+    {SplatFormat::usdz, ".usdz", "USDZ", {}, io::read_usdz, io::write_usdz},
     {SplatFormat::ksplat, ".ksplat", "ksplat", {std::string_view("\0\1\0\0", 4)}, io::read_ksplat, nullptr}};
 
 const Kind& kind_of(SplatFormat format) {
@@ -56,7 +58,8 @@ const Kind* kind_of_name(const std::filesystem::path& path) {
     return nullptr;
 }
 
-constexpr const char* kWritten = ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, .glb, .gltf";
+constexpr const char* kWritten =
+    ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, .glb, .gltf, .usda, .usdz";
 
 std::string all_kinds() {
     return std::string(kWritten) + ", .ksplat";
@@ -162,6 +165,8 @@ SplatFormat format_of_file(const std::filesystem::path& path) {
     std::error_code error;
     if (!kind && !std::filesystem::is_regular_file(path, error)) refuse(path, all_kinds());
     core::FileReader reader(path);
+    // Both .usdz and .sog are zip archives.
+    if (kind && kind->format == SplatFormat::usdz) return SplatFormat::usdz;
     // A .splat begins with a coordinate, so its first bytes may look like any format.
     if (kind && kind->format == SplatFormat::splat && reader.size() % 32 == 0) return SplatFormat::splat;
     constexpr uint64_t kHeadBytes = 4;
@@ -216,8 +221,8 @@ std::vector<std::string> save_splats(const std::filesystem::path& path, const Ga
     else
         more = write(path, drawable_only(gaussians, remarks), options);
     remarks.insert(remarks.end(), more.begin(), more.end());
-    const bool unmarked =
-        format == SplatFormat::splat || format == SplatFormat::glb || format == SplatFormat::gltf;
+    const bool unmarked = !ply && format != SplatFormat::compressed_ply && format != SplatFormat::spz &&
+                          format != SplatFormat::sog && format != SplatFormat::sog_meta;
     if (options.antialiased && unmarked)
         remarks.push_back("the mark that the scene was trained anti-aliased is dropped");
     if (!options.comments.empty() && !ply && format != SplatFormat::compressed_ply)

@@ -24,6 +24,11 @@ inline double logit(double p, double least, double most) {
     return std::log(p) - std::log1p(-p);
 }
 
+/// The logit of an opacity of 0..1 in float32. The largest is half a step below 1.
+inline double logit_of_opacity(double opacity) {
+    return logit(opacity, 1e-30, 1 - 0x1p-25);
+}
+
 /// The logit of an opacity of 0..1 that is stored in `levels` + 1 steps. The ends move inwards by a quarter
 /// of a step, so they round back to themselves.
 inline double logit_of_steps(double p, uint32_t levels) {

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// Scenes whose colours are in linear light.
+#pragma once
+#include <string>
+
+#include "ewa/gaussians.h"
+
+namespace ewa::io {
+
+/// Converts colours from linear light to sRGB: the base colour exactly, and view dependence by the slope of the curve there.
+/// Returns a line that says so.
+std::string linear_colors_to_srgb(Gaussians& gaussians);
+
+}  // namespace ewa::io
