@@ -126,8 +126,9 @@ constexpr double kShrink = 0.98;
 
 [[noreturn]] void fail_folded() {
     throw InputError(
-        "the lens distortion folds the image over itself, so it cannot be inverted; check the camera's "
-        "distortion parameters or undistort the images with another tool");
+        "the lens folds the image over itself, so it cannot be undistorted; check the distortion, and that "
+        "the "
+        "focal length and principal point are of this image's size, or undistort with another tool");
 }
 
 glm::dvec2 normalized(const Camera& camera, double x, double y) {
@@ -262,6 +263,10 @@ Camera undistorted_camera(const Camera& source, const Distortion& distortion) {
         throw InputError("a pinhole cannot show these images; take --lens native");
     if (source.width < 2 || source.height < 2)
         throw InputError("a distorted image needs at least 2 x 2 pixels");
+    if (!(source.cx > 0 && source.cx < source.width && source.cy > 0 && source.cy < source.height))
+        throw InputError(
+            "the principal point lies outside the image, which cannot be undistorted then; check it and the "
+            "image's size, or take --lens native or another tool");
     const Inner inner = inner_border(source, distortion);
     double x = axis_scale(distortion, source.fx, source.cx, source.width, inner.left, inner.right);
     double y = axis_scale(distortion, source.fy, source.cy, source.height, inner.top, inner.bottom);

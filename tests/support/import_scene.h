@@ -25,7 +25,7 @@ struct SceneView {
     glm::dvec3 translation() const { return -(rotation * center); }
 };
 
-inline constexpr int kSceneWidth = 48, kSceneHeight = 36;
+inline constexpr int kSceneWidth = 48, kSceneHeight = 22;
 
 /// No axis, no angle and no coordinate of a view occurs twice.
 inline std::vector<SceneView> scene_views() {

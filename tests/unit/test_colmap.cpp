@@ -315,6 +315,10 @@ TEST(Colmap, TextErrorsNameTheLine) {
     refuse("# c\n1 PINHOLE 8 six 10 11 4 3\n", image_line, "", {"cameras.txt:2:", "height", "\"six\""});
     refuse("1 PINHOLE 8 6 10 11 4\n", image_line, "", {"cameras.txt:1:"});
     refuse("1 PINHOLE 8 6 10 11 4 3 0\n", image_line, "", {"cameras.txt:1:", "too many"});
+    refuse("1 OPENCV 8 6 10 11 4 3\n", image_line, "",
+           {"cameras.txt:1:", "model OPENCV has 8 parameters after its size, and here are 4"});
+    refuse("1 " + std::string(3000, 'X') + " 8 6 10 11 4 3\n", image_line, "",
+           {"cameras.txt:1:", "unknown lens model \"" + std::string(60, 'X') + "\";"});
     refuse("1 FOO 8 6 10 11 4 3\n", image_line, "", {"cameras.txt:1:", "FOO", "image_undistorter"});
     refuse(camera_line, image_line + "2 1 0 0 zero 0 0 0 1 c.png\n\n", "", {"images.txt:3:", "\"zero\""});
     refuse(camera_line, "1 1 0 0 0 0 0 0 1\n\n", "", {"images.txt:1:", "no name"});

@@ -36,7 +36,7 @@ std::string text_of(double value) {
 
 std::string calibration_xml(const Calibration& c) {
     std::string xml =
-        "<calibration type=\"" + c.type + "\" class=\"adjusted\"><resolution width=\"48\" height=\"36\"/>";
+        "<calibration type=\"" + c.type + "\" class=\"adjusted\"><resolution width=\"48\" height=\"22\"/>";
     const std::pair<const char*, double> terms[] = {{"f", c.f},   {"cx", c.cx}, {"cy", c.cy}, {"b1", c.b1},
                                                     {"b2", c.b2}, {"k1", c.k1}, {"k2", c.k2}, {"k3", c.k3},
                                                     {"k4", c.k4}, {"p1", c.p1}, {"p2", c.p2}};
@@ -84,7 +84,7 @@ struct MetashapeScene {
                "1\" enabled=\"true\">"
                "<sensors next_id=\"5\"><sensor id=\"4\" label=\"phone\" type=\"" +
                sensor_type +
-               "\"><resolution width=\"48\" height=\"36\"/>"
+               "\"><resolution width=\"48\" height=\"22\"/>"
                "<calibration type=\"frame\" class=\"initial\"><f>99</f></calibration>" +
                calibration +
                "</sensor></sensors><components next_id=\"3\"><component id=\"2\"><transform><rotation "

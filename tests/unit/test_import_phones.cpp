@@ -21,8 +21,9 @@ glm::dmat3 arkit_axes(const SceneView& view) {
 }
 
 json polycam_camera(const SceneView& view) {
-    json camera{{"fx", 44.5},   {"fy", 43.25},         {"cx", 24.75},    {"cy", 17.125}, {"width", 48},
-                {"height", 36}, {"blur_score", 120.5}, {"timestamp", 5}, {"t_20", 0.0}};
+    json camera{{"fx", 44.5},          {"fy", 43.25},    {"cx", 24.75},
+                {"cy", 17.125},        {"width", 48},    {"height", kSceneHeight},
+                {"blur_score", 120.5}, {"timestamp", 5}, {"t_20", 0.0}};
     const glm::dmat3 axes = arkit_axes(view);
     for (int r = 0; r < 3; ++r) {
         for (int c = 0; c < 3; ++c) camera["t_" + std::to_string(r) + std::to_string(c)] = axes[c][r];

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "core/json.h"
@@ -9,6 +8,7 @@
 #include "scene/lens.h"
 #include "scene/readout.h"
 #include "support/temp_folder.h"
+#include "support/transforms_scene.h"
 
 namespace {
 
@@ -16,40 +16,8 @@ using namespace ewa;
 using nlohmann::json;
 using test::expect_error;
 using test::TempFolder;
-
-// A camera at (1, 2, 3) that looks along world -x with world z up: its x axis is +y, its y axis +z, its z
-// axis +x.
-const json kMatrix = {{0, 0, 1, 1}, {1, 0, 0, 2}, {0, 1, 0, 3}, {0, 0, 0, 1}};
-
-json frame(const std::string& path) {
-    return {{"file_path", path}, {"transform_matrix", kMatrix}};
-}
-
-/// Two pictures of 8 x 6 and a transforms.json.
-struct Scene {
-    TempFolder folder;
-    json model = {{"fl_x", 10},      {"fl_y", 11},
-                  {"cx", 4.5},       {"cy", 2.5},
-                  {"w", 8},          {"h", 6.0},
-                  {"aabb_scale", 4}, {"frames", {frame("./images/b.png"), frame("images\\a.png")}}};
-
-    Scene() {
-        std::filesystem::create_directories(folder / "images");
-        for (const char* name : {"a.png", "b.png"}) save_image(folder / "images" / name, Image(8, 6, 3));
-    }
-    std::filesystem::path write(const char* name = "transforms.json") const {
-        return folder.write(name, model.dump());
-    }
-    Dataset load(bool need_files = true) const {
-        write();
-        DatasetOptions options;
-        options.need_images = options.need_points = need_files;
-        return load_dataset(folder.path(), options);
-    }
-    void refuse(std::initializer_list<std::string> parts) const {
-        expect_error<InputError>([&] { load(); }, parts);
-    }
-};
+using Scene = test::TransformsScene;
+using test::kTransformsPose;
 
 TEST(Transforms, InstantNgp) {
     Scene scene;
@@ -100,59 +68,6 @@ TEST(Transforms, NerfstudioFramesHaveTheirOwnIntrinsicsAndPoints) {
     EXPECT_EQ(scene.load(false).frames.size(), 2u);
 }
 
-TEST(Transforms, NerfstudiosListOfTerms) {
-    Scene scene;
-    scene.model["camera_model"] = "OPENCV_FISHEYE";
-    scene.model["distortion_params"] = {0.04, -0.01, 0.003, -0.001, 0, 0};
-    scene.model["frames"][0].update(
-        {{"camera_model", "OPENCV"}, {"distortion_params", {-0.1, 0.02, 0.001, 0, 0.003, -0.002}}});
-    const Dataset dataset = scene.load();
-    EXPECT_EQ(dataset.frames[0].distortion,
-              (Distortion{.k1 = 0.04, .k2 = -0.01, .k3 = 0.003, .k4 = -0.001, .lens = Lens::fisheye}));
-    EXPECT_EQ(dataset.frames[1].distortion,
-              (Distortion{.k1 = -0.1, .k2 = 0.02, .p1 = 0.003, .p2 = -0.002, .k3 = 0.001}));
-    scene.model["frames"][0]["distortion_params"] = {0.1, 0.2, 0.3, 0.4, 0, 0};
-    scene.refuse({"the distortion term k4 is not supported"});
-    scene.model["frames"][0]["distortion_params"] = {0.1, 0.2};
-    scene.refuse({"frame 0", "\"distortion_params\" is not a list of 6 numbers"});
-    scene.model["frames"][0]["distortion_params"] = {0.1, 0.2, 0, 0, 0, "x"};
-    scene.refuse({"\"distortion_params\" holds an entry that is not a finite number"});
-}
-
-TEST(Transforms, Fisheye624IsProjectArias) {
-    Scene scene;
-    scene.model["camera_model"] = "FISHEYE624";
-    scene.model["fisheye_crop_radius"] = 700;
-    scene.refuse({"\"distortion_params\" is missing"});
-    scene.model["distortion_params"] = {0.03,   -0.02, 0.01,  -0.004, 0.002, -0.001,
-                                        0.0031, 0.002, 0.004, -0.003, 0.005, -0.006};
-    const Dataset dataset = scene.load();
-    ASSERT_EQ(dataset.notes.size(), 1u);
-    EXPECT_NE(dataset.notes[0].find("fisheye_crop_radius"), std::string::npos);
-    const Distortion& lens = dataset.frames[0].distortion;
-    const glm::dvec2 ray(0.4, -0.3);
-    const glm::dvec2 q = ray * (std::atan(0.5) / 0.5);
-    const double w = glm::dot(q, q);
-    const glm::dvec2 p =
-        q * (1 + w * (0.03 + w * (-0.02 + w * (0.01 + w * (-0.004 + w * (0.002 + w * -0.001))))));
-    // Aria: p + 2 (p . t) p + |p|^2 t with t = (p0, p1), then the thin prism of |p|^2.
-    const glm::dvec2 t(0.0031, 0.002);
-    const double p2 = glm::dot(p, p);
-    const glm::dvec2 expected =
-        p + 2 * glm::dot(p, t) * p + p2 * t + p2 * glm::dvec2(0.004 - 0.003 * p2, 0.005 - 0.006 * p2);
-    EXPECT_NEAR(glm::length(scene::distort(lens, ray) - expected), 0, 1e-15);
-}
-
-TEST(Transforms, ModelsOfNerfstudioThatAreNoLens) {
-    Scene scene;
-    scene.model["camera_model"] = "ORTHOPHOTO";
-    EXPECT_EQ(scene.load().frames[0].camera.distortion.lens, Lens::orthographic);
-    for (const char* model : {"OMNIDIRECTIONALSTEREO_L", "VR180_R"}) {
-        scene.model["camera_model"] = model;
-        scene.refuse({"the camera model", model, "another place for each direction; export"});
-    }
-}
-
 TEST(Transforms, TheProgramShowsInTheKeys) {
     Scene scene;
     EXPECT_EQ(scene.load().program, "instant-ngp");
@@ -164,9 +79,10 @@ TEST(Transforms, TheProgramShowsInTheKeys) {
 TEST(Transforms, BlenderSplits) {
     TempFolder folder;
     for (const char* set : {"train", "test", "val"}) {
-        const json model = {
-            {"camera_angle_x", 2 * std::atan(0.5)},
-            {"frames", {frame(std::string("./") + set + "/r_0"), frame(std::string("./") + set + "/r_1")}}};
+        const json model = {{"camera_angle_x", 2 * std::atan(0.5)},
+                            {"frames",
+                             {test::transforms_frame(std::string("./") + set + "/r_0"),
+                              test::transforms_frame(std::string("./") + set + "/r_1")}}};
         folder.write(std::string("transforms_") + set + ".json", model.dump());
         std::filesystem::create_directories(folder / set);
         save_image(folder / set / "r_0.png", Image(8, 6, 4));
@@ -205,13 +121,22 @@ TEST(Transforms, MissingImagesAreCounted) {
     scene.refuse({"b.png", "6 x 8", "8 x 6"});
 }
 
+TEST(Transforms, AnImageWithTwoCamerasIsNoted) {
+    Scene scene;
+    scene.model["frames"] = {test::transforms_frame("images/b.png"), test::transforms_frame("images/b.png")};
+    const Dataset dataset = scene.load();
+    EXPECT_EQ(dataset.frames.size(), 2u);
+    ASSERT_EQ(dataset.notes.size(), 1u);
+    EXPECT_NE(dataset.notes[0].find("images/b.png has several cameras"), std::string::npos);
+}
+
 TEST(Transforms, RotationsAreMadeOrthonormal) {
     Scene scene;
     json& matrix = scene.model["frames"][0]["transform_matrix"];
     for (int row = 0; row < 3; ++row)
         for (int column = 0; column < 3; ++column)
             matrix[size_t(row)][size_t(column)] =
-                3 * (kMatrix[size_t(row)][size_t(column)].get<double>() + 3e-4 * (row - column));
+                3 * (kTransformsPose[size_t(row)][size_t(column)].get<double>() + 3e-4 * (row - column));
     const glm::dmat3 r = scene.load().frames[1].camera.rotation;
     const glm::dmat3 product = glm::transpose(r) * r;
     for (int i = 0; i < 3; ++i)
@@ -231,59 +156,16 @@ TEST(Transforms, RotationsAreMadeOrthonormal) {
     refuse("text", "rows");
 }
 
-TEST(Transforms, Lenses) {
-    Scene scene;
-    scene.model.update({{"k1", 0.01}, {"k2", 0.02}, {"k3", 0.03}, {"p1", 0.001}, {"p2", 0.002}});
-    Distortion expected{0.01, 0.02, 0.001, 0.002, 0.03};
-    EXPECT_EQ(scene.load().frames[0].distortion, expected);
-    scene.model["camera_model"] = "FULL_OPENCV";
-    scene.model.update({{"k4", 0.04}, {"k5", 0.05}, {"k6", 0.06}});
-    expected.k4 = 0.04, expected.k5 = 0.05, expected.k6 = 0.06;
-    EXPECT_EQ(scene.load().frames[0].distortion, expected);
-    for (const char* how : {"camera_model", "is_fisheye"}) {
-        Scene fisheye;
-        fisheye.model.update({{"k1", 0.01}, {"k2", 0.02}, {"k3", 0.03}, {"k4", 0.04}});
-        fisheye.model[how] = std::string(how) == "is_fisheye" ? json(true) : json("OPENCV_FISHEYE");
-        const Frame frame = fisheye.load().frames[0];
-        EXPECT_EQ(frame.distortion,
-                  (Distortion{.k1 = 0.01, .k2 = 0.02, .k3 = 0.03, .k4 = 0.04, .lens = Lens::fisheye}));
-        EXPECT_GT(frame.camera.width, frame.source.width - 2);
-    }
-}
-
-TEST(Transforms, OtherLensesAreNamed) {
-    Scene other;
-    other.model["camera_model"] = "FTHETA";
-    other.refuse({"frame 0", "FTHETA", "undistort"});
-    // No pinhole shows these.
-    for (const auto& [model, lens] :
-         {std::pair{"EQUIRECTANGULAR", Lens::equirectangular}, {"ORTHOGRAPHIC", Lens::orthographic}}) {
-        Scene scene;
-        scene.model["camera_model"] = model;
-        const Frame frame = scene.load().frames[0];
-        EXPECT_EQ(frame.camera.distortion.lens, lens);
-        EXPECT_TRUE(frame.distortion.none());
-    }
-    for (const char* key : {"k4", "k5", "ftheta_p0"}) {
-        Scene scene;
-        scene.model[key] = 0.0;
-        EXPECT_NO_THROW(scene.load());
-        scene.model["frames"][1][key] = 0.1;
-        scene.refuse({"frame 1", key});
-    }
-    Scene fisheye;
-    fisheye.model.update({{"is_fisheye", true}, {"k5", 0.1}});
-    fisheye.refuse({"frame 0", "k5"});
-}
-
+/// An angle of view is equidistant for a fisheye, and parallel rays have none.
+/// The width is the whole circle, and an angle has as many pixels upright.
 TEST(Transforms, RollingShutters) {
     Scene scene;
-    json later = kMatrix;
+    json later = kTransformsPose;
     later[0][3] = 1.5;
     json& first = scene.model["frames"][0];
     first["rolling_shutter"] = "bottom-to-top";
     scene.refuse({"frame 0", "\"transform_matrix_start\" is missing"});
-    first["transform_matrix_start"] = kMatrix;
+    first["transform_matrix_start"] = kTransformsPose;
     scene.refuse({"frame 0", "\"transform_matrix_end\" is missing"});
     first["transform_matrix_end"] = later;
     first.erase("transform_matrix");
@@ -317,7 +199,7 @@ TEST(Transforms, RollingShutters) {
                              {"rolling shutter", "undistorted"});
     // Poses that no readout uses are named.
     first.erase("rolling_shutter");
-    first["transform_matrix"] = kMatrix;
+    first["transform_matrix"] = kTransformsPose;
     ASSERT_EQ(scene.load().notes.size(), 1u);
     EXPECT_NE(scene.load().notes[0].find("transform_matrix_start"), std::string::npos);
     first["rolling_shutter"] = "global";
@@ -350,8 +232,8 @@ TEST(Transforms, NamesWhatIsWrong) {
     refuse("frames", json::array(), {"no images"});
     refuse("frames", {3}, {"frame 0", "object"});
     refuse("frames", {{{"file_path", "a.png"}}}, {"frame 0", "transform_matrix"});
-    refuse("frames", {{{"transform_matrix", kMatrix}}}, {"frame 0", "file_path"});
-    refuse("frames", {{{"transform_matrix", kMatrix}, {"file_path", 3}}}, {"frame 0", "file_path"});
+    refuse("frames", {{{"transform_matrix", kTransformsPose}}}, {"frame 0", "file_path"});
+    refuse("frames", {{{"transform_matrix", kTransformsPose}, {"file_path", 3}}}, {"frame 0", "file_path"});
     refuse("k1", -3, {"folds"});
     Scene scene;
     scene.model.erase("fl_x");

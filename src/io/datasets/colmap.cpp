@@ -237,6 +237,7 @@ void read_binary_points(const std::filesystem::path& path, ColmapBuilder& builde
     }
 }
 
+constexpr size_t kShownBytes = 60;            // bytes of a word in an error
 constexpr size_t kMaxLine = size_t(1) << 28;  // the observations of one image are one line
 
 /// The lines of a file with their numbers, and the words of a line.
@@ -274,7 +275,7 @@ class Lines {
         else
             value = core::parse_integer<T>(text);
         if (!value)
-            fail(std::string(what) + ": \"" + std::string(text.substr(0, 60)) + "\" is not " +
+            fail(std::string(what) + ": \"" + std::string(text.substr(0, kShownBytes)) + "\" is not " +
                  (std::is_same_v<T, double> ? "a number" : "an integer in range"));
         return *value;
     }
@@ -298,13 +299,19 @@ void read_text_cameras(const std::filesystem::path& path, ColmapBuilder& builder
         const std::string_view name = lines.word();
         const ColmapLens* lens = colmap_lens(name);
         if (!lens) {
-            lines.fail("unknown lens model \"" + std::string(name) +
+            lines.fail("unknown lens model \"" + std::string(name.substr(0, kShownBytes)) +
                        "\"; undistort the images with `colmap image_undistorter` and use its output");
             return;
         }
         const auto width = lines.value<uint64_t>("width"), height = lines.value<uint64_t>("height");
         std::vector<double> parameters(lens->parameters());
-        for (double& parameter : parameters) parameter = lines.value<double>("camera parameter");
+        for (size_t i = 0; i < parameters.size(); ++i) {
+            if (lines.rest().empty())
+                lines.fail("a camera of the model " + std::string(name) + " has " +
+                           std::to_string(parameters.size()) + " parameters after its size, and here are " +
+                           std::to_string(i));
+            parameters[i] = lines.value<double>("camera parameter");
+        }
         if (!lines.rest().empty()) lines.fail("a " + std::string(name) + " camera has too many parameters");
         builder.add_camera(id, *lens, width, height, parameters, fail);
     }

@@ -14,6 +14,7 @@
 #include "io/datasets/image_records.h"
 #include "io/datasets/importers/importer.h"
 #include "scene/camera.h"
+#include "scene/intrinsics.h"
 #include "scene/lens.h"
 #include "scene/native_lens.h"
 #include "scene/readout.h"
@@ -195,8 +196,9 @@ class CameraCache {
     std::vector<Known> known_;
 };
 
+/// where: begins the errors of the camera.
 Frame make_frame(const io::ImageRecord& image, const ImageFile& file, const DatasetOptions& options,
-                 CameraCache& cameras) {
+                 CameraCache& cameras, const std::string& where) {
     Frame frame;
     frame.name = image.name;
     frame.image_path = file.path;
@@ -217,14 +219,24 @@ Frame make_frame(const io::ImageRecord& image, const ImageFile& file, const Data
     }
     frame.split = image.split;
     try {
+        if (const std::string fault = scene::intrinsics_fault(frame.source, image.distortion); !fault.empty())
+            throw InputError(fault);
         frame.pinhole = cameras.of(frame.source, image.distortion);
         if (frame.pinhole.distortion.none()) frame.distortion = image.distortion;
         frame.camera = downscale(frame.pinhole, frame.downscale);
         scene::check_readout(frame.camera);
     } catch (const InputError& error) {
-        throw InputError(core::one_line("frame \"" + image.name + "\": " + error.what()));
+        throw InputError(core::one_line(where + ": frame \"" + image.name + "\": " + error.what()));
     }
     return frame;
+}
+
+/// images: sorted by name.
+void note_repeated(const std::vector<io::ImageRecord>& images, std::vector<std::string>& notes) {
+    const auto same = [](const io::ImageRecord& a, const io::ImageRecord& b) { return a.name == b.name; };
+    if (const auto first = std::ranges::adjacent_find(images, same); first != images.end())
+        notes.push_back("the image " + core::one_line(first->name) +
+                        " has several cameras, each of which counts as an image");
 }
 
 /// Throws if a camera has no finite position, or is so far away that its distance is not finite.
@@ -341,6 +353,7 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
     io::ImageRecords model = read_model(path, options);
     const std::string name = core::one_line(path.string());
     if (model.images.empty()) throw InputError(name + ": the dataset has no images");
+    io::note_partial_spheres(model);
     Dataset dataset;
     dataset.root = is_folder(path) ? path : path.parent_path();
     dataset.files = std::move(model.files);
@@ -353,6 +366,7 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
     dataset.notes = std::move(model.notes);
     std::stable_sort(model.images.begin(), model.images.end(),
                      [](const io::ImageRecord& a, const io::ImageRecord& b) { return a.name < b.name; });
+    note_repeated(model.images, dataset.notes);
     CameraCache cameras(options.lens);
     const bool captured = is_file(dataset.root / "capture.json");
     for (const io::ImageRecord& image : model.images) {
@@ -361,7 +375,7 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
         dataset.missing_images += !file.exists;
         const bool usable = image.camera.width > 0 && (file.exists || !options.need_images);
         if (!usable) continue;
-        dataset.frames.push_back(make_frame(image, file, options, cameras));
+        dataset.frames.push_back(make_frame(image, file, options, cameras, name));
         Frame& frame = dataset.frames.back();
         frame.mask_path = find_mask(image, model.folder, options.downscale);
         frame.depth_path = find_depth(image, model.folder);

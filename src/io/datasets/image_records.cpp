@@ -3,14 +3,44 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/trigonometric.hpp>
+#include <numbers>
 
 #include "core/atomic_file.h"
 #include "core/file_reader.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/splats/ply_table.h"
+#include "scene/native_lens.h"
 
 namespace ewa::io {
+
+void set_sphere(Camera& camera, const std::string& where) {
+    constexpr int kRounding = 2;  // px of the width
+    scene::set_equirectangular(camera);
+    const int more = 2 * camera.height - camera.width;
+    if (more > kRounding)
+        throw InputError(core::one_line(
+            where + ": a 360 degree image of " + std::to_string(camera.width) + " x " +
+            std::to_string(camera.height) +
+            " pixels is higher than half its width; stretch the images to 2:1, or cut a second eye off"));
+    if (more < -kRounding) camera.fy = camera.fx;
+}
+
+void note_partial_spheres(ImageRecords& records) {
+    const auto partial = [](const ImageRecord& image) {
+        const Camera& c = image.camera;
+        return image.distortion.lens == Lens::equirectangular && c.height < 0.999 * std::numbers::pi * c.fy;
+    };
+    const auto first = std::ranges::find_if(records.images, partial);
+    if (first == records.images.end()) return;
+    records.notes.push_back(
+        "360 degree images of " + std::to_string(first->camera.width) + " x " +
+        std::to_string(first->camera.height) +
+        " pixels are taken to show the whole circle along their width, and " +
+        std::to_string(std::lround(glm::degrees(first->camera.height / first->camera.fy))) +
+        " degrees upright");
+}
 
 void add_point(PointCloud& points, DroppedPoints& dropped, const glm::dvec3& position,
                const std::array<uint8_t, 3>& color, const std::function<std::string()>& where) {

@@ -46,6 +46,13 @@ struct ImageRecords {
     std::vector<std::string> notes;     // Dataset::notes
 };
 
+/// Gives the camera of a 360° image its intrinsics: the width shows the whole circle, with as many px per angle along both sides.
+/// Throws InputError that begins with `where` if the image is higher than all directions.
+void set_sphere(Camera& camera, const std::string& where);
+
+/// Adds a note if there are 360° images that do not show all directions.
+void note_partial_spheres(ImageRecords& records);
+
 /// Adds a point, or counts it as dropped. `where` is called for the first dropped point.
 void add_point(PointCloud& points, DroppedPoints& dropped, const glm::dvec3& position,
                const std::array<uint8_t, 3>& color, const std::function<std::string()>& where);

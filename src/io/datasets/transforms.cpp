@@ -4,7 +4,8 @@
 // A key of a frame wins over the same key at the top of the file.
 //   fl_x fl_y cx cy w h            px; defaults: fl_y is fl_x, (cx, cy) the centre, w h the image's size
 //   camera_angle_x camera_angle_y  angles of view in radians, in place of fl_x and fl_y
-//   k1 k2 k3 p1 p2                 OpenCV's distortion
+//                                  of a fisheye, they are equidistant; parallel rays have none
+//   k1 k2 k3 p1 p2 s1 s2 s3 s4     OpenCV's distortion
 //   camera_model, is_fisheye       OPENCV_FISHEYE: fisheye with k1 to k4; FULL_OPENCV: k1 to k6
 //   distortion_params              k1 k2 k3 k4 p1 p2; of FISHEYE624 k1 to k6, p2, p1, s1 to s4: in place of keys of their own
 //   transform_matrix               camera to world; camera axes are OpenGL's (x right, y up, z back)
@@ -32,7 +33,6 @@
 #include "ewa/error.h"
 #include "io/datasets/image_records.h"
 #include "io/datasets/rotation.h"
-#include "scene/native_lens.h"
 #include "scene/readout.h"
 
 namespace ewa::io {
@@ -73,6 +73,17 @@ class Entry {
         return value->get<std::string>();
     }
 
+    /// A number is true unless it is 0. False without the key.
+    bool flag(const char* key) const {
+        const json* value = find(key);
+        if (!value) return false;
+        if (!value->is_boolean() && !value->is_number())
+            fail(std::string("\"") + key + "\" is neither true nor false");
+        return value->is_boolean() ? value->get<bool>() : value->get<double>() != 0;
+    }
+
+    const std::string& where() const { return where_; }
+
     [[noreturn]] void fail(const std::string& text) const {
         throw InputError(where_ + ": " + core::one_line(text));
     }
@@ -87,7 +98,8 @@ using Term = double Distortion::*;
 
 constexpr std::pair<const char*, Term> kTerms[] = {
     {"k1", &Distortion::k1}, {"k2", &Distortion::k2}, {"k3", &Distortion::k3}, {"k4", &Distortion::k4},
-    {"k5", &Distortion::k5}, {"k6", &Distortion::k6}, {"p1", &Distortion::p1}, {"p2", &Distortion::p2}};
+    {"k5", &Distortion::k5}, {"k6", &Distortion::k6}, {"p1", &Distortion::p1}, {"p2", &Distortion::p2},
+    {"s1", &Distortion::s1}, {"s2", &Distortion::s2}, {"s3", &Distortion::s3}, {"s4", &Distortion::s4}};
 
 /// A list of terms; false if the entry has none.
 bool read_terms(const Entry& entry, std::initializer_list<Term> terms, Distortion& d) {
@@ -122,9 +134,10 @@ Distortion read_fisheye624(const Entry& entry) {
 void refuse_model_of(const Entry& entry, const std::string& model) {
     if (model.starts_with("OMNIDIRECTIONALSTEREO") || model.starts_with("VR180"))
         entry.fail(
-            "the camera model " + model +
+            "the camera model " + model.substr(0, kLongestName) +
             " has another place for each direction; export each eye as EQUIRECTANGULAR, or PINHOLE images");
-    entry.fail("the camera model " + model + " is not supported; undistort the images to PINHOLE first");
+    entry.fail("the camera model " + model.substr(0, kLongestName) +
+               " is not supported; undistort the images to PINHOLE first");
 }
 
 /// The lenses of nerfstudio and instant-ngp. They disagree on k4: a fourth radial term, or as in OpenCV a
@@ -142,8 +155,7 @@ Distortion read_lens(const Entry& entry) {
     if (model == "EQUIRECTANGULAR") return {.lens = Lens::equirectangular};
     if (model == "ORTHOGRAPHIC" || model == "ORTHOPHOTO") return {.lens = Lens::orthographic};
     if (model == "FISHEYE624") return read_fisheye624(entry);
-    const json* flag = entry.find("is_fisheye");
-    const bool fisheye = holds(kFisheye, model) || (flag && *flag != json(false) && *flag != json(0));
+    const bool fisheye = entry.flag("is_fisheye") || holds(kFisheye, model);
     if (!fisheye && !holds(kPerspective, model)) refuse_model_of(entry, model);
     Distortion d;
     d.lens = fisheye ? Lens::fisheye : Lens::brown;
@@ -223,10 +235,18 @@ int whole_size(const Entry& entry, const char* key, double value) {
     return static_cast<int>(value);
 }
 
-double focal_from_angle(const Entry& entry, const char* key, int size) {
+double focal_from_angle(const Entry& entry, const char* key, int size, Lens lens) {
     const double angle = *entry.number(key);
+    const std::string name = std::string("\"") + key + "\"";
+    if (lens == Lens::orthographic)
+        entry.fail(name + " says nothing of parallel rays; they need \"fl_x\", the pixels per world unit");
+    if (lens == Lens::fisheye || lens == Lens::fisheye624) {
+        if (!(angle > 0 && angle <= 2 * std::numbers::pi))
+            entry.fail(name + " is not an angle between 0 and 2 pi (radians)");
+        return size / angle;
+    }
     if (!(angle > 0 && angle < std::numbers::pi))
-        entry.fail(std::string("\"") + key + "\" is not an angle between 0 and pi (radians)");
+        entry.fail(name + " is not an angle between 0 and pi (radians)");
     return 0.5 * size / std::tan(0.5 * angle);
 }
 
@@ -245,19 +265,21 @@ void read_intrinsics(const Entry& entry, ImageRecord& image) {
         return;
     }
     if (image.distortion.lens == Lens::equirectangular) {
-        scene::set_equirectangular(camera);
+        set_sphere(camera, entry.where());
         return;
     }
     if (const auto fl_x = entry.number("fl_x"))
         camera.fx = *fl_x;
     else if (entry.number("camera_angle_x"))
-        camera.fx = focal_from_angle(entry, "camera_angle_x", camera.width);
+        camera.fx = focal_from_angle(entry, "camera_angle_x", camera.width, image.distortion.lens);
+    else if (image.distortion.lens == Lens::orthographic)
+        entry.fail("\"fl_x\" is missing, the pixels per world unit of parallel rays");
     else
         entry.fail("\"fl_x\" or \"camera_angle_x\" is missing");
     if (const auto fl_y = entry.number("fl_y"))
         camera.fy = *fl_y;
     else if (!entry.number("fl_x") && entry.number("camera_angle_y"))
-        camera.fy = focal_from_angle(entry, "camera_angle_y", camera.height);
+        camera.fy = focal_from_angle(entry, "camera_angle_y", camera.height, image.distortion.lens);
     else
         camera.fy = camera.fx;
     if (!(camera.fx > 0 && camera.fy > 0)) entry.fail("a focal length is not positive");
@@ -371,15 +393,18 @@ Json model_of(const Distortion& d) {
     if (d.lens == Lens::fisheye)
         return {{"camera_model", "OPENCV_FISHEYE"}, {"k1", d.k1}, {"k2", d.k2}, {"k3", d.k3}, {"k4", d.k4}};
     if (d.none()) return {{"camera_model", "PINHOLE"}};
-    return {{"camera_model", "FULL_OPENCV"},
-            {"k1", d.k1},
-            {"k2", d.k2},
-            {"p1", d.p1},
-            {"p2", d.p2},
-            {"k3", d.k3},
-            {"k4", d.k4},
-            {"k5", d.k5},
-            {"k6", d.k6}};
+    Json model = {{"camera_model", "FULL_OPENCV"},
+                  {"k1", d.k1},
+                  {"k2", d.k2},
+                  {"p1", d.p1},
+                  {"p2", d.p2},
+                  {"k3", d.k3},
+                  {"k4", d.k4},
+                  {"k5", d.k5},
+                  {"k6", d.k6}};
+    const bool prism = d.s1 != 0 || d.s2 != 0 || d.s3 != 0 || d.s4 != 0;
+    if (prism) model.update({{"s1", d.s1}, {"s2", d.s2}, {"s3", d.s3}, {"s4", d.s4}});
+    return model;
 }
 
 /// The poses of a rolling shutter. Other programs read that of the middle.

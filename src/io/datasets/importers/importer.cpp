@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
+#include <span>
 
 #include "core/file_reader.h"
 #include "core/folders.h"
@@ -129,6 +129,14 @@ constexpr std::array kUnread{
     Unread{"", ".sfm", "a file of Meshroom; export the cameras there, as COLMAP or as sfm_data.json"},
     Unread{"", ".nvm", "a file of VisualSFM; open it in COLMAP, and export a model"}};
 
+/// Files of other names than these may lie anywhere, so that only one which the user names is meant as cameras.
+constexpr std::array kOther{
+    Unread{"", ".xml", "not Metashape's file of cameras, which has <document> and <chunk> at its beginning"},
+    Unread{"", ".zip", "empty, or not a zip archive"}, Unread{"", ".r3d", "not Record3D's archive"},
+    Unread{"", ".xmp", "not RealityScan's file of a camera, which has a rotation"},
+    Unread{"", ".csv",
+           "not RealityScan's file of cameras, whose first line names name, heading, pitch and roll"}};
+
 }  // namespace
 
 const std::vector<CameraImporter>& camera_importers() {
@@ -191,16 +199,19 @@ bool is_imported(const fs::path& entry, const std::function<std::string()>& head
 }
 
 std::string export_advice(const fs::path& path) {
-    const auto advice = [](const fs::path& file) -> std::string {
-        for (const Unread& unread : kUnread)
+    const auto advice = [](const fs::path& file, std::span<const Unread> list) -> std::string {
+        for (const Unread& unread : list)
             if (extension_in_lower_case(file) == unread.extension &&
                 (unread.name.empty() || file.filename() == unread.name))
                 return core::one_line(file.filename().string()) + " is " + std::string(unread.advice);
         return {};
     };
-    if (!core::is_folder(path)) return advice(path);
+    if (!core::is_folder(path)) {
+        const std::string text = advice(path, kUnread);
+        return text.empty() ? advice(path, kOther) : text;
+    }
     for (const fs::path& file : files_of_folder(path))
-        if (std::string text = advice(file); !text.empty()) return text;
+        if (std::string text = advice(file, kUnread); !text.empty()) return text;
     return {};
 }
 
@@ -226,12 +237,6 @@ void finish_record(ImageRecord& record, const std::string& where) {
     for (int i = 0; i < 3; ++i)
         for (int k = 0; k < 3; ++k) finite = finite && std::isfinite(c.rotation[i][k]);
     if (!finite) throw InputError(core::one_line(where + ": the rotation is not finite"));
-}
-
-void set_sphere(Camera& camera) {
-    camera.fx = camera.fy = std::max(camera.width, camera.height) / (2 * std::numbers::pi);
-    camera.cx = 0.5 * camera.width;
-    camera.cy = 0.5 * camera.height;
 }
 
 void add_points_beside(const fs::path& folder, bool with_points, ImageRecords& records) {

@@ -51,8 +51,8 @@ std::optional<FoundImporter> find_importer(const std::filesystem::path& path);
 /// Whether an entry of an archive has cameras. head: gives the entry's first bytes, and is only called for names that fit.
 bool is_imported(const std::filesystem::path& entry, const std::function<std::string()>& head);
 
-/// What to export, for a folder or file with the cameras of a program in a form that is not read, such as its own project. Empty if
-/// there is none.
+/// What to export, for a folder or file with the cameras of a program in a form that is not read, such as its own project. Or why
+/// a file is not the one that its name promises. Empty if there is nothing to say.
 std::string export_advice(const std::filesystem::path& path);
 
 /// The folder's files in the order of names.
@@ -60,9 +60,6 @@ std::vector<std::filesystem::path> files_of_folder(const std::filesystem::path& 
 
 /// Checks the intrinsics and the rotation of a record. `where` begins the errors.
 void finish_record(ImageRecord& record, const std::string& where);
-
-/// Gives the camera of a 360 degree image as many px per angle along both sides: the larger side shows the whole circle.
-void set_sphere(Camera& camera);
 
 /// Adds the points of the PLY of points that is alone in the folder.
 void add_points_beside(const std::filesystem::path& folder, bool with_points, ImageRecords& records);

@@ -43,7 +43,7 @@ std::optional<ImageRecord> metashape_sensor(const XmlField& sensor) {
     const std::string type = sensor.attribute("type");
     if (type == "spherical") {
         record.distortion.lens = Lens::equirectangular;
-        set_sphere(camera);
+        set_sphere(camera, sensor.where());
         return record;
     }
     if (type != "frame" && type != "fisheye")

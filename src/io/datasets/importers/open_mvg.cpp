@@ -85,7 +85,7 @@ ImageRecord open_mvg_camera(const JsonField& value, TypeNames& types) {
     camera.height = data.side("height");
     record.distortion.lens = lens->lens;
     if (lens->lens == Lens::equirectangular) {
-        set_sphere(camera);
+        set_sphere(camera, value.where());
         return record;
     }
     const std::vector<double> center = data.numbers("principal_point", 2);

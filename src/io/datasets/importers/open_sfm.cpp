@@ -98,7 +98,7 @@ ImageRecord open_sfm_camera(const JsonField& field) {
     camera.height = field.side("height");
     record.distortion.lens = lens->lens;
     if (lens->lens == Lens::equirectangular) {
-        set_sphere(camera);
+        set_sphere(camera, field.where());
         return record;
     }
     const double unit = std::max(camera.width, camera.height);
