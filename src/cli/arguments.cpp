@@ -251,9 +251,7 @@ Dataset load_cameras_as_trained(const fs::path& path, const CamerasInput& input)
                                           .need_points = input.points,
                                           .max_width = input.max_width});
     auto missing = [](const Frame& frame) { return !frame.image_exists; };
-    const auto count = std::count_if(dataset.frames.begin(), dataset.frames.end(), missing);
-    dataset.missing_images = static_cast<int>(count);
-    if (count < std::ssize(dataset.frames)) std::erase_if(dataset.frames, missing);
+    if (!std::ranges::all_of(dataset.frames, missing)) std::erase_if(dataset.frames, missing);
     return dataset;
 }
 

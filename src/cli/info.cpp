@@ -6,16 +6,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/geometric.hpp>
-#include <glm/trigonometric.hpp>
-#include <map>
 #include <memory>
 #include <numeric>
 #include <optional>
 #include <string_view>
-#include <tuple>
 
 #include "cli/arguments.h"
+#include "cli/camera_groups.h"
 #include "cli/command.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
@@ -36,7 +33,6 @@
 #include "io/gltf/mesh.h"
 #include "io/splats/formats.h"
 #include "report/summary.h"
-#include "scene/readout.h"
 
 namespace ewa::cli {
 namespace {
@@ -180,71 +176,6 @@ bool is_sog_archive(const fs::path& path) {
     return std::ranges::any_of(zip.entries(), [](const auto& entry) { return entry.name == "meta.json"; });
 }
 
-/// The frames that share a size and intrinsics.
-struct CameraGroup {
-    int frames = 0;
-    Camera camera;
-    bool distorted = false;  // undistorted on loading
-};
-
-std::string_view lens_name(const Distortion& distortion) {
-    switch (distortion.lens) {
-        case Lens::fisheye:
-            return "a fisheye";
-        case Lens::equirectangular:
-            return "360 degrees";
-        case Lens::orthographic:
-            return "parallel rays";
-        default:
-            return "a lens with distortion";
-    }
-}
-
-std::vector<CameraGroup> camera_groups(const Dataset& dataset) {
-    std::map<std::tuple<int, int, double, double, double, double, bool>, CameraGroup> groups;
-    for (const Frame& frame : dataset.frames) {
-        const Camera& c = frame.camera;
-        const bool distorted = !frame.distortion.none();
-        CameraGroup& group = groups[{c.width, c.height, c.fx, c.fy, c.cx, c.cy, distorted}];
-        group.camera = c;
-        group.distorted = distorted;
-        ++group.frames;
-    }
-    std::vector<CameraGroup> list;
-    for (const auto& [key, group] : groups) list.push_back(group);
-    std::stable_sort(list.begin(), list.end(), [](auto& a, auto& b) { return a.frames > b.frames; });
-    return list;
-}
-
-struct Rolling {
-    int frames = 0;
-    std::string order;                 // that of the first one
-    double degrees = 0, distance = 0;  // medians, during a readout; world units
-};
-
-/// Empty if no frame has a readout.
-std::optional<Rolling> rolling_of(const Dataset& dataset) {
-    Rolling rolling;
-    std::vector<double> degrees, distances;
-    for (const Frame& frame : dataset.frames) {
-        if (!frame.camera.readout) continue;
-        const scene::ReadoutMotion motion = scene::readout_motion(frame.camera);
-        if (rolling.frames++ == 0)
-            rolling.order = core::word_for(scene::kReadoutWords, frame.camera.readout->from);
-        degrees.push_back(glm::degrees(glm::length(motion.turn)));
-        distances.push_back(glm::length(motion.shift));
-    }
-    if (rolling.frames == 0) return std::nullopt;
-    const auto median = [](std::vector<double>& values) {
-        const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-        std::nth_element(values.begin(), middle, values.end());
-        return *middle;
-    };
-    rolling.degrees = median(degrees);
-    rolling.distance = median(distances);
-    return rolling;
-}
-
 void print_rolling(const Dataset& dataset) {
     if (const auto rolling = rolling_of(dataset))
         fmt::print("rolling shutter {}, {}; a camera turns by {:.3g} degrees and moves by {:.3g} (medians)\n",
@@ -262,6 +193,7 @@ Json dataset_json(const Dataset& dataset, const Split& split, double extent) {
                            {"fy", group.camera.fy},
                            {"cx", group.camera.cx},
                            {"cy", group.camera.cy},
+                           {"lens", lens_name(group.lens).word},
                            {"distorted", group.distorted}});
     Json json{{"kind", dataset.format},
               {"program", dataset.program},
@@ -290,9 +222,11 @@ void print_cameras(const Dataset& dataset) {
         const Camera& c = groups[i].camera;
         fmt::print("{:<16}{}x{}, fx {:.6g}, fy {:.6g}, cx {:.6g}, cy {:.6g}{} ({})\n",
                    i == 0 ? "cameras" : "", c.width, c.height, c.fx, c.fy, c.cx, c.cy,
-                   groups[i].distorted   ? ", undistorted on loading"
-                   : c.distortion.none() ? std::string()
-                                         : fmt::format(", rendered through {}", lens_name(c.distortion)),
+                   groups[i].lens.none()
+                       ? std::string()
+                       : fmt::format(", {} {}",
+                                     groups[i].distorted ? "undistorted on loading from" : "rendered through",
+                                     lens_name(groups[i].lens).text),
                    core::counted(uint64_t(groups[i].frames), "frame"));
     }
     if (groups.size() > kShown) fmt::print("{:<16}and {} more\n", "", groups.size() - kShown);
@@ -333,7 +267,20 @@ void info_archive(const fs::path& path, int test_every, bool json) {
     if (!archive_has_cameras(path))
         throw InputError(core::one_line(path.string()) +
                          ": an archive without cameras; ewa cameras searches those of the photos in it");
-    info_dataset(unpack_archive(path, folder.path()), path, test_every, json);
+    try {
+        info_dataset(unpack_archive(path, folder.path()), path, test_every, json);
+    } catch (const InputError& error) {
+        // Names the archive and the entry in place of the folder, which is no more when the user reads it.
+        std::string text = error.what();
+        const std::string unpacked = folder.path().string();
+        for (size_t at = 0; (at = text.find(unpacked, at)) != text.npos;) {
+            const bool entry = text.compare(at + unpacked.size(), 1, "/") == 0;
+            const std::string name = core::one_line(path.string()) + (entry ? ": " : "");
+            text.replace(at, unpacked.size() + (entry ? 1 : 0), name);
+            at += name.size();
+        }
+        throw InputError(text);
+    }
 }
 
 void info_mesh(const fs::path& path, int test_every, bool json) {
@@ -430,6 +377,8 @@ int run(const InfoArguments& arguments) {
         info_image(path, format, arguments.json);
     else if (is_mesh_scene(path))
         info_mesh(path, arguments.test_every, arguments.json);
+    else if (const std::string advice = io::export_advice(path); !advice.empty())
+        throw InputError(core::one_line(path.string()) + ": not a dataset: " + advice);
     else
         info_splats(path, nullptr, arguments);
     return 0;

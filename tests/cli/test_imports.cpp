@@ -77,6 +77,29 @@ TEST_F(Imports, ProjectsOfProgramsHaveAdvice) {
     write_file(folder_ / "only/scene.psx", "<document/>");
     expect_failure(run_ewa({"info", folder_ / "only"}), 2, "export cameras.xml there");
     expect_failure(run_ewa({"train", folder_ / "only", "-o", folder_ / "run"}), 2, "a project of Metashape");
+    for (const auto& [name, advice] : {std::pair{"scene.psx", "a project of Metashape"},
+                                       {"a.rcproj", "a project of RealityCapture"},
+                                       {"a.zip", "empty, or not a zip archive"},
+                                       {"a.r3d", "not Record3D's archive"},
+                                       {"a.xml", "not Metashape's file of cameras"},
+                                       {"a.xmp", "not RealityScan's file of a camera"},
+                                       {"a.csv", "not RealityScan's file of cameras"}}) {
+        const std::string file = folder_ / (std::string("only/") + name);
+        write_file(file, "");
+        expect_failure(run_ewa({"info", file}), 2, std::string(name) + " is " + advice);
+    }
+}
+
+/// The folder into which an archive was unpacked is no more.
+TEST_F(Imports, ErrorsInAnArchiveNameItsEntry) {
+    ewa::io::ArchiveWriter writer;
+    for (const std::string& name : files_below(folder_ / "odm"))
+        writer.add("project/" + name,
+                   name.ends_with(".json") ? "[{\"cameras\": {}}]" : read_file(folder_ / "odm/" + name));
+    write_file(folder_ / "bad.zip", writer.finish());
+    const Outcome outcome = run_ewa({"info", folder_ / "bad.zip"});
+    expect_failure(outcome, 2, folder_ / "bad.zip" + ": project/opensfm/reconstruction.json: ");
+    EXPECT_EQ(outcome.err.find("ewa-zip-"), std::string::npos) << outcome.err;
 }
 
 }  // namespace

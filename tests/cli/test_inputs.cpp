@@ -75,6 +75,22 @@ TEST(Inputs, DatasetWithoutAnyImage) {
     expect_failure(run_ewa({"train", folder / "data", "-o", folder / "out", "--init", "random"}), 2, "data");
 }
 
+/// An image that is missing may have no size either.
+TEST(Inputs, InfoCountsEveryMissingImage) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    nlohmann::json top = read_json(folder / "data/transforms.json");
+    for (const char* key : {"w", "h"}) {
+        top.erase(key);
+        for (auto& frame : top["frames"]) frame.erase(key);
+    }
+    write_file(folder / "data/transforms.json", top.dump());
+    for (const char* name : {"data/images/1.png", "data/images/2.png"}) fs::remove(folder / name);
+    const Outcome outcome = run_ewa({"info", folder / "data"});
+    expect_success(outcome);
+    EXPECT_NE(outcome.out.find("images          2 missing"), std::string::npos) << outcome.out;
+}
+
 TEST(Inputs, DatasetWithoutPoints) {
     const Folder folder;
     make_dataset(folder / "data");
