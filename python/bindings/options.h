@@ -56,7 +56,8 @@ const Gaussians& fitted_to(Footprint kernel, const Splats& splats, Gaussians& fi
 #define EWA_LOOK_TYPES                                                                                       \
     "antialias: bool | None = None, kernel: typing.Literal['peak', 'antialias', 'density', 'ewa'] | None = " \
     "None, "                                                                                                 \
-    "integrator: typing.Literal['splat', 'ray', 'march'] = 'splat', samples: int | None = None, "            \
+    "integrator: typing.Literal['splat', 'ray', 'fast-ray', 'march'] = 'splat', "                            \
+    "samples: int | None = None, "                                                                           \
     "points: bool = False, nearest: int | None = None"
 
 }  // namespace ewa::python

@@ -7,7 +7,8 @@
 
 namespace ewa::cli {
 
-inline constexpr const char* kLensForms = "fisheye[:DEGREES], equirect, ortho or opencv:K1[,K2[,P1,P2]]";
+inline constexpr const char* kLensForms =
+    "fisheye[:DEGREES] (180), equirect, ortho or opencv:K1[,K2[,P1,P2]]";
 
 struct LensArgument {
     Distortion lens;

@@ -298,6 +298,7 @@ int run(CLI::App& app, RenderArguments& arguments) {
     for (const char* option :
          {"--frames", "--test-every", "--downscale", "--max-width", "--exposures", "--appearance-of"})
         if (app.count(option) > 0) of_frames = option;
+    if (arguments.lens == "native" || arguments.lens == "undistort") of_frames = "--lens " + arguments.lens;
     if (arguments.mode == "depth" && arguments.draw.integrator == "march")
         throw InputError("--mode depth: the integrator march draws no depth; the others do");
     SplatInput input = splat_input(arguments.splats);

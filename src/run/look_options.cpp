@@ -55,11 +55,16 @@ RunOption background_option() {
 }
 
 RunOption integrator_option() {
+    static const core::Words<Integrator> trained = [] {
+        core::Words<Integrator> words = scene::kIntegratorWords;
+        std::erase_if(words, [](const auto& word) { return word.second == Integrator::march; });
+        return words;
+    }();
     RunOption option = choice<Integrator>(
         "integrator",
         "How a pixel sees the splats. splat: as footprints on the image. fast-ray: each along the "
         "pixel's own ray, through any lens but parallel rays. ray: the same, in the order on that ray",
-        [](RunOptions& o) -> Integrator& { return o.train.render.integrator; }, scene::kIntegratorWords);
+        [](RunOptions& o) -> Integrator& { return o.train.render.integrator; }, trained);
     option.before = "splat";
     return option;
 }

@@ -349,7 +349,9 @@ std::vector<Row> rows() {
              "lens",
              "What becomes of images through other lenses than a pinhole. native: splats are rendered "
              "through the "
-             "lens. undistort: the images are resampled. auto: native for 360 degrees, else undistort",
+             "lens. undistort: the images are resampled. auto: native for 360 degrees and parallel rays, "
+             "else "
+             "undistort",
              [](RunOptions& o) -> LensUse& { return o.lens; }, scene::kLensWords)},
         {"Data", "",
          number<int>(

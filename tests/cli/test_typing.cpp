@@ -71,6 +71,8 @@ TEST_F(Typed, MistypedWordsAreRecognised) {
     expect_failure(run_ewa({"eval", "s.ply", "data", "--integrator", "rya"}), 2,
                    "--integrator: 'rya' is not one of splat, ray, fast-ray, march; did you mean ray?");
     expect_failure(run_ewa({"train", "photos", "--samples", "4"}), 2, "unexpected arguments: --samples 4");
+    expect_failure(run_ewa({"train", "photos", "--integrator", "march"}), 2,
+                   "'march' is not one of splat, ray, fast-ray");
     expect_failure(run_ewa({}), 2, "a subcommand is required: train, render");
 #ifdef EWA_VIEW_PROGRAM
     const Circumstances viewer{.program = EWA_VIEW_PROGRAM};

@@ -147,6 +147,9 @@ TEST_F(Views, WordsThatAreNoLens) {
     for (const char* lens :
          {"fisheye:0", "fisheye:361", "fisheye:x", "equirect:2", "tele", "opencv:1,2,3", ""})
         expect_failure(render({"-o", folder / "x.png", "--lens", lens}), 2, "--lens:");
+    for (const std::string lens : {"native", "undistort"})
+        expect_failure(render({"-o", folder / "x.png", "--lens", lens}), 2,
+                       "--lens " + lens + " needs --cameras DATASET");
 }
 
 TEST_F(Views, TheMarkOfAntialiasingIsUsed) {
