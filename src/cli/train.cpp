@@ -183,11 +183,11 @@ std::unique_ptr<Progress> place_photos(TrainArguments& arguments) {
     return progress;
 }
 
-std::string accuracy_section(const RunScene& scene) {
+std::string accuracy_section(const RunScene& scene, bool quiet) {
     if (!scene.camera.distortion.none() || scene::moves(scene.camera))
         return "<p>Error against run time is measured for pinholes at rest only.</p>";
     return report::work_precision_html(
-        rendering_diagram(scene.device, scene.gaussians, scene.camera, scene.options, false));
+        rendering_diagram(scene.device, scene.gaussians, scene.camera, scene.options, quiet));
 }
 
 /// What the process of another rank than 0 does: it trains and says nothing.
@@ -209,7 +209,10 @@ int run(CLI::App& app, TrainArguments& arguments) {
     if (fs::is_directory(options.init)) options.init = splat_input(options.init).file.string();
     Footprint& kernel = options.train.render.kernel;
     kernel = settled_kernel(kernel, arguments.antialias);
-    if (arguments.accuracy) options.report_section = accuracy_section;
+    if (arguments.accuracy)
+        options.report_section = [quiet = arguments.output.quiet](const RunScene& scene) {
+            return accuracy_section(scene, quiet);
+        };
     check_options(options);
     if (options.ranks->size() > 1 && arguments.makes_dataset)
         throw InputError(

@@ -274,6 +274,12 @@ TEST_F(RunFolders, InriasLayoutIsWrittenWhereAskedFor) {
     EXPECT_FALSE(fs::exists(folder / "o/inria/point_cloud/iteration_2"));
 }
 
+TEST_F(RunFolders, QuietIsQuietAboutAccuracyToo) {
+    const Outcome outcome = train({"-o", "o", "--steps", "1", "--accuracy"});
+    expect_success(outcome);
+    EXPECT_EQ(outcome.out, "");
+}
+
 TEST_F(RunFolders, ATildeIsTheHomeFolder) {
     Circumstances at_home;
     at_home.environment = {{"HOME", folder / "home"}};
