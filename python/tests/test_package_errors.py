@@ -156,6 +156,7 @@ COMMAND_LINE = {
     "accuracy",
     "force",
     "frames",
+    "inria",
     "keep",
     "lpips-weights",
     "metrics",

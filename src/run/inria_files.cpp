@@ -3,6 +3,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
@@ -13,6 +14,7 @@
 #include "core/json.h"
 #include "io/datasets/image_records.h"
 #include "run/run_files.h"
+#include "scene/lens.h"
 
 namespace ewa::train {
 namespace {
@@ -48,9 +50,19 @@ std::string arguments_text(const RunInput& input, const fs::path& model, int sh_
         absolute(input.dataset.root), r == 1 && g == 1 && b == 1 ? "True" : "False");
 }
 
+/// The camera without its lens. A lens that no pinhole comes near becomes one of 90 degrees.
+Camera without_lens(Camera camera) {
+    if (!scene::has_pinhole(camera.distortion.lens)) {
+        if (camera.distortion.lens == Lens::equirectangular)
+            camera.width = camera.height = std::max(1, camera.width / 4);
+        camera.fx = camera.fy = 0.5 * std::max(camera.width, camera.height);
+    }
+    return camera;
+}
+
 /// Position and rotation are camera to world, in OpenCV's axes.
 Json camera_entry(const Frame& frame, size_t id) {
-    const Camera& camera = frame.camera;
+    const Camera camera = without_lens(frame.camera);
     const glm::dvec3 position = camera.position();
     Json rotation = Json::array();
     for (int row = 0; row < 3; ++row)

@@ -23,6 +23,7 @@
 #include "run/pose_options.h"
 #include "run/region_option.h"
 #include "scene/dense_points.h"
+#include "scene/lens.h"
 #include "scene/names.h"
 #include "shared/constants.h"
 #include "train/appearance_choice.h"
@@ -163,6 +164,18 @@ void settle_depths(RunInput& input) {
         input.notes.push_back(core::counted(maps, "depth map") + " not used; --loss depth=2 compares them");
 }
 
+/// What the user should know of the cameras in INRIA's layout.
+std::optional<std::string> inria_remark(const Dataset& dataset) {
+    for (const Frame& frame : dataset.frames)
+        if (!frame.camera.distortion.none())
+            return std::string("--inria: cameras.json has pinholes alone, so ") +
+                   (scene::has_pinhole(frame.camera.distortion.lens)
+                        ? "these have the focal lengths of their lenses; --lens undistort trains on such "
+                          "images"
+                        : "these are views of 90 degrees from the same places");
+    return std::nullopt;
+}
+
 void add_remarks(RunInput& input) {
     settle_depths(input);
     const Dataset& dataset = input.dataset;
@@ -195,6 +208,8 @@ void add_remarks(RunInput& input) {
     if (input.options.train.render.kernel == Footprint::density)
         input.notes.emplace_back(
             "opacities in splats.ply are fitted to 3DGS's kernel, so that other viewers show about the same");
+    if (const auto remark = input.options.inria ? inria_remark(dataset) : std::nullopt)
+        input.remarks.push_back(*remark);
     if (const auto remark = too_short_remark(input.options.train)) input.remarks.push_back(*remark);
 }
 

@@ -8,6 +8,7 @@
 
 #include "cli/expect.h"
 #include "cli/faulty.h"
+#include "ewa/image.h"
 
 namespace {
 
@@ -272,6 +273,33 @@ TEST_F(RunFolders, InriasLayoutIsWrittenWhereAskedFor) {
     EXPECT_TRUE(read_file(folder / "o/inria/input.ply").starts_with("ply\n"));
     expect_success(train({"-o", "o", "--steps", "1", "--inria", "--force"}));
     EXPECT_FALSE(fs::exists(folder / "o/inria/point_cloud/iteration_2"));
+}
+
+/// INRIA's cameras.json has pinholes alone.
+TEST_F(RunFolders, InriasLayoutSaysWhatItCannotSayOfLenses) {
+    const auto trained = [&](const std::string& model, const std::string& remark) {
+        nlohmann::json top = read_json(folder / "data/transforms.json");
+        top.update({{"camera_model", model}, {"h", 24}, {"k1", 0.01}});
+        for (auto& frame : top["frames"])
+            ewa::save_image((folder / "data") + "/" + frame["file_path"].get<std::string>(),
+                            ewa::Image(48, 24, 3));
+        write_file(folder / "data/transforms.json", top.dump());
+        const Outcome outcome =
+            ewa_in(folder / ".", {"train", "data", "--init", "s.ply", "-o", "o", "--steps", "1", "--inria",
+                                  "--lens", "native", "--force"});
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        EXPECT_NE((outcome.out + outcome.err).find("--inria: cameras.json has pinholes alone, so " + remark),
+                  std::string::npos)
+            << outcome.out << outcome.err;
+        return read_json(folder / "o/inria/cameras.json")[0];
+    };
+    const auto fisheye = trained("OPENCV_FISHEYE", "these have the focal lengths of their lenses");
+    EXPECT_EQ(fisheye["width"], 48);
+    EXPECT_EQ(fisheye["fx"], 50);
+    const auto around = trained("EQUIRECTANGULAR", "these are views of 90 degrees");
+    EXPECT_EQ(around["width"], 12);
+    EXPECT_EQ(around["height"], 12);
+    EXPECT_EQ(around["fx"], 6);
 }
 
 TEST_F(RunFolders, QuietIsQuietAboutAccuracyToo) {
