@@ -4,6 +4,9 @@
 #include <unistd.h>
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
+#include <cmath>
+#include <glm/mat3x3.hpp>
 #include <memory>
 #include <numbers>
 #include <optional>
@@ -61,12 +64,38 @@ std::vector<Camera> own_cameras(const Gaussians& gaussians) {
     return cameras;
 }
 
+/// The six sides of a cube about the camera of a 360° image, with its pixels per degree in their middles. They overlap: a side sees
+/// nothing between its last pixel's centre and its border.
+void add_cube(const Camera& around, std::vector<Camera>& cameras) {
+    constexpr int kOverlap = 2;  // px
+    Camera side;
+    const int length = std::max(1, int(std::lround(2 * around.fx)));
+    side.width = side.height = length + 2 * kOverlap;
+    side.fx = side.fy = 0.5 * length;
+    side.cx = side.cy = 0.5 * side.width;
+    constexpr double kTurns[] = {0, 0.25, 0.5, 0.75};
+    const auto add = [&](double turn, double nod) {
+        const double a = 2 * std::numbers::pi * turn, b = 2 * std::numbers::pi * nod;
+        const glm::dmat3 about_y(std::cos(a), 0, std::sin(a), 0, 1, 0, -std::sin(a), 0, std::cos(a));
+        const glm::dmat3 about_x(1, 0, 0, 0, std::cos(b), -std::sin(b), 0, std::sin(b), std::cos(b));
+        side.rotation = about_x * about_y * around.rotation;
+        side.translation = about_x * about_y * around.translation;
+        cameras.push_back(side);
+    };
+    for (const double turn : kTurns) add(turn, 0);
+    for (const double nod : {0.25, 0.75}) add(0, nod);
+}
+
 std::vector<Camera> cameras_of(const Dataset& dataset) {
     std::vector<Camera> cameras;
     for (const Frame& frame : dataset.frames) {
+        if (frame.camera.distortion.lens == Lens::equirectangular) {
+            add_cube(frame.camera, cameras);
+            continue;
+        }
         if (!frame.camera.distortion.none())
-            throw InputError("a mesh needs pinholes, and " + core::one_line(frame.name) +
-                             " cannot be undistorted to one");
+            throw InputError("a mesh needs pinholes or 360 degree images, and " + core::one_line(frame.name) +
+                             " has parallel rays; name other cameras with --cameras");
         if (scene::moves(frame.camera))
             throw InputError("a mesh needs cameras at rest, and " + core::one_line(frame.name) +
                              " has a rolling shutter");
@@ -82,7 +111,7 @@ std::optional<Dataset> dataset_of_mesh(const MeshArguments& arguments, const std
     if (path.empty()) return std::nullopt;
     Dataset dataset = load_cameras_as_trained(
         dataset_input(path),
-        {.downscale = arguments.downscale, .max_width = arguments.max_width, .lens = LensUse::undistort});
+        {.downscale = arguments.downscale, .max_width = arguments.max_width, .lens = LensUse::automatic});
     const fs::path refined = arguments.cameras.empty() ? refined_cameras_of(*run) : fs::path();
     if (!refined.empty()) io::use_refined_cameras(dataset, refined);
     return dataset;

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "cli/expect.h"
+#include "ewa/image.h"
 #include "ewa/splat_files.h"
 
 namespace {
@@ -109,6 +110,29 @@ TEST(Mesh, OfASplatFileAlone) {
         run_ewa({"mesh", folder / "shell.ply", "-o", folder / "m.glb", "--voxel", "0.05"});
     expect_success(outcome);
     EXPECT_NE(outcome.out.find("in 1 part, voxels of 0.05, watertight"), std::string::npos) << outcome.out;
+}
+
+/// From inside, the six sides of one 360° image see the whole shell.
+TEST(Mesh, OfA360Image) {
+    const Prepared folder;
+    std::filesystem::create_directories(folder / "around/images");
+    ewa::save_image(folder / "around/images/a.png", ewa::Image(128, 64, 3));
+    const auto dataset = [&](const std::string& model) {
+        nlohmann::json top = {{"camera_model", model}, {"fl_x", 20}};
+        top["frames"] = {{{"file_path", "images/a.png"},
+                          {"transform_matrix", {{1, 0, 0, 0.1}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}}}};
+        write_file(folder / "around/transforms.json", top.dump());
+    };
+    dataset("EQUIRECTANGULAR");
+    const auto made = [&] {
+        return run_ewa({"mesh", folder / "shell.ply", "-o", folder / "m.ply", "--cameras", folder / "around",
+                        "--voxel", "0.05"});
+    };
+    const Outcome outcome = made();
+    expect_success(outcome);
+    EXPECT_NE(outcome.out.find("in 1 part, voxels of 0.05, watertight"), std::string::npos) << outcome.out;
+    dataset("ORTHOGRAPHIC");
+    expect_failure(made(), 2, "a.png has parallel rays; name other cameras with --cameras");
 }
 
 TEST(Mesh, ErrorsAreOneLine) {
