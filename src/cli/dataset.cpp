@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 struct DatasetArguments {
     fs::path scene, output;
-    std::string size = "256x256", exposure = "auto", lens, shutter;
+    std::string size, exposure = "auto", lens, shutter;
     int views = -1;
     SyntheticOptions options;
     DeviceOptions device;
@@ -52,15 +52,18 @@ RollingShutter shutter_of(const std::string& text) {
 int run(const DatasetArguments& arguments) {
     io::check_not_inside_dataset("-o", arguments.output);
     SyntheticOptions options = arguments.options;
-    const core::PixelSize size = size_of(arguments.size);
-    options.width = size.width;
-    options.height = size.height;
     if (arguments.views >= 0) options.views = arguments.views;
     if (!arguments.lens.empty()) {
         const LensArgument lens = lens_of(arguments.lens);
         options.lens = lens.lens;
         options.fisheye_degrees = lens.fisheye_degrees;
     }
+    const bool around = options.lens.lens == Lens::equirectangular;
+    const core::PixelSize size = size_of(!arguments.size.empty() ? arguments.size
+                                         : around                ? "256x128"
+                                                                 : "256x256");
+    options.width = size.width;
+    options.height = size.height;
     if (!arguments.shutter.empty()) options.rolling_shutter = shutter_of(arguments.shutter);
     if (arguments.varied) options.appearance = AppearanceModel::ppisp;
     if (arguments.exposure != "auto") {
@@ -91,9 +94,8 @@ Action add_dataset(CLI::App& app) {
                    "[those of the file if it has 8 or more, else 48]")
         ->transform(in_range(0, 100000))
         ->type_name("N");
-    app.add_option("--size", arguments->size, "Width and height in pixels")
-        ->type_name("WxH")
-        ->capture_default_str();
+    app.add_option("--size", arguments->size, "Width and height in pixels [256x256, for equirect 256x128]")
+        ->type_name("WxH");
     app.add_option("--samples", options.samples, "Paths per pixel")
         ->transform(in_range(1, 65536))
         ->type_name("N")

@@ -54,6 +54,8 @@ void check(const SyntheticOptions& o) {
     if (!scene::is_native(o.lens)) throw InputError("lens: splats cannot be rendered through it");
     if (!(o.fisheye_degrees > 0 && o.fisheye_degrees <= 360))
         throw InputError("lens: the angle is not in 0 .. 360");
+    if (o.lens.lens == Lens::equirectangular && o.width != 2 * o.height)
+        throw InputError("lens: a 360 degree image is twice as wide as high");
     if (o.rolling_shutter && !(std::abs(o.rolling_shutter->degrees) <= 90))
         throw InputError("rolling shutter: a readout turns by at most 90 degrees");
     if (o.rolling_shutter && !(o.rolling_shutter->percent >= 0 && o.rolling_shutter->percent <= 100))
@@ -337,17 +339,20 @@ class DatasetJob {
         save_image(folder_ / job_.depth_name(i), tracer_.seen(cameras_[i]).depth);
     }
 
-    /// Points from equally many random pixels of each view. Pixels without a surface give none.
+    /// Equally many points from random pixels of each view. A pixel without a surface gives none, and another is tried: a wide lens
+    /// shows much sky. A view that shows hardly anything gives less.
     PointCloud points() const {
         PointCloud cloud;
         if (options_.points == 0) return cloud;
+        constexpr uint32_t kTries = 64;  // for a point
         const auto each = uint32_t((size_t(options_.points) + cameras_.size() - 1) / cameras_.size());
         for (size_t view = 0; view < cameras_.size(); ++view) {
             const Camera& camera = cameras_[view];
             const double limit = scene::lens_limit(camera);
             const Image image = load_image(folder_ / job_.image_name(view)),
                         depth = load_image(folder_ / job_.depth_name(view));
-            for (uint32_t i = 0; i < each && cloud.positions.size() < size_t(options_.points); ++i) {
+            const size_t enough = std::min(cloud.positions.size() + each, size_t(options_.points));
+            for (uint32_t i = 0; i < kTries * each && cloud.positions.size() < enough; ++i) {
                 const auto u = core::uniform4({i, uint32_t(view), uint32_t(options_.seed), 0x706f696eu});
                 const int x = int(u[0] * camera.width), y = int(u[1] * camera.height);
                 const double z = double(depth.at(x, y)[0]);

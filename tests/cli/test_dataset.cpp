@@ -133,10 +133,26 @@ TEST(Dataset, IsRenderedThroughLenses) {
         EXPECT_EQ(camera.distortion.lens, lens);
         EXPECT_FALSE(camera.distortion.none());
         EXPECT_EQ(camera.position(), pinholes.frames[0].camera.position());
+        EXPECT_GT(dataset.points.positions.size(), 1900u) << "of the 2,000 that were asked for";
         expect_points_on_surfaces(dataset.points, pinholes, folder / "pinhole", 8);
     }
     const Outcome info = run_ewa({"info", folder / "equirect"});
     EXPECT_NE(info.out.find("rendered through 360 degrees"), std::string::npos) << info.out;
+    const Outcome fisheye = run_ewa({"info", folder / "fisheye:190"});
+    EXPECT_NE(fisheye.out.find("undistorted on loading from a fisheye"), std::string::npos) << fisheye.out;
+    for (const auto& [name, lens] : {std::pair{"pinhole", "pinhole"},
+                                     {"fisheye:190", "fisheye"},
+                                     {"equirect", "equirectangular"},
+                                     {"ortho", "orthographic"},
+                                     {"opencv:-0.1,0.02,0.01,-0.01", "opencv"}}) {
+        const auto told = nlohmann::json::parse(run_ewa({"info", folder / name, "--json"}).out);
+        EXPECT_EQ(told["cameras"][0]["lens"], lens);
+    }
+    const Outcome square = run_ewa({"dataset", kScenes + "tea_table.gltf", "-o", folder / "no", "--lens",
+                                    "equirect", "--size", "96x96"});
+    EXPECT_EQ(square.status, 2);
+    EXPECT_NE(square.err.find("a 360 degree image is twice as wide as high"), std::string::npos)
+        << square.err;
     for (const char* wrong : {"fishey", "fisheye:x", "opencv", "opencv:1,2,3", "equirect:2", "fisheye:400"})
         EXPECT_EQ(
             run_ewa({"dataset", kScenes + "tea_table.gltf", "-o", folder / "no", "--lens", wrong}).status, 2)
