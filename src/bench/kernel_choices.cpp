@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bench/kernel_choices.h"
 
-#include <charconv>
-#include <map>
 #include <sstream>
 
+#include "core/typing.h"
+#include "core/words.h"
 #include "ewa/error.h"
 
 namespace ewa::bench {
@@ -14,22 +14,17 @@ namespace {
     throw InputError("--kernels: '" + choice + "' is not " + expected);
 }
 
-uint32_t number_in(const std::string& choice, const std::string& text, uint32_t most) {
-    uint32_t value = 0;
-    const char* end = text.data() + text.size();
-    const auto [at, error] = std::from_chars(text.data(), end, value);
-    if (error != std::errc() || at != end || value == 0 || value > most)
-        refuse(choice, "a number from 1 to " + std::to_string(most));
-    return value;
+uint32_t number_in(const std::string& choice, std::string text, uint32_t most) {
+    const std::string fault = core::settle_number<uint32_t>(text, 1, most);
+    if (!fault.empty()) throw InputError("--kernels: " + choice + ": " + fault);
+    return *core::parse_integer<uint32_t>(text);
 }
 
-uint32_t one_of(const std::string& choice, const std::string& text,
-                const std::map<std::string, uint32_t>& values) {
-    const auto found = values.find(text);
-    if (found != values.end()) return found->second;
-    std::string names;
-    for (const auto& value : values) names += (names.empty() ? "" : ", ") + value.first;
-    refuse(choice, "one of " + names);
+template <class T>
+T one_of(const std::string& choice, std::string text, const core::Words<T>& words) {
+    const std::string fault = core::settle_word(text, core::words_of(words));
+    if (!fault.empty()) throw InputError("--kernels: " + choice + ": " + fault);
+    return *core::find_value(words, text);
 }
 
 void set_tile(passes::KernelConfig& config, const std::string& choice, const std::string& value) {
@@ -52,12 +47,12 @@ void set_choice(passes::KernelConfig& config, const std::string& choice, const g
     if (name == "tile") {
         set_tile(config, choice, value);
     } else if (name == "broadcast") {
-        config.broadcast = one_of(choice, value,
-                                  {{"shuffles", shared::BROADCAST_SHUFFLES},
-                                   {"shared", shared::BROADCAST_SHARED},
-                                   {"uniform", shared::BROADCAST_UNIFORM}});
+        config.broadcast = one_of<uint32_t>(choice, value,
+                                            {{"shuffles", shared::BROADCAST_SHUFFLES},
+                                             {"shared", shared::BROADCAST_SHARED},
+                                             {"uniform", shared::BROADCAST_UNIFORM}});
     } else if (name == "sort") {
-        config.ranked_sort = one_of(choice, value, {{"ranked", 1}, {"counted", 0}}) == 1;
+        config.ranked_sort = one_of<bool>(choice, value, {{"ranked", true}, {"counted", false}});
         if (config.ranked_sort && !passes::can_rank(limits)) refuse(choice, "what this device can do");
     } else if (name == "scan") {
         config.scan_turns = number_in(choice, value, 1024);

@@ -32,6 +32,15 @@ std::string chain_case_name(const testing::TestParamInfo<ChainCase>& info) {
            std::to_string(int(c.kernel)) + "_seed" + std::to_string(c.seed);
 }
 
+void expect_same_gradient(const Gaussians& actual, const reference::Values& expected) {
+    GradientTolerance tolerance;
+    tolerance.cosine = 1e-6;
+    tolerance.norm = 2e-4;
+    tolerance.element_relative = 1e-2;
+    tolerance.element_absolute = 1e-4;
+    EXPECT_TRUE(splat_gradients_agree(actual, expected, tolerance));
+}
+
 class Chain : public testing::TestWithParam<ChainCase>, protected ChainScene {
   protected:
     void SetUp() override {
@@ -60,12 +69,7 @@ TEST_P(Chain, GradientMatchesTheReference) {
     EXPECT_NEAR(actual.loss, expected.loss, 1e-6);
     EXPECT_NEAR(actual.l1, expected.l1, 1e-6);
     EXPECT_NEAR(actual.ssim, expected.ssim, 1e-6);
-    GradientTolerance tolerance;
-    tolerance.cosine = 1e-6;
-    tolerance.norm = 2e-4;
-    tolerance.element_relative = 1e-2;
-    tolerance.element_absolute = 1e-4;
-    EXPECT_TRUE(splat_gradients_agree(actual.gradient, expected.gradient, tolerance));
+    expect_same_gradient(actual.gradient, expected.gradient);
 }
 
 TEST_P(Chain, GradientOfDepthsMatchesTheReference) {
@@ -83,12 +87,7 @@ TEST_P(Chain, GradientOfDepthsMatchesTheReference) {
         EXPECT_LE(glm::length(is - want), 1e-4 * glm::length(want) + 1e-7);
     }
     EXPECT_NEAR(actual.loss, expected.loss, 1e-6);
-    GradientTolerance tolerance;
-    tolerance.cosine = 1e-6;
-    tolerance.norm = 2e-4;
-    tolerance.element_relative = 1e-2;
-    tolerance.element_absolute = 1e-4;
-    EXPECT_TRUE(splat_gradients_agree(actual.gradient, expected.gradient, tolerance));
+    expect_same_gradient(actual.gradient, expected.gradient);
 }
 
 std::vector<ChainCase> cases() {
