@@ -154,6 +154,7 @@ def test_options_are_spelled_as_arguments(text, expected):
 # Options in errors that only runs of the command line meet.
 COMMAND_LINE = {
     "accuracy",
+    "depth",
     "force",
     "frames",
     "inria",
@@ -200,7 +201,7 @@ def test_every_option_in_an_error_of_libewa_is_an_argument():
         option: place
         for option, place in found.items()
         if option not in COMMAND_LINE
-        and option not in ("ratio", "width")  # of style sheets
+        and option not in ("ratio", "width", "flatten")  # of style sheets and of usdcat
         and spelled(f"--{option}").removesuffix("=") not in known
     }
     assert not strangers
