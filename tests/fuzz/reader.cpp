@@ -192,7 +192,7 @@ void check_error(const std::string& text) {
         named = named || std::isdigit(static_cast<unsigned char>(text[at + 5]));
     for (const char* place : {"\"", "'", "`", "properties f_rest_", "attribute ", "accessor", "node ",
                               "mesh ", "buffer ", "image ", "material ", "texture ", "the JSON ", "claims ",
-                              "view ", "begins ", "is empty", "it is a"})
+                              "view ", "line ", "begins ", "is empty", "it is a"})
         named = named || text.find(place) != std::string::npos;
     EWA_REQUIRE(named);
     EWA_REQUIRE(text.find('\n') == std::string::npos && text.size() < 2000);
