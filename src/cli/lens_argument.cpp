@@ -11,6 +11,7 @@
 namespace ewa::cli {
 
 LensArgument lens_of(const std::string& text) {
+    constexpr size_t kShown = 60;  // bytes of the text in an error
     const size_t colon = text.find(':');
     const std::string name = text.substr(0, colon);
     std::vector<double> numbers;
@@ -18,14 +19,15 @@ LensArgument lens_of(const std::string& text) {
     for (std::string word; std::getline(list, word, ',');) {
         const auto number = core::parse_number(word);
         if (!number || !std::isfinite(*number))
-            throw InputError("--lens: '" + word + "' is not a number; expected " + kLensForms);
+            throw InputError("--lens: '" + word.substr(0, kShown) + "' is not a number; expected " +
+                             kLensForms);
         numbers.push_back(*number);
     }
     const size_t most = name == "fisheye" ? 1 : name == "opencv" ? 4 : 0;
     const bool good = name == "fisheye" || name == "equirect" || name == "ortho" ||
                       (name == "opencv" && !numbers.empty() && numbers.size() != 3);
     if (!good || numbers.size() > most)
-        throw InputError("--lens: '" + text + "' is no lens; expected " + kLensForms);
+        throw InputError("--lens: '" + text.substr(0, kShown) + "' is no lens; expected " + kLensForms);
     LensArgument out;
     if (name == "fisheye") {
         out.lens.lens = Lens::fisheye;

@@ -16,6 +16,7 @@
 #include "ewa/error.h"
 #include "io/datasets/view_list.h"
 #include "scene/camera.h"
+#include "scene/intrinsics.h"
 #include "scene/native_lens.h"
 
 namespace ewa::cli {
@@ -152,8 +153,12 @@ void check_views(const ViewsArguments& arguments) {
 
 Camera through(const LensArgument& lens, const Camera& camera, const glm::dvec3& up,
                const glm::dvec3& middle) {
-    if (lens.lens.lens != Lens::equirectangular)
-        return scene::through_lens(camera, lens.lens, lens.fisheye_degrees, middle);
+    if (lens.lens.lens != Lens::equirectangular) {
+        const Camera seen = scene::through_lens(camera, lens.lens, lens.fisheye_degrees, middle);
+        const std::string fault = scene::intrinsics_fault(seen, lens.lens);
+        if (!fault.empty()) throw InputError("--lens: " + fault);
+        return seen;
+    }
     // A look straight down or up has its heading at the top or bottom of the image.
     const glm::dmat3 axes = glm::transpose(camera.rotation);
     glm::dvec3 ahead = axes[2] - glm::dot(axes[2], up) * up;

@@ -26,6 +26,7 @@
 #include "pathtracer/virtual_camera.h"
 #include "scene/camera.h"
 #include "scene/frustum.h"
+#include "scene/intrinsics.h"
 #include "scene/native_lens.h"
 #include "scene/readout.h"
 #include "shared/constants.h"
@@ -105,8 +106,11 @@ std::vector<Camera> cameras_for(const scene::MeshScene& scene, const SyntheticOp
     std::vector<Camera> cameras = pinholes_for(scene, o, name);
     const glm::dvec3 middle = scene::bounds_of(scene).center();
     if (!o.lens.none())
-        for (Camera& camera : cameras)
+        for (Camera& camera : cameras) {
             camera = scene::through_lens(camera, o.lens, o.fisheye_degrees, middle);
+            const std::string fault = scene::intrinsics_fault(camera, o.lens);
+            if (!fault.empty()) throw InputError("lens: " + fault);
+        }
     if (o.rolling_shutter) add_readouts(cameras, *o.rolling_shutter, o.seed, middle);
     return cameras;
 }

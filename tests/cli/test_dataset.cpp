@@ -153,7 +153,8 @@ TEST(Dataset, IsRenderedThroughLenses) {
     EXPECT_EQ(square.status, 2);
     EXPECT_NE(square.err.find("a 360 degree image is twice as wide as high"), std::string::npos)
         << square.err;
-    for (const char* wrong : {"fishey", "fisheye:x", "opencv", "opencv:1,2,3", "equirect:2", "fisheye:400"})
+    for (const char* wrong : {"fishey", "fisheye:x", "opencv", "opencv:1,2,3", "equirect:2", "fisheye:400",
+                              "fisheye:1e-30", "opencv:1e300"})
         EXPECT_EQ(
             run_ewa({"dataset", kScenes + "tea_table.gltf", "-o", folder / "no", "--lens", wrong}).status, 2)
             << wrong;

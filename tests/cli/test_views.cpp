@@ -147,6 +147,11 @@ TEST_F(Views, WordsThatAreNoLens) {
     for (const char* lens :
          {"fisheye:0", "fisheye:361", "fisheye:x", "equirect:2", "tele", "opencv:1,2,3", ""})
         expect_failure(render({"-o", folder / "x.png", "--lens", lens}), 2, "--lens:");
+    for (const char* lens : {"fisheye:1e-30", "opencv:1e300"})
+        expect_failure(render({"-o", folder / "x.png", "--lens", lens}), 2, "--lens: ");
+    const Outcome at_length = render({"-o", folder / "x.png", "--lens", std::string(3000, 'x')});
+    expect_failure(at_length, 2, "--lens: 'xxx");
+    EXPECT_LT(at_length.err.size(), 300u);
     for (const std::string lens : {"native", "undistort"})
         expect_failure(render({"-o", folder / "x.png", "--lens", lens}), 2,
                        "--lens " + lens + " needs --cameras DATASET");
