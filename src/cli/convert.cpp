@@ -10,6 +10,7 @@
 
 #include "cli/arguments.h"
 #include "cli/command.h"
+#include "cli/convert_clean.h"
 #include "cli/convert_edits.h"
 #include "cli/convert_page.h"
 #include "cli/orbit_check.h"
@@ -38,6 +39,7 @@ struct ConvertArguments {
     std::vector<std::string> transform;
     std::string crop, sort;
     Edits edits;
+    Cleaning cleaning;
     int spz_version = 3;
     fs::path json;
     bool bake_sky = false, check = false, allow_empty = false, quiet = false;
@@ -47,8 +49,8 @@ struct ConvertArguments {
 struct Work {
     Gaussians gaussians;
     SaveOptions save;
-    std::vector<std::string> lost;  // notes on what the output lacks
-    Json inputs = Json::array();
+    std::vector<std::string> lost;                          // notes on what the output lacks
+    Json inputs = Json::array(), removed = Json::object();  // removed: splats by option
 };
 
 std::string described(const fs::path& path, std::string_view format, const std::string& variant,
@@ -134,7 +136,8 @@ uint64_t bytes_of(const std::vector<fs::path>& files) {
 /// Throws if an output is another file of this command, or cannot be written.
 void check_files(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
-    std::vector<NamedFile> inputs, outputs = {{"OUT", out}, {"--json", arguments.json}};
+    std::vector<NamedFile> inputs,
+        outputs = {{"OUT", out}, {"--json", arguments.json}, {"--dry-run", arguments.cleaning.picture}};
     for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
         inputs.push_back({"an input", arguments.files[i]});
         for (const fs::path& values : values_of(arguments.files[i]))
@@ -148,7 +151,7 @@ void check_files(const ConvertArguments& arguments) {
     if (format == SplatFormat::sog_meta) beside = io::sog_value_files(out);
     for (const fs::path& file : beside.written) outputs.push_back({"the file of OUT's values", file});
     for (const fs::path& file : beside.removed) outputs.push_back({"the file of OUT's older values", file});
-    if (outputs.size() > 2) check_command_outputs(outputs, inputs);
+    if (outputs.size() > 3) check_command_outputs(outputs, inputs);
 }
 
 /// Throws unless splats are left to write, or --allow-empty is given. read: the number of splats in the inputs.
@@ -173,6 +176,28 @@ Json output_json(const ConvertArguments& arguments, const Gaussians& gaussians) 
     return json;
 }
 
+/// Removes what the options name and says how much. Whether that was all, for --dry-run. in_place: the splats are where the run has
+/// them.
+bool clean_scene(const ConvertArguments& arguments, Work& work, bool in_place) {
+    const std::optional<live::Run> run = in_place ? arguments.run : std::nullopt;
+    const bool dry = !arguments.cleaning.picture.empty();
+    const Gaussians before = dry ? work.gaussians : Gaussians();
+    const size_t all = work.gaussians.size();
+    for (const Removed& removed : clean(work.gaussians, arguments.cleaning, run)) {
+        work.lost.push_back(fmt::format("{} {} {} of {}", removed.option, dry ? "would remove" : "removed",
+                                        removed.splats, core::counted(all, "splat")));
+        work.removed[removed.option] = work.removed.value(removed.option, size_t(0)) + removed.splats;
+    }
+    if (!dry) return false;
+    draw_removed(arguments.cleaning.picture, before, work.gaussians, run);
+    if (!arguments.quiet)
+        for (const std::string& remark : work.lost) fmt::print("  {}\n", core::one_line(remark));
+    if (!arguments.json.empty())
+        write_json(arguments.json,
+                   {{"inputs", work.inputs}, {"removed", work.removed}, {"remarks", work.lost}});
+    return true;
+}
+
 int run(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
     const bool page = names_page(out);
@@ -184,9 +209,16 @@ int run(const ConvertArguments& arguments) {
     edits.transform = parse_transform(arguments.transform);
     edits.crop = parse_crop(arguments.crop);
     edits.morton = arguments.sort == "morton";
+    if (!arguments.cleaning.picture.empty() && !arguments.cleaning.any())
+        throw InputError(
+            "--dry-run: no option removes splats; see --remove-floaters and others of ewa convert --help");
     check_files(arguments);
     Work work = read_all(arguments);
     const size_t read = work.gaussians.size();
+    const bool in_place = edits.transform == glm::dmat4(1);
+    place_splats(work.gaussians, edits.transform, "--transform");
+    edits.transform = glm::dmat4(1);
+    if (arguments.cleaning.any() && clean_scene(arguments, work, in_place)) return 0;
     if (auto remark = apply_edits(work.gaussians, edits, format)) work.lost.push_back(std::move(*remark));
 
     const size_t count = work.gaussians.size();
@@ -197,7 +229,6 @@ int run(const ConvertArguments& arguments) {
                       arguments.quiet || count < kShowFrom);
     work.save.spz_version = arguments.spz_version;
     work.save.progress = [&](uint64_t done, uint64_t) { progress.update(static_cast<int>(done)); };
-    const bool in_place = edits.transform == glm::dmat4(1);
     const std::vector<std::string> quantised =
         page ? write_page(out, work.gaussians, work.save, in_place ? arguments.run : std::nullopt)
              : save_splats(out, work.gaussians, work.save);
@@ -215,6 +246,7 @@ int run(const ConvertArguments& arguments) {
     }
     Json json = {
         {"inputs", work.inputs}, {"output", output_json(arguments, work.gaussians)}, {"remarks", remarks}};
+    if (!work.removed.empty()) json["removed"] = work.removed;
     if (arguments.check) json["check"] = check(arguments, work);
     if (!arguments.json.empty()) write_json(arguments.json, json);
     return 0;
@@ -264,6 +296,7 @@ Action add_convert(CLI::App& app) {
     app.add_option("-o,--output", arguments->output, "The output; all FILES are then inputs")
         ->type_name("OUT");
     add_editing_options(app, *arguments);
+    add_cleaning_options(app, arguments->cleaning);
     app.add_option("--spz-version", arguments->spz_version,
                    "SPZ version: 3 (every reader supports it) or 4 (newer, smaller files)")
         ->transform(one_of({"3", "4"}))

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/convert_page.h"
 
-#include "cli/arguments.h"
 #include "cli/run_inputs.h"
 #include "core/atomic_file.h"
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
-#include "io/datasets/refined_cameras.h"
 #include "report/scene_page.h"
 #include "scene/framing.h"
 
@@ -21,10 +19,7 @@ constexpr int kStartWidth = 1280, kStartHeight = 720;
 /// The cameras of the run's dataset, in the order of their names. Empty, with a remark, where they cannot be read.
 Dataset cameras_of(const live::Run& run, std::vector<std::string>& remarks) {
     try {
-        Dataset dataset = load_cameras_as_trained(dataset_of(run), {});
-        const fs::path refined = refined_cameras_of(run);
-        if (!refined.empty()) io::use_refined_cameras(dataset, refined);
-        return dataset;
+        return cameras_of_run(run);
     } catch (const InputError& error) {
         remarks.push_back("the page has no views of photos: " + core::one_line(error.what()));
         return {};

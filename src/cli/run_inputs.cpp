@@ -171,4 +171,11 @@ std::optional<live::Run> resolve_views(CLI::App& app, ViewArguments& arguments) 
     return std::move(input.run);
 }
 
+Dataset cameras_of_run(const live::Run& run) {
+    Dataset dataset = load_cameras_as_trained(dataset_of(run), {});
+    const std::filesystem::path refined = refined_cameras_of(run);
+    if (!refined.empty()) io::use_refined_cameras(dataset, refined);
+    return dataset;
+}
+
 }  // namespace ewa::cli

@@ -42,6 +42,9 @@ void use_options_of(const live::Run& run, CLI::App& app);
 /// is missing.
 std::filesystem::path refined_cameras_of(const live::Run& run);
 
+/// The cameras of the run's dataset as it was trained, refined ones if it has them. Throws InputError.
+Dataset cameras_of_run(const live::Run& run);
+
 /// Which appearance images get.
 struct AppearanceArguments {
     std::string file = "auto";  // or "none", or "auto": the file beside the splats of a run, if it is there

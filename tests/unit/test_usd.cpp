@@ -58,18 +58,21 @@ TEST(Usd, StagesWithZUp) {
 TEST(Usd, TransformsOfParents) {
     TempFolder folder;
     const auto placed = [&](const std::string& ops) {
-        const glm::dvec3 m = mean_of(read(folder, "def Xform \"P\" {\n" + ops + field("[(1, 2, 3)]") + "}\n"));
+        const glm::dvec3 m =
+            mean_of(read(folder, "def Xform \"P\" {\n" + ops + field("[(1, 2, 3)]") + "}\n"));
         return glm::dvec3(m.x, -m.y, -m.z);  // back to y up
     };
     EXPECT_EQ(placed("double3 xformOp:translate = (10, 20, 30)\n float3 xformOp:scale = (2, 2, 2)\n"
                      "uniform token[] xformOpOrder = [\"xformOp:translate\", \"xformOp:scale\"]\n"),
               glm::dvec3(12, 24, 36));
-    EXPECT_EQ(placed("matrix4d xformOp:transform:a = ( (0, 1, 0, 0), (-1, 0, 0, 0), (0, 0, 1, 0), (5, 6, 7, 1) )\n"
-                     "uniform token[] xformOpOrder = [\"xformOp:transform:a\"]\n"),
-              glm::dvec3(3, 7, 10));  // x becomes y, y becomes -x
+    EXPECT_EQ(
+        placed("matrix4d xformOp:transform:a = ( (0, 1, 0, 0), (-1, 0, 0, 0), (0, 0, 1, 0), (5, 6, 7, 1) )\n"
+               "uniform token[] xformOpOrder = [\"xformOp:transform:a\"]\n"),
+        glm::dvec3(3, 7, 10));  // x becomes y, y becomes -x
     const auto near = [](const glm::dvec3& a, const glm::dvec3& b) { return glm::length(a - b) < 1e-5; };
-    EXPECT_TRUE(near(placed("float xformOp:rotateZ = 90\nuniform token[] xformOpOrder = [\"xformOp:rotateZ\"]\n"),
-                     {-2, 1, 3}));
+    EXPECT_TRUE(
+        near(placed("float xformOp:rotateZ = 90\nuniform token[] xformOpOrder = [\"xformOp:rotateZ\"]\n"),
+             {-2, 1, 3}));
     // About x first: (1, 2, 3) -> (1, -3, 2) -> (3, 1, 2) by z.
     EXPECT_TRUE(near(placed("float3 xformOp:rotateXYZ = (90, 0, 90)\n"
                             "uniform token[] xformOpOrder = [\"xformOp:rotateXYZ\"]\n"),
@@ -83,12 +86,20 @@ TEST(Usd, WhatIsSkippedIsSaid) {
     TempFolder folder;
     const std::string text =
         "#usda 1.0\n( subLayers = [ @a(1].usda@ ] )\n"
-        "def Scope \"S\" ( references = @other.usda@</A> ) { rel x = </S>\n custom string y = '''it's } {'''\n"
+        "def Scope \"S\" ( references = @other.usda@</A> ) { rel x = </S>\n custom string y = '''it's } "
+        "{'''\n"
         "dictionary d = { string a = \"]\" } }\n"
-        "over \"O\" { " + field("[(9, 9, 9)]") + "}\nclass \"C\" { " + field("[(9, 9, 9)]") + "}\n"
-        "def \"I\" { token visibility = \"invisible\"\n" + field("[(9, 9, 9)]") + "}\n"
-        "def \"D\" ( active = false ) { " + field("[(9, 9, 9)]") + "}\n"
-        "def \"V\" { variantSet \"v\" = { \"a\" { " + field("[(9, 9, 9)]") + "} }\n" + field("[(1, 2, 3)]") + "}\n";
+        "over \"O\" { " +
+        field("[(9, 9, 9)]") + "}\nclass \"C\" { " + field("[(9, 9, 9)]") +
+        "}\n"
+        "def \"I\" { token visibility = \"invisible\"\n" +
+        field("[(9, 9, 9)]") +
+        "}\n"
+        "def \"D\" ( active = false ) { " +
+        field("[(9, 9, 9)]") +
+        "}\n"
+        "def \"V\" { variantSet \"v\" = { \"a\" { " +
+        field("[(9, 9, 9)]") + "} }\n" + field("[(1, 2, 3)]") + "}\n";
     const SplatScene scene = read_splats(folder.write("a.usda", text));
     EXPECT_EQ(mean_of(scene.gaussians), glm::dvec3(1, -2, -3));
     EXPECT_EQ(scene.remarks.size(), 3u);
@@ -98,10 +109,14 @@ TEST(Usd, WhatIsSkippedIsSaid) {
 TEST(Usd, HalfPrecisionAndLinearLight) {
     TempFolder folder;
     std::string text = field("[(1, 2, 3)]");
-    text.insert(text.find("    float3[] scales"), "    uniform token colorSpace:name = \"lin_rec709_scene\"\n");
-    for (const auto& [from, to] : {std::pair{"point3f[] positions", "point3h[] positionsh"}, {"float3[] scales", "half3[] scalesh"},
-                                   {"quatf[] orientations", "quath[] orientationsh"}, {"float[] opacities", "half[] opacitiesh"},
-                                   {"float3[] radiance:sphericalHarmonicsCoefficients", "half3[] radiance:sphericalHarmonicsCoefficientsh"}})
+    text.insert(text.find("    float3[] scales"),
+                "    uniform token colorSpace:name = \"lin_rec709_scene\"\n");
+    for (const auto& [from, to] : {std::pair{"point3f[] positions", "point3h[] positionsh"},
+                                   {"float3[] scales", "half3[] scalesh"},
+                                   {"quatf[] orientations", "quath[] orientationsh"},
+                                   {"float[] opacities", "half[] opacitiesh"},
+                                   {"float3[] radiance:sphericalHarmonicsCoefficients",
+                                    "half3[] radiance:sphericalHarmonicsCoefficientsh"}})
         text.replace(text.find(from), std::strlen(from), to);
     const Gaussians g = read(folder, text);
     EXPECT_EQ(mean_of(g), glm::dvec3(1, -2, -3));
@@ -164,7 +179,8 @@ TEST(Usd, RefusesWithTheReason) {
     refuse(head + wrong, {"1 SH coefficients for 1 splats of SH degree 1"});
     wrong.replace(wrong.find("Degree = 1"), 10, "Degree = -");
     refuse(head + wrong, {"line"});
-    refuse(head + "def \"P\" { uniform token[] xformOpOrder = [\"xformOp:matrix\"] " + field("[(1, 2, 3)]") + "}",
+    refuse(head + "def \"P\" { uniform token[] xformOpOrder = [\"xformOp:matrix\"] " + field("[(1, 2, 3)]") +
+               "}",
            {"xformOp:matrix has no value"});
     refuse(head + "def \"P\" { float xformOp:spin = 1\n uniform token[] xformOpOrder = [\"xformOp:spin\"] " +
                field("[(1, 2, 3)]") + "}",

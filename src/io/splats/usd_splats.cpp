@@ -62,7 +62,8 @@ class UsdReader {
     void visit(const UsdPrim& prim, const glm::dmat4& parent) {
         if (prim.specifier != "def" || usd_metadata(prim.metadata, "active") == "false") return;
         for (const char* outside : {"references", "payload", "inherits", "specializes"})
-            if (usd_metadata(prim.metadata, outside)) remark("references to other prims and files are skipped");
+            if (usd_metadata(prim.metadata, outside))
+                remark("references to other prims and files are skipped");
         if (prim.variants) remark("variants are skipped");
         if (const UsdProperty* visibility = prim.property("visibility"))
             if (layer_.words(*visibility).front() == "invisible") {
@@ -79,8 +80,7 @@ class UsdReader {
         const UsdProperty* order = prim.property("xformOpOrder");
         if (!order) return parent;
         for (const std::string& op : layer_.words(*order)) {
-            if (op == "!resetXformStack!")
-                layer_.fail(order->value, "!resetXformStack! is not supported");
+            if (op == "!resetXformStack!") layer_.fail(order->value, "!resetXformStack! is not supported");
             const UsdProperty* value = prim.property(op);
             if (!value) layer_.fail(order->value, core::one_line(op) + " has no value");
             parent = parent * operation(op, *value);
@@ -158,8 +158,7 @@ class UsdReader {
         g.log_scales.reserve(scales.size());
         for (const float scale : scales) g.log_scales.push_back(log_of_scale(scale));
         g.opacity_logits.reserve(count);
-        for (const float opacity : opacities)
-            g.opacity_logits.push_back(float(logit_of_opacity(opacity)));
+        for (const float opacity : opacities) g.opacity_logits.push_back(float(logit_of_opacity(opacity)));
         read_sh(prim, g);
         return g;
     }
@@ -210,7 +209,9 @@ SplatScene read_layer(const std::filesystem::path& path, const std::string& entr
     const std::string name =
         core::one_line(path.string()) + (entry.empty() ? "" : ": \"" + core::one_line(entry) + "\"");
     if (text.starts_with("PXR-USDC"))
-        throw InputError(name + ": is OpenUSD's binary format; usdcat IN.usdc -o OUT.usda makes text of it, which ewa reads");
+        throw InputError(
+            name +
+            ": is OpenUSD's binary format; usdcat IN.usdc -o OUT.usda makes text of it, which ewa reads");
     return UsdReader(UsdText(name, std::move(text))).read();
 }
 
@@ -225,8 +226,8 @@ class UsdWriter {
 
     /// An array of `count` elements of `each` numbers; value(i, k) is number k of element i.
     template <class Value>
-    void array(const std::string& type, const std::string& name, size_t count, size_t each, const Value& value,
-               const std::string& metadata = "") {
+    void array(const std::string& type, const std::string& name, size_t count, size_t each,
+               const Value& value, const std::string& metadata = "") {
         ((text_ += "    " + type) += "[] ") += name + " = [";
         for (size_t i = 0; i < count; ++i) {
             text_ += i == 0 ? "" : ", ";
@@ -259,7 +260,8 @@ class UsdWriter {
     std::string text_;
 };
 
-void write_layer(const Gaussians& g, const SaveOptions& options, const std::function<void(std::string_view)>& sink) {
+void write_layer(const Gaussians& g, const SaveOptions& options,
+                 const std::function<void(std::string_view)>& sink) {
     UsdWriter writer(sink);
     const size_t n = g.size(), coefficients = size_t(sh_coefficients(g.sh_degree));
     std::array<glm::vec3, 2> box = {glm::vec3(n > 0 ? INFINITY : 0), glm::vec3(n > 0 ? -INFINITY : 0)};
@@ -269,15 +271,15 @@ void write_layer(const Gaussians& g, const SaveOptions& options, const std::func
     }
     writer.line("#usda 1.0\n(\n    defaultPrim = \"Splats\"\n    doc = \"ewa " EWA_VERSION
                 "\"\n    metersPerUnit = 1\n    upAxis = \"Y\"\n)\n");
-    writer.line(std::string("def ") + kType + " \"Splats\" (\n    prepend apiSchemas = [\"ColorSpaceAPI\"]\n)\n{");
+    writer.line(std::string("def ") + kType +
+                " \"Splats\" (\n    prepend apiSchemas = [\"ColorSpaceAPI\"]\n)\n{");
     writer.line("    uniform token colorSpace:name = \"srgb_rec709_display\"");
     writer.line("    uniform token projectionModeHint = \"perspective\"");
     writer.line("    uniform token sortingModeHint = \"zDepth\"");
     writer.array("float3", "extent", 2, 3, [&](size_t i, size_t k) { return box[i][int(k)]; });
     writer.array("point3f", "positions", n, 3, [&](size_t i, size_t k) { return g.means[3 * i + k]; });
-    writer.array("quatf", "orientations", n, 4, [&](size_t i, size_t k) {
-        return float(unit_quaternion(&g.quaternions[4 * i])[k]);
-    });
+    writer.array("quatf", "orientations", n, 4,
+                 [&](size_t i, size_t k) { return float(unit_quaternion(&g.quaternions[4 * i])[k]); });
     writer.array("float3", "scales", n, 3,
                  [&](size_t i, size_t k) { return scale_of_log(g.log_scales[3 * i + k]); });
     writer.array("float", "opacities", n, 1,
@@ -286,7 +288,8 @@ void write_layer(const Gaussians& g, const SaveOptions& options, const std::func
     writer.array(
         "float3", kSh, n * coefficients, 3,
         [&](size_t i, size_t k) {
-            if (options.progress && k == 0 && i % (coefficients << 12) == 0) options.progress(i / coefficients, n);
+            if (options.progress && k == 0 && i % (coefficients << 12) == 0)
+                options.progress(i / coefficients, n);
             return g.sh[3 * i + k];
         },
         " (\n        elementSize = " + std::to_string(coefficients) + "\n    )");

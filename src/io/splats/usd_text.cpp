@@ -76,13 +76,25 @@ class UsdParser {
     /// Passes a value of any type.
     void skip_value() {
         switch (const char c = next()) {
-            case '(': skip_brackets(')'); return;
-            case '[': skip_brackets(']'); return;
-            case '{': skip_brackets('}'); return;
+            case '(':
+                skip_brackets(')');
+                return;
+            case '[':
+                skip_brackets(']');
+                return;
+            case '{':
+                skip_brackets('}');
+                return;
             case '"':
-            case '\'': quoted(); return;
-            case '@': skip_to("@"); return;
-            case '<': skip_to(">"); return;
+            case '\'':
+                quoted();
+                return;
+            case '@':
+                skip_to("@");
+                return;
+            case '<':
+                skip_to(">");
+                return;
             default:
                 if (c != '-' && c != '+' && !is_word(c)) fail("a value is missing");
                 if (c == '-' || c == '+') ++at_;
@@ -206,8 +218,8 @@ class UsdParser {
     }
 
     void property(std::string first, UsdPrim& owner) {
-        static constexpr std::string_view kBefore[] = {"custom", "uniform", "varying", "config",
-                                                       "prepend", "append", "delete",  "add"};
+        static constexpr std::string_view kBefore[] = {"custom",  "uniform", "varying", "config",
+                                                       "prepend", "append",  "delete",  "add"};
         UsdProperty property;
         property.type = std::move(first);
         while (std::find(std::begin(kBefore), std::end(kBefore), property.type) != std::end(kBefore))

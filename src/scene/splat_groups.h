@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which splats belong together, and how many cameras see each: what cleaning a scene needs to know.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "ewa/camera.h"
+#include "ewa/gaussians.h"
+
+namespace ewa::scene {
+
+struct SplatGroups {
+    std::vector<uint32_t> of;  // the group of each splat
+    std::vector<uint32_t>
+        sizes;  // splats in each group; the largest comes first, then by the lowest index of a splat
+};
+
+/// Groups of splats that touch. Two splats touch if their largest standard deviations differ by less than a factor of 2, and
+/// d' (Σa + Σb)^-1 d < 9 for the difference d of their means: 3 standard deviations of the difference of a point of each. The
+/// limit on sizes keeps a huge splat in the background from joining all that floats in it. Each splat is compared
+/// with its 32 nearest of about its size. The first of several at one place in an octave of sizes is compared for all. A splat that is not drawable is a group of its own. O(n log n).
+SplatGroups touching_groups(const Gaussians& gaussians);
+
+/// How many of the cameras have the splat's mean in their image, in front of the near plane. What hides it does not count.
+/// Lenses must be native (is_native).
+std::vector<uint32_t> views_of_splats(const Gaussians& gaussians, const std::vector<Camera>& cameras);
+
+}  // namespace ewa::scene
