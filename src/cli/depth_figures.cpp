@@ -14,7 +14,7 @@ namespace {
 constexpr size_t kMostOfName = 36;  // with the columns, a line of 100 characters
 
 std::string percents(const train::DepthErrors& errors) {
-    return fmt::format("{:8.3f}{:8.3f}{:8.2f}{:8.2f}", 100 * errors.median, 100 * errors.mean,
+    return fmt::format(" {:7.3f} {:7.3f} {:7.2f} {:7.2f}", 100 * errors.median, 100 * errors.mean,
                        100 * errors.within_1, 100 * errors.within_5);
 }
 
