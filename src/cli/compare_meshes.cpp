@@ -16,16 +16,11 @@ namespace {
 
 constexpr double kUsualDistance = 0.005;  // of the diagonal of B's box
 
-std::string border_text(const mesh::Topology& topology) {
-    return topology.watertight()
-               ? "watertight"
-               : fmt::format("{} at the border, {} of more than two triangles",
-                             core::counted(topology.border_edges, "edge"), topology.crowded_edges);
-}
-
 report::Json to_json(const mesh::Topology& topology, size_t triangles) {
     return {{"triangles", triangles},
             {"parts", topology.parts},
+            {"holes", topology.holes},
+            {"largest_hole", topology.largest_hole},
             {"border_edges", topology.border_edges},
             {"crowded_edges", topology.crowded_edges},
             {"watertight", topology.watertight()}};
@@ -52,7 +47,7 @@ void compare_meshes(const MeshComparison& comparison) {
         const mesh::Topology topology = mesh::topology_of(mesh::joined(*mesh));
         fmt::print("{}: {} in {}, {}\n", core::one_line(path->string()),
                    core::counted(mesh->triangles.size(), "triangle"), core::counted(topology.parts, "part"),
-                   border_text(topology));
+                   mesh::watertight_text(topology));
         json[name] = to_json(topology, mesh->triangles.size());
     }
     if (!comparison.json.empty()) write_json(comparison.json, json);

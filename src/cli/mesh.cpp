@@ -136,16 +136,12 @@ uint64_t memory_for_volume() {
 void print(const scene::TriangleMesh& made, double voxel, const MeshArguments& arguments,
            Progress& progress) {
     const mesh::Topology topology = mesh::topology_of(made);
-    const std::string border =
-        topology.watertight()
-            ? "watertight"
-            : fmt::format("not watertight: {} at the border{}", core::counted(topology.border_edges, "edge"),
-                          topology.crowded_edges > 0
-                              ? fmt::format(", {} of more than two triangles", topology.crowded_edges)
-                              : "");
     progress.note(fmt::format("{}: {} in {}, voxels of {:.4g}, {}", core::one_line(arguments.output.string()),
                               core::counted(made.triangles.size(), "triangle"),
-                              core::counted(topology.parts, "part"), voxel, border));
+                              core::counted(topology.parts, "part"), voxel, mesh::watertight_text(topology)));
+    if (arguments.triangles > 0 && made.triangles.size() > size_t(arguments.triangles))
+        progress.note(fmt::format("--triangles {}: with fewer than {}, the surface would tear",
+                                  arguments.triangles, made.triangles.size()));
 }
 
 int make_mesh(const MeshArguments& arguments, const std::optional<live::Run>& run) {

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mesh/parts.h"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numeric>
 #include <utility>
 
+#include "core/typing.h"
 #include "mesh/meshing.h"
 
 namespace ewa::mesh {
@@ -17,8 +20,8 @@ using scene::TriangleMesh;
 /// Vertices that triangles connect: find() is the same for all of a part.
 class Union {
   public:
-    explicit Union(const TriangleMesh& mesh) : parent_(mesh.positions.size()) {
-        std::iota(parent_.begin(), parent_.end(), 0u);
+    explicit Union(size_t vertices) : parent_(vertices) { std::iota(parent_.begin(), parent_.end(), 0u); }
+    explicit Union(const TriangleMesh& mesh) : Union(mesh.positions.size()) {
         for (const auto& t : mesh.triangles) {
             join(t[0], t[1]);
             join(t[1], t[2]);
@@ -28,15 +31,42 @@ class Union {
         while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
         return i;
     }
-
-  private:
     /// The lower index leads, so that parts do not depend on the order of triangles.
     void join(uint32_t a, uint32_t b) {
         const auto [low, high] = std::minmax({find(a), find(b)});
         parent_[high] = low;
     }
+
+  private:
     std::vector<uint32_t> parent_;
 };
+
+using Edge = std::pair<uint32_t, uint32_t>;
+
+/// Boxes of vertices that belong together, by the vertex that leads them.
+struct Boxes {
+    explicit Boxes(size_t vertices) : low(vertices, glm::vec3(1e30f)), high(vertices, glm::vec3(-1e30f)) {}
+    void add(uint32_t leader, const glm::vec3& position) {
+        low[leader] = glm::min(low[leader], position);
+        high[leader] = glm::max(high[leader], position);
+    }
+    bool any(size_t leader) const { return low[leader].x <= high[leader].x; }
+    double diagonal(size_t leader) const { return double(glm::length(high[leader] - low[leader])); }
+    std::vector<glm::vec3> low, high;
+};
+
+void measure_holes(const TriangleMesh& mesh, const std::vector<Edge>& border, Topology& out) {
+    Union joined(mesh.positions.size());
+    for (const auto& [a, b] : border) joined.join(a, b);
+    Boxes boxes(mesh.positions.size());
+    for (const auto& [a, b] : border)
+        for (const uint32_t i : {a, b}) boxes.add(joined.find(i), mesh.positions[i]);
+    for (size_t i = 0; i < mesh.positions.size(); ++i) {
+        if (!boxes.any(i)) continue;
+        ++out.holes;
+        out.largest_hole = std::max(out.largest_hole, boxes.diagonal(i));
+    }
+}
 
 void drop_unused_vertices(TriangleMesh& mesh) {
     constexpr uint32_t kNone = ~0u;
@@ -63,7 +93,7 @@ Topology topology_of(const TriangleMesh& mesh) {
     Topology out;
     Union joined(mesh);
     std::vector<uint8_t> leads(mesh.positions.size());
-    std::vector<std::pair<uint32_t, uint32_t>> edges;
+    std::vector<Edge> edges, border;
     edges.reserve(3 * mesh.triangles.size());
     for (const auto& t : mesh.triangles) {
         leads[joined.find(t[0])] = 1;
@@ -74,28 +104,38 @@ Topology topology_of(const TriangleMesh& mesh) {
     for (size_t i = 0; i < edges.size();) {
         size_t end = i + 1;
         while (end < edges.size() && edges[end] == edges[i]) ++end;
-        out.border_edges += end - i == 1;
+        if (end - i == 1) border.push_back(edges[i]);
         out.crowded_edges += end - i > 2;
         i = end;
     }
+    out.border_edges = border.size();
+    if (!border.empty()) measure_holes(mesh, border, out);
     return out;
+}
+
+std::string watertight_text(const Topology& topology) {
+    if (topology.watertight()) return "watertight";
+    std::string text = "not watertight: ";
+    if (topology.holes > 0)
+        text += fmt::format("{} of {}, the largest {:.3g} across", core::counted(topology.holes, "hole"),
+                            core::counted(topology.border_edges, "edge"), topology.largest_hole);
+    if (topology.crowded_edges > 0)
+        text += fmt::format("{}{} of more than two triangles", topology.holes > 0 ? ", " : "",
+                            core::counted(topology.crowded_edges, "edge"));
+    return text;
 }
 
 size_t drop_small_parts(TriangleMesh& mesh, double least) {
     std::erase_if(mesh.triangles, [](const auto& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
     Union joined(mesh);
-    std::vector<glm::vec3> low(mesh.positions.size(), glm::vec3(1e30f)), high(low.size(), glm::vec3(-1e30f));
+    Boxes boxes(mesh.positions.size());
     for (const auto& t : mesh.triangles)
-        for (const uint32_t i : t) {
-            const uint32_t part = joined.find(i);
-            low[part] = glm::min(low[part], mesh.positions[i]);
-            high[part] = glm::max(high[part], mesh.positions[i]);
-        }
+        for (const uint32_t i : t) boxes.add(joined.find(i), mesh.positions[i]);
     size_t dropped = 0;
-    std::vector<uint8_t> small(low.size());
-    for (size_t part = 0; part < low.size(); ++part) {
-        if (low[part].x > high[part].x) continue;
-        small[part] = double(glm::length(high[part] - low[part])) < least;
+    std::vector<uint8_t> small(mesh.positions.size());
+    for (size_t part = 0; part < small.size(); ++part) {
+        if (!boxes.any(part)) continue;
+        small[part] = boxes.diagonal(part) < least;
         dropped += small[part];
     }
     std::erase_if(mesh.triangles, [&](const auto& t) { return small[joined.find(t[0])] != 0; });

@@ -2,6 +2,7 @@
 // The parts of a mesh, its border, and what is left of it without small parts or with fewer triangles.
 #pragma once
 #include <cstddef>
+#include <string>
 
 #include "scene/triangle_mesh.h"
 
@@ -11,10 +12,15 @@ struct Topology {
     size_t parts = 0;          // connected by shared vertices
     size_t border_edges = 0;   // of one triangle
     size_t crowded_edges = 0;  // of more than two
+    size_t holes = 0;  // border edges connected by shared vertices; the outer edge of a surface is one, too
+    double largest_hole = 0;  // the diagonal of its box
     /// Whether the surface has an inside: every edge is that of two triangles.
     bool watertight() const { return border_edges == 0 && crowded_edges == 0; }
 };
 Topology topology_of(const scene::TriangleMesh& mesh);
+
+/// "watertight", or what keeps the surface from being so.
+std::string watertight_text(const Topology& topology);
 
 /// Drops parts whose box has a diagonal below `least`, triangles with two equal corners, and vertices without triangles.
 /// Returns the number of dropped parts.

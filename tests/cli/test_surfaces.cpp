@@ -135,6 +135,14 @@ TEST(Mesh, OfA360Image) {
     expect_failure(made(), 2, "a.png has parallel rays; name other cameras with --cameras");
 }
 
+TEST(Mesh, SaysWhereFewerTrianglesWouldTearIt) {
+    const Prepared folder;
+    const Outcome told = run_ewa({"mesh", folder / "shell.ply", "-o", folder / "m.glb", "--cameras",
+                                  folder / "data", "--voxel", "0.1", "--triangles", "4"});
+    expect_success(told);
+    EXPECT_NE(told.out.find("--triangles 4: with fewer than "), std::string::npos) << told.out;
+}
+
 TEST(Mesh, ErrorsAreOneLine) {
     const Prepared folder;
     expect_failure(mesh(folder, "m.stl"), 2, ".ply, .obj or .glb");

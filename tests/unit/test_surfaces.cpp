@@ -190,6 +190,26 @@ TEST(MeshParts, SmallOnesAreDropped) {
     EXPECT_GT(mesh::topology_of(m).crowded_edges, 0u);
 }
 
+TEST(MeshParts, HolesAreMeasured) {
+    TriangleMesh m = square(1, 0);
+    add(m, square(3, 5));
+    const mesh::Topology two = mesh::topology_of(m);
+    EXPECT_EQ(two.holes, 2u);
+    EXPECT_NEAR(two.largest_hole, 3 * std::sqrt(2.0), 1e-6);
+    EXPECT_EQ(mesh::watertight_text(two), "not watertight: 2 holes of 8 edges, the largest 4.24 across");
+    m = fused_sphere(12, 0.04).mesh;
+    ASSERT_EQ(mesh::watertight_text(mesh::topology_of(m)), "watertight");
+    m.triangles.erase(m.triangles.begin() + 50);
+    const mesh::Topology open = mesh::topology_of(m);
+    EXPECT_EQ(open.holes, 1u);
+    EXPECT_EQ(open.border_edges, 3u);
+    EXPECT_GT(open.largest_hole, 0);
+    EXPECT_LT(open.largest_hole, 0.1);
+    m.triangles = {{0, 1, 2}, {0, 1, 2}, {0, 1, 2}};
+    EXPECT_EQ(mesh::watertight_text(mesh::topology_of(m)),
+              "not watertight: 3 edges of more than two triangles");
+}
+
 TEST(MeshParts, NormalsHaveALengthOfOneEverywhere) {
     TriangleMesh m = square(1, 0);
     // A triangle without an area beside the square, and one that is alone.
