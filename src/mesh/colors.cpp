@@ -9,6 +9,7 @@
 
 #include "core/parallel.h"
 #include "mesh/depth_map.h"
+#include "scene/depth_map.h"
 
 namespace ewa::mesh {
 namespace {

@@ -14,6 +14,7 @@
 #include "ewa/error.h"
 #include "mesh/depth_map.h"
 #include "mesh/meshing.h"
+#include "scene/depth_map.h"
 
 namespace ewa::mesh {
 namespace {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 
 #include "core/text.h"
 #include "ewa/error.h"
@@ -16,6 +17,7 @@ namespace {
 
 constexpr double kMostDepth = 1e12;   // world units; larger ones are sky
 constexpr double kLevels = 65535;     // of an integer map, which load_image divides by this
+constexpr float kAgreement = 0.1f;    // of neighbours, relative
 constexpr float kLeastWeight = 0.5f;  // of a pixel whose depth counts
 
 /// World units of a value of the map.
@@ -39,6 +41,24 @@ void check_lens_of(const Frame& frame) {
 
 }  // namespace
 
+float depth_at(const Image& depth, const glm::vec2& at, float step) {
+    if (!(at.x >= 0 && at.y >= 0 && at.x < float(depth.width) && at.y < float(depth.height))) return 0;
+    const float nearest = *depth.at(int(at.x), int(at.y));
+    const glm::vec2 middle = at - 0.5f;
+    if (middle.x < 0 || middle.y < 0 || middle.x > float(depth.width - 1) ||
+        middle.y > float(depth.height - 1))
+        return nearest;
+    const int x = std::min(int(middle.x), depth.width - 2), y = std::min(int(middle.y), depth.height - 2);
+    if (x < 0 || y < 0) return nearest;
+    const float a = *depth.at(x, y), b = *depth.at(x + 1, y), c = *depth.at(x, y + 1),
+                d = *depth.at(x + 1, y + 1);
+    const float low = std::min({a, b, c, d}), high = std::max({a, b, c, d});
+    if (!(low > 0) || high - low > step) return nearest;
+    const float u = middle.x - float(x), v = middle.y - float(y);
+    const float mean = (1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * c + u * d);
+    return std::isfinite(mean) ? mean : nearest;
+}
+
 Image load_depth_map(const Frame& frame) {
     check_lens_of(frame);
     const double unit = unit_of(frame);
@@ -57,10 +77,12 @@ Image load_depth_map(const Frame& frame) {
                           (y + 0.5) * pinhole.height / camera.height);
             if (!frame.distortion.none())
                 at = scene::source_pixel(frame.source, frame.distortion, pinhole, at);
-            // The nearest depth: a mean over the edge of a thing would lie where nothing is.
-            const int column = std::clamp(int(at.x * map.width / frame.source.width), 0, map.width - 1);
-            const int row = std::clamp(int(at.y * map.height / frame.source.height), 0, map.height - 1);
-            const double depth = unit * double(*map.at(column, row));
+            const glm::vec2 place(at.x * map.width / frame.source.width,
+                                  at.y * map.height / frame.source.height);
+            const glm::vec2 inside =
+                glm::clamp(place, glm::vec2(0.5f), glm::vec2(map.width, map.height) - 0.5f);
+            const double depth =
+                unit * double(depth_at(map, inside, kAgreement * *map.at(int(inside.x), int(inside.y))));
             *depths.at(x, y) = depth > 0 && depth <= kMostDepth ? float(depth) : 0.0f;
         }
     return depths;

@@ -65,17 +65,32 @@ TEST(DepthMap, LevelsHaveAUnit) {
     scene.refuse({"transforms.json: frame 0", "\"depth_unit_scale_factor\" is not above 0"});
 }
 
-/// Of another size than the image, and of an image that is downscaled: the pixels nearest to the middles.
-TEST(DepthMap, TheNearestPixelCounts) {
+/// Of another size than the image, and of an image that is downscaled: the middle of four pixels.
+TEST(DepthMap, NeighboursThatAgreeAreInterpolated) {
     const DepthScene scene;
     Image map = load_depth_map(scene.load({.downscale = 2}).frames[0]);
     ASSERT_EQ(map.width, 4);
     ASSERT_EQ(map.height, 3);
-    EXPECT_NEAR(*map.at(1, 2), 0.001 * (1000 + 10 * 3 + 5), 1e-6);
+    EXPECT_NEAR(*map.at(1, 2), 0.001 * (1000 + 10 * 2.5 + 4.5), 1e-6);
     scene.folder.write("maps/a.png", deep_png(DepthScene::levels(16, 12)));
     map = load_depth_map(scene.load().frames[0]);
     ASSERT_EQ(map.width, 8);
-    EXPECT_NEAR(*map.at(3, 2), 0.001 * (1000 + 10 * 7 + 5), 1e-6);
+    EXPECT_NEAR(*map.at(3, 2), 0.001 * (1000 + 10 * 6.5 + 4.5), 1e-6);
+}
+
+TEST(DepthMap, AtAnEdgeTheNearestPixelCounts) {
+    Image map(4, 4, 1);
+    for (float& depth : map.pixels) depth = 2;
+    *map.at(2, 1) = 5;
+    EXPECT_EQ(depth_at(map, {1.9f, 1.5f}, 0.2f), 2);
+    EXPECT_EQ(depth_at(map, {2.1f, 1.5f}, 0.2f), 5);
+    *map.at(2, 1) = NAN;
+    EXPECT_EQ(depth_at(map, {1.9f, 1.6f}, 0.2f), 2);
+    *map.at(2, 1) = 2.1f;
+    EXPECT_FLOAT_EQ(depth_at(map, {2, 1.5f}, 0.2f), 2.05f);
+    EXPECT_EQ(depth_at(map, {0.1f, 3.9f}, 0.2f), 2);
+    EXPECT_EQ(depth_at(map, {-0.1f, 2}, 0.2f), 0);
+    EXPECT_EQ(depth_at(map, {2, 4}, 0.2f), 0);
 }
 
 TEST(DepthMap, IsUndistortedAsItsImageIs) {
@@ -90,7 +105,8 @@ TEST(DepthMap, IsUndistortedAsItsImageIs) {
         for (int x = 0; x < map.width; ++x) {
             const glm::dvec2 at =
                 scene::source_pixel(frame.source, frame.distortion, frame.pinhole, {x + 0.5, y + 0.5});
-            EXPECT_NEAR(*map.at(x, y), 0.001 * (1000 + 10 * std::floor(at.x) + std::floor(at.y)), 1e-6);
+            const double column = std::clamp(at.x - 0.5, 0.0, 7.0), row = std::clamp(at.y - 0.5, 0.0, 5.0);
+            EXPECT_NEAR(*map.at(x, y), 0.001 * (1000 + 10 * column + row), 2e-6);
             moved = moved || int(at.x) != x;
         }
     EXPECT_TRUE(moved);
