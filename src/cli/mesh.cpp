@@ -28,6 +28,7 @@
 #include "mesh/mesh_files.h"
 #include "mesh/meshing.h"
 #include "mesh/parts.h"
+#include "run/loss_option.h"
 #include "scene/dataset_files.h"
 #include "scene/framing.h"
 #include "scene/readout.h"
@@ -42,6 +43,7 @@ struct MeshArguments {
     double voxel = 0;   // 0: not given
     int triangles = 0;  // 0: not given
     int downscale = 1, max_width = 0;
+    std::string depth = "auto";  // or median, mean
     DeviceOptions device;
     bool quiet = false;
 };
@@ -128,6 +130,22 @@ void check_output(const MeshArguments& arguments, const std::optional<Dataset>& 
     check_command_outputs({{"the mesh", arguments.output}}, read);
 }
 
+/// Whether the surfaces are at the mean depth of the splats, which --loss depth brings onto them; else at the median depth.
+bool at_mean_depth(const MeshArguments& arguments, const std::optional<live::Run>& run) {
+    if (arguments.depth != "auto") return arguments.depth == "mean";
+    const std::string loss = run ? run->text("loss") : "";
+    return !loss.empty() && train::parse_loss(loss).depth > 0;
+}
+
+/// The mean depth where the splats take at least half of the light; elsewhere 0.
+Image solid_mean_depth(const Rendering& seen) {
+    constexpr float kSolid = 0.5f;
+    Image depth = seen.depth;
+    for (size_t i = 0; i < depth.pixels.size(); ++i)
+        if (!(seen.alpha.pixels[i] >= kSolid)) depth.pixels[i] = 0;
+    return depth;
+}
+
 /// Half of the machine's memory.
 uint64_t memory_for_volume() {
     return uint64_t(sysconf(_SC_PHYS_PAGES)) * uint64_t(sysconf(_SC_PAGESIZE)) / 2;
@@ -160,7 +178,9 @@ int make_mesh(const MeshArguments& arguments, const std::optional<live::Run>& ru
         if (interrupted()) throw Interrupted();
         progress.update(int(steps));
     };
+    const bool mean = at_mean_depth(arguments, run);
     mesh::DepthCache cache(cameras.size(), [&](size_t i) {
+        if (mean) return solid_mean_depth(renderer.render(cameras[i], Drawing::depth));
         return renderer.render(cameras[i], Drawing::median_depth).median_depth;
     });
     const mesh::DepthOfView depth = [&](size_t i) -> const Image& { return cache.at(i); };
@@ -214,6 +234,13 @@ Action add_mesh(CLI::App& app) {
                    "At most this many triangles, where the surface needs no more to hang together [all]")
         ->transform(in_range(4, 1000000000))
         ->type_name("N");
+    app.add_option(
+           "--depth", arguments->depth,
+           "Where a pixel's surface is: at the median or the mean depth of its splats. auto: the mean if the "
+           "run compared it with depth maps (--loss depth=W), else the median")
+        ->transform(one_of({"auto", "median", "mean"}))
+        ->type_name("auto|median|mean")
+        ->capture_default_str();
     add_size_options(app, arguments->downscale, arguments->max_width);
     add_device_options(app, arguments->device);
     add_quiet_option(app, arguments->quiet);

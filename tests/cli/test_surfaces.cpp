@@ -112,6 +112,41 @@ TEST(Mesh, OfASplatFileAlone) {
     EXPECT_NE(outcome.out.find("in 1 part, voxels of 0.05, watertight"), std::string::npos) << outcome.out;
 }
 
+/// What shows the back of the shell through its front is nearer to the middle by the mean depth.
+TEST(Mesh, AtTheMeanDepthAfterATrainingWithDepthMaps) {
+    const Prepared folder;
+    ewa::Gaussians g = ewa::load_splats(folder / "shell.ply");
+    std::fill(g.opacity_logits.begin(), g.opacity_logits.end(), 2.0f);
+    std::filesystem::create_directories(folder / "run");
+    ewa::save_splats(folder / "run/splats.ply", g);
+    write_file(folder / "run/metrics.jsonl",
+               "{\"step\": 1, \"loss\": 0.5, \"seconds\": 0.1, \"splats\": 600}\n");
+    const auto made = [&](const std::string& loss, const std::vector<std::string>& more = {}) {
+        write_file(folder / "run/config.json",
+                   nlohmann::json{{"dataset", folder / "data"}, {"steps", 3}, {"loss", loss}}.dump());
+        std::vector<std::string> arguments = {"mesh",    folder / "run", "-o",     folder / "m.ply",
+                                              "--voxel", "0.08",         "--quiet"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        expect_success(run_ewa(arguments));
+        return read_file(folder / "m.ply");
+    };
+    const std::string usual = "l1=0.8,ssim=0.2", depth = usual + ",depth=2";
+    const std::string median = made(usual), mean = made(depth);
+    EXPECT_EQ(median, made(depth, {"--depth", "median"}));
+    EXPECT_EQ(mean, made(usual, {"--depth", "mean"}));
+    const auto radius = [](const std::string& ply) {
+        const size_t vertices = header_count(ply, "element vertex "), data = ply.find("end_header\n") + 11;
+        double sum = 0;
+        for (size_t i = 0; i < vertices; ++i) {
+            float p[3];
+            std::memcpy(p, &ply[data + 27 * i], sizeof(p));
+            sum += std::hypot(p[0], p[1], p[2]);
+        }
+        return sum / double(vertices);
+    };
+    EXPECT_LT(radius(mean), radius(median) - 0.01);
+}
+
 /// From inside, the six sides of one 360° image see the whole shell.
 TEST(Mesh, OfA360Image) {
     const Prepared folder;
