@@ -65,7 +65,8 @@ inline unsigned pixels_of_tile(const BlendLists& lists) {
 }
 
 inline void open_pixels(Pixels& pixels, const BlendLists& lists, const Strip& strip) {
-    pixels.y_step = float(kLanes / strip.width);  // rows of one vector
+    const unsigned rows = kLanes / strip.width;  // of one vector
+    pixels.y_step = float(rows);
     for (unsigned v = 0; v < kVectors; ++v) {
         for (unsigned l = 0; l < kLanes; ++l) {
             const unsigned index = strip.first + v * kLanes + l;
