@@ -2,6 +2,7 @@
 // Edits of a whole splat scene.
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <glm/mat4x4.hpp>
 #include <string>
 #include <vector>
@@ -23,6 +24,15 @@ void select_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices);
 
 /// Sets the SH degree (0..3). Higher coefficients are cut, new ones are zero.
 void set_sh_degree(Gaussians& gaussians, int degree);
+
+/// The same in place, for ascending indices without repetition: it takes no memory for a copy.
+void keep_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices);
+
+/// Merges near splats until `target` of them are left, at least one. A merged splat has the mean, the covariance and the colour of
+/// the light that both take, and as much of that light as its opacity allows. Rounds merge the pairs of the least relative error.
+/// Splats that are not drawable are removed first. The same scene gives the same splats. O(n log n) in time; the memory beside
+/// the scene is about 110 bytes a splat. progress: called with the number of splats that are left, after each round.
+void decimate_splats(Gaussians& gaussians, size_t target, const std::function<void(size_t)>& progress = {});
 
 /// Appends the splats of `more`. The SH degree becomes the larger of both. If only one of them has opacities of
 /// Footprint::density, these are fitted to the other kernels.

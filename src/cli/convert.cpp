@@ -37,7 +37,7 @@ struct ConvertArguments {
     fs::path output;                     // -o, which becomes the last of the files
     std::vector<glm::dmat4> placements;  // of the inputs
     std::vector<std::string> transform;
-    std::string crop, sort;
+    std::string crop, decimate, sort;
     Edits edits;
     Cleaning cleaning;
     int spz_version = 3;
@@ -208,6 +208,7 @@ int run(const ConvertArguments& arguments) {
     Edits edits = arguments.edits;
     edits.transform = parse_transform(arguments.transform);
     edits.crop = parse_crop(arguments.crop);
+    edits.decimation = parse_decimation(arguments.decimate);
     edits.morton = arguments.sort == "morton";
     if (!arguments.cleaning.picture.empty() && !arguments.cleaning.any())
         throw InputError(
@@ -219,7 +220,8 @@ int run(const ConvertArguments& arguments) {
     place_splats(work.gaussians, edits.transform, "--transform");
     edits.transform = glm::dmat4(1);
     if (arguments.cleaning.any() && clean_scene(arguments, work, in_place)) return 0;
-    if (auto remark = apply_edits(work.gaussians, edits, format)) work.lost.push_back(std::move(*remark));
+    for (std::string& remark : apply_edits(work.gaussians, edits, format))
+        work.lost.push_back(std::move(remark));
 
     const size_t count = work.gaussians.size();
     check_not_empty(arguments, read, count);
@@ -273,6 +275,9 @@ void add_editing_options(CLI::App& app, ConvertArguments& arguments) {
     app.add_option("--max-sh", arguments.edits.max_sh, "Reduce the spherical harmonics to this degree")
         ->transform(in_range(0, kMaxShDegree))
         ->type_name("0..3");
+    app.add_option("--decimate", arguments.decimate,
+                   "Merge near splats until this number of them is left, or this percentage: 500k, 50%")
+        ->type_name("N|P%");
     app.add_option("--sort", arguments.sort,
                    "Order of the splats: morton puts neighbours in space next to each other in the file")
         ->transform(one_of({"morton"}))

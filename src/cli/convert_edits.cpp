@@ -84,7 +84,7 @@ void keep_if(Gaussians& gaussians, const Keep& keep) {
     std::vector<uint32_t> kept;
     for (size_t i = 0; i < gaussians.size(); ++i)
         if (keep(i)) kept.push_back(static_cast<uint32_t>(i));
-    if (kept.size() < gaussians.size()) select_splats(gaussians, kept);
+    if (kept.size() < gaussians.size()) keep_splats(gaussians, kept);
 }
 
 size_t drawable_count(const Gaussians& gaussians) {
@@ -146,7 +146,28 @@ std::optional<std::array<double, 6>> parse_crop(const std::string& text) {
     return box;
 }
 
-std::optional<std::string> apply_edits(Gaussians& gaussians, const Edits& edits, SplatFormat format) {
+std::optional<Decimation> parse_decimation(const std::string& text) {
+    if (text.empty()) return std::nullopt;
+    Decimation decimation;
+    if (text.back() == '%') {
+        const auto percent =
+            core::parse_number(core::trim(std::string_view(text).substr(0, text.size() - 1)));
+        if (percent && *percent > 0 && *percent <= 100) decimation.part = *percent / 100;
+    } else {
+        decimation.count = core::parse_count<size_t>(text).value_or(0);
+    }
+    if (decimation.part == 0 && decimation.count == 0)
+        throw InputError("--decimate: '" + text +
+                         "' is neither a number of splats from 1 on nor a percentage above 0 and up to 100");
+    return decimation;
+}
+
+size_t left_of(size_t count, const Decimation& decimation) {
+    if (decimation.part == 0) return std::min(count, decimation.count);
+    return std::min(count, std::max<size_t>(1, size_t(std::llround(double(count) * decimation.part))));
+}
+
+std::vector<std::string> apply_edits(Gaussians& gaussians, const Edits& edits, SplatFormat format) {
     place_splats(gaussians, edits.transform, "--transform");
     if (edits.crop) crop(gaussians, *edits.crop);
     if (edits.min_opacity > 0)
@@ -154,19 +175,26 @@ std::optional<std::string> apply_edits(Gaussians& gaussians, const Edits& edits,
             return 1 / (1 + std::exp(-static_cast<double>(gaussians.opacity_logits[i]))) >= edits.min_opacity;
         });
     if (gaussians.sh_degree > edits.max_sh) set_sh_degree(gaussians, edits.max_sh);
-    std::optional<std::string> remark;
+    std::vector<std::string> remarks;
+    if (edits.decimation) {
+        const size_t before = gaussians.size();
+        decimate_splats(gaussians, left_of(before, *edits.decimation));
+        if (gaussians.size() < before)
+            remarks.push_back(
+                fmt::format("--decimate left {} of {}", gaussians.size(), core::counted(before, "splat")));
+    }
     if (format != SplatFormat::ply) {
         const size_t before = gaussians.size();
         keep_if(gaussians, [&](size_t i) { return drawable(gaussians, i); });
         if (gaussians.size() < before)
-            remark = "skipped " + core::counted(before - gaussians.size(), "splat") +
-                     " with a value that is not finite or a zero quaternion";
+            remarks.push_back("skipped " + core::counted(before - gaussians.size(), "splat") +
+                              " with a value that is not finite or a zero quaternion");
     }
     // The order in which these formats are written: --check compares splat by splat.
     const bool ordered = format == SplatFormat::compressed_ply || format == SplatFormat::sog ||
                          format == SplatFormat::sog_meta;
     if (edits.morton || ordered) select_splats(gaussians, morton_order(gaussians));
-    return remark;
+    return remarks;
 }
 
 }  // namespace ewa::cli

@@ -12,11 +12,18 @@
 
 namespace ewa::cli {
 
+/// How many splats to leave: a number, or a part of those that are there.
+struct Decimation {
+    double part = 0;  // above 0: of the splats
+    size_t count = 0;
+};
+
 struct Edits {
     glm::dmat4 transform{1.0};
     std::optional<std::array<double, 6>> crop;  // a box: x, y, z of the low corner, then of the high one
     double min_opacity = 0;
     int max_sh = kMaxShDegree;
+    std::optional<Decimation> decimation;
     bool morton = false;
 };
 
@@ -40,9 +47,16 @@ void place_splats(Gaussians& gaussians, const glm::dmat4& matrix, const std::str
 /// Parses --crop. Empty: no box. Throws InputError.
 std::optional<std::array<double, 6>> parse_crop(const std::string& text);
 
+/// Parses --decimate: N, or P% with 0 < P <= 100. Empty: none. Throws InputError.
+std::optional<Decimation> parse_decimation(const std::string& text);
+
+/// The number of splats that `decimation` leaves of `count`.
+size_t left_of(size_t count, const Decimation& decimation);
+
 /// Applies the user's edits, then those that the format needs. The result is the scene that the file will
-/// hold. Returns a line if splats were dropped for the format. Throws InputError if the transform makes a
+/// hold. Returns lines on splats that were merged, and on those that were
+/// dropped for the format. Throws InputError if the transform makes a
 /// splat undrawable.
-std::optional<std::string> apply_edits(Gaussians& gaussians, const Edits& edits, SplatFormat format);
+std::vector<std::string> apply_edits(Gaussians& gaussians, const Edits& edits, SplatFormat format);
 
 }  // namespace ewa::cli

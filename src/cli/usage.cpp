@@ -22,10 +22,10 @@ const std::map<std::string, std::string>& subjects() {
         const auto add = [&made](const char* subject, std::initializer_list<const char*> names) {
             for (const char* name : names) made[name] = subject;
         };
-        add("Data", {"cameras",      "frame",       "split",        "transform", "exposures", "appearance-of",
-                     "crop",         "min-opacity", "max-sh",       "sort",      "splats",    "cases",
-                     "bake-sky",     "views",       "size",         "look-at",   "up",        "orbit",
-                     "film-seconds", "matching",    "scene-splats", "visible",   "view-time"});
+        add("Data", {"cameras",  "frame",        "split",    "transform",    "exposures", "appearance-of",
+                     "crop",     "min-opacity",  "max-sh",   "sort",         "splats",    "cases",
+                     "decimate", "bake-sky",     "views",    "size",         "look-at",   "up",
+                     "orbit",    "film-seconds", "matching", "scene-splats", "visible",   "view-time"});
         add("Quality", {"quality", "antialias", "integrator", "samples", "runs", "training-steps"});
         add("Output",
             {"output",   "format",   "mode",        "json",      "svg",    "heat-map", "heat-scale",

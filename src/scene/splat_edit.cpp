@@ -15,6 +15,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "scene/color.h"
+#include "scene/splat_shape.h"
 
 namespace ewa {
 
@@ -61,66 +62,12 @@ Bounds bounds_of(const Gaussians& g) {
     return bounds;
 }
 
+using scene::decompose;
+using scene::Decomposition;
 using scene::kMaxShCoefficients;
+using scene::right_handed;
 using scene::sh_basis;
 using ShMatrix = std::array<std::array<double, kMaxShCoefficients>, kMaxShCoefficients>;
-
-/// Singular value decomposition A = U diag(s) V^T by one-sided Jacobi rotations (Hestenes 1958). U's columns
-/// are the rotated columns of A divided by their lengths.
-struct Decomposition {
-    glm::dmat3 u{1.0};
-    glm::dvec3 s{0.0};
-    glm::dmat3 v{1.0};
-};
-
-Decomposition decompose(glm::dmat3 a) {
-    Decomposition result;
-    constexpr int kSweeps = 30;
-    for (int sweep = 0; sweep < kSweeps; ++sweep) {
-        bool turned = false;
-        for (int p = 0; p < 2; ++p)
-            for (int q = p + 1; q < 3; ++q) {
-                const double pq = glm::dot(a[p], a[q]), pp = glm::dot(a[p], a[p]), qq = glm::dot(a[q], a[q]);
-                if (!(std::abs(pq) > 1e-16 * std::sqrt(pp * qq))) continue;
-                turned = true;
-                const double zeta = (qq - pp) / (2 * pq);
-                const double t = (zeta >= 0 ? 1 : -1) / (std::abs(zeta) + std::hypot(1.0, zeta));
-                const double c = 1 / std::hypot(1.0, t), s = c * t;
-                const auto turn = [&](glm::dmat3& m) {
-                    const glm::dvec3 old = m[p];
-                    m[p] = c * old - s * m[q];
-                    m[q] = s * old + c * m[q];
-                };
-                turn(a);
-                turn(result.v);
-            }
-        if (!turned) break;
-    }
-    for (int i = 0; i < 3; ++i) {
-        result.s[i] = glm::length(a[i]);
-        result.u[i] = result.s[i] > 0 ? a[i] / result.s[i] : glm::dvec3(0);
-    }
-    return result;
-}
-
-/// Replaces columns of length 0 so that the three are a right-handed orthonormal frame. An axis may change
-/// its sign, which does not change the covariance.
-glm::dmat3 right_handed(glm::dmat3 u) {
-    for (int i = 0; i < 3; ++i) {
-        if (glm::length(u[i]) > 0) continue;
-        const glm::dvec3 other = u[(i + 1) % 3], third = u[(i + 2) % 3];
-        if (glm::length(other) > 0 && glm::length(third) > 0) {
-            u[i] = glm::cross(other, third);
-            continue;
-        }
-        const glm::dvec3 from = glm::length(other) > 0 ? other : third;
-        const glm::dvec3 away = std::abs(from.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
-        const glm::dvec3 side = away - from * glm::dot(from, away);
-        u[i] = glm::length(side) > 0 ? glm::normalize(side) : glm::dvec3(1, 0, 0);
-    }
-    if (glm::determinant(u) < 0) u[2] = -u[2];
-    return u;
-}
 
 /// Snaps a value near a whole number to it, so that turns by 90 degrees are exact.
 double snapped(double v) {
@@ -234,6 +181,21 @@ void select_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices) {
     select_values(gaussians.log_scales, 3, indices);
     select_values(gaussians.sh, gaussians.sh_stride(), indices);
     select_values(gaussians.opacity_logits, 1, indices);
+}
+
+void keep_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices) {
+    assert(std::is_sorted(indices.begin(), indices.end()));
+    const auto keep = [&](std::vector<float>& values, size_t stride) {
+        for (size_t i = 0; i < indices.size(); ++i)
+            if (indices[i] != i)
+                std::copy_n(values.data() + indices[i] * stride, stride, values.data() + i * stride);
+        values.resize(indices.size() * stride);
+    };
+    keep(gaussians.means, 3);
+    keep(gaussians.quaternions, 4);
+    keep(gaussians.log_scales, 3);
+    keep(gaussians.sh, gaussians.sh_stride());
+    keep(gaussians.opacity_logits, 1);
 }
 
 void set_sh_degree(Gaussians& gaussians, int degree) {

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <glm/glm.hpp>
-#include <glm/gtc/quaternion.hpp>
 #include <map>
 #include <memory>
 #include <nanoflann.hpp>
@@ -13,6 +12,7 @@
 
 #include "core/parallel.h"
 #include "scene/native_lens.h"
+#include "scene/splat_shape.h"
 
 namespace ewa::scene {
 
@@ -35,19 +35,11 @@ struct Octave {
     }
 };
 
-using Tree =
+using OctaveTree =
     nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Octave>, Octave, 3, uint32_t>;
 
 double largest_log_scale(const Gaussians& g, size_t i) {
     return std::max({g.log_scales[3 * i], g.log_scales[3 * i + 1], g.log_scales[3 * i + 2]});
-}
-
-glm::dmat3 covariance(const Gaussians& g, size_t i) {
-    const float* q = &g.quaternions[4 * i];
-    const glm::dmat3 rotation(glm::normalize(glm::dquat(q[0], q[1], q[2], q[3])));
-    glm::dmat3 axes = rotation;
-    for (int k = 0; k < 3; ++k) axes[k] *= std::exp(double(g.log_scales[3 * i + size_t(k)]));
-    return axes * glm::transpose(axes);
 }
 
 bool touch(const Gaussians& g, size_t a, size_t b) {
@@ -56,7 +48,7 @@ bool touch(const Gaussians& g, size_t a, size_t b) {
     const float* p = &g.means[3 * a];
     const float* q = &g.means[3 * b];
     const glm::dvec3 d(double(p[0]) - q[0], double(p[1]) - q[1], double(p[2]) - q[2]);
-    return glm::dot(d, glm::inverse(covariance(g, a) + covariance(g, b)) * d) < kTouching;
+    return glm::dot(d, glm::inverse(covariance_of(g, a) + covariance_of(g, b)) * d) < kTouching;
 }
 
 /// Sets that are joined two by two.
@@ -95,7 +87,7 @@ void join_places(const Gaussians& g, std::vector<uint32_t>& splats, Sets& sets) 
 
 /// Joins each splat with those of `tree` that it touches.
 void join_with(const Gaussians& g, const std::vector<uint32_t>& splats, const Octave& octave,
-               const Tree& tree, Sets& sets) {
+               const OctaveTree& tree, Sets& sets) {
     std::array<uint32_t, kNearest> index{};
     std::array<double, kNearest> squared{};
     for (const uint32_t i : splats) {
@@ -119,11 +111,11 @@ SplatGroups touching_groups(const Gaussians& gaussians) {
         octave.gaussians = &gaussians;
         octave.splats.push_back(uint32_t(i));
     }
-    std::map<int, std::unique_ptr<Tree>> trees;
+    std::map<int, std::unique_ptr<OctaveTree>> trees;
     Sets sets(count);
     for (auto& [size, octave] : octaves) {
         join_places(gaussians, octave.splats, sets);
-        trees[size] = std::make_unique<Tree>(3, octave);
+        trees[size] = std::make_unique<OctaveTree>(3, octave);
         trees[size]->buildIndex();
     }
     // Splats of about one size are in one octave or in two that follow each other.

@@ -100,6 +100,10 @@ TEST(Convert, EditsOnTheWay) {
     EXPECT_EQ(converted({"--min-opacity", "0.5"}).size(), 3u);
     EXPECT_EQ(converted({"--crop", "0,0,0,4,4,4"}).means, (std::vector<float>{0, 0, 0, 1, 2, 3}));
     EXPECT_EQ(converted({"--transform", "move=1,0,0", "--crop", "1.5,0,0,9,9,9"}).size(), 2u);
+    EXPECT_EQ(converted({"--decimate", "50%"}).size(), 2u);
+    EXPECT_EQ(converted({"--decimate", "3"}).size(), 3u);
+    EXPECT_EQ(converted({"--decimate", "1k"}).means, g.means);
+    EXPECT_EQ(converted({"--decimate", "0.1%", "--crop", "0,0,0,4,4,4"}).size(), 1u);
     EXPECT_EQ(converted({"--sort", "morton"}).means,
               (std::vector<float>{-1, -2, -3, 0, 0, 0, 1, 2, 3, 5, 5, 5}));
     // A quarter turn round z takes x to y; then twice the size, then moved.
@@ -154,6 +158,8 @@ TEST(Convert, WrongUse) {
     refuse({"--crop", "1,0,0,0,1,1"}, "lower corner");
     refuse({"--min-opacity", "2"}, "min-opacity");
     refuse({"--max-sh", "4"}, "max-sh");
+    for (const char* text : {"0", "0%", "101%", "half", "-5", "%"})
+        refuse({std::string("--decimate=") + text}, "--decimate: '");
     refuse({"--sort", "size"}, "sort");
 }
 
