@@ -23,7 +23,8 @@ set_target_properties(ewa_library PROPERTIES OUTPUT_NAME ewa EXPORT_NAME ewa LIN
 target_link_options(ewa_library PRIVATE -Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/libewa.map -Wl,--as-needed
                                         -Wl,--no-undefined)
 target_link_libraries(ewa_library PRIVATE Vulkan::Vulkan PNG::PNG JPEG::JPEG spdlog::spdlog ZLIB::ZLIB zstd::libzstd_shared
-                                          PkgConfig::WEBP PkgConfig::MINIZIP pugixml::pugixml ${CMAKE_DL_LIBS})
+                                          PkgConfig::WEBP PkgConfig::MINIZIP pugixml::pugixml SQLite::SQLite3
+                                          ${CMAKE_DL_LIBS})
 target_compile_features(ewa_library INTERFACE cxx_std_20)
 target_include_directories(ewa_library INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 if(EWA_SANITIZE)

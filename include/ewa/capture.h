@@ -11,9 +11,9 @@
 
 namespace ewa {
 
-/// Which pairs of images COLMAP compares.
+/// Which pairs of images are compared.
 enum class Matching {
-    automatic,  // sequence for a video; for photos unordered up to 200, else sequence
+    automatic,  // those that look as if they showed the same things, up to 1,000 images; else sequence
     sequence,   // each image with those that follow it in the order of names
     unordered   // all pairs; the time grows with the square of their number
 };

@@ -33,7 +33,7 @@ using core::is_file;
 using core::is_folder;
 using Json = nlohmann::ordered_json;
 
-constexpr int kMostUnordered = 200;  // photos; all pairs of more take hours on a CPU
+constexpr size_t kMostByLook = 1000;  // photos; even their looks take minutes to compare if there are more
 
 std::string extension_of(const fs::path& path) {
     return core::lower(path.extension().string());
@@ -150,6 +150,18 @@ capture::Chosen choose(const fs::path& photos, const fs::path& folder, const Jso
     return {found, {}, {}};
 }
 
+capture::Pairing pairing_of(Matching matching, size_t photos) {
+    switch (matching) {
+        case Matching::sequence:
+            return capture::Pairing::in_sequence;
+        case Matching::unordered:
+            return capture::Pairing::all;
+        case Matching::automatic:
+            break;
+    }
+    return photos > kMostByLook ? capture::Pairing::in_sequence : capture::Pairing::by_look;
+}
+
 /// Tells the user before the long work.
 void say(const std::vector<std::string>& lines, const capture::ProgressFunction& progress) {
     for (const std::string& line : lines) {
@@ -160,18 +172,16 @@ void say(const std::vector<std::string>& lines, const capture::ProgressFunction&
 }
 
 /// Finds the cameras, or removes those of photos that have changed since.
-Capture search(const fs::path& folder, bool video, const capture::Chosen& chosen,
-               const CaptureOptions& options, const capture::ProgressFunction& progress) {
+Capture search(const fs::path& folder, const capture::Chosen& chosen, const CaptureOptions& options,
+               const capture::ProgressFunction& progress) {
     const fs::path model = folder / "sparse/0";
     std::vector<std::string> remarks;
     if (!is_folder(model)) {
-        const bool sequence = options.matching == Matching::automatic
-                                  ? video || int(chosen.names.size()) > kMostUnordered
-                                  : options.matching == Matching::sequence;
         capture::require_photos(folder / "images", chosen.names.size(), {});
         core::make_folder(model.parent_path());
-        remarks = capture::place_photos({folder / "images", chosen.names, sequence}, folder / "colmap", model,
-                                        progress);
+        remarks = capture::place_photos(
+            {folder / "images", chosen.names, pairing_of(options.matching, chosen.names.size())},
+            folder / "colmap", model, progress);
     }
     if (!chosen.gone.empty()) capture::remove_views(model, chosen.gone);
     Capture result = result_of(folder, chosen.names);
@@ -207,7 +217,7 @@ Capture make_of_video(Making& now) {
     if (!fs::exists(fs::symlink_status(images)))
         capture::extract_frames(now.input, images, now.options.frames, work / "log.txt", now.progress);
     const capture::Chosen chosen{capture::photos_in(images), {}, {}};
-    return search(now.folder, true, chosen, now.options, now.progress);
+    return search(now.folder, chosen, now.options, now.progress);
 }
 
 /// link: what images/ refers to.
@@ -219,7 +229,7 @@ Capture make_of_photos(Making& now, const fs::path& photos, const fs::path& link
     core::make_folder(now.folder / "colmap");
     const fs::path images = now.folder / "images";
     if (!fs::exists(fs::symlink_status(images))) fs::create_directory_symlink(link, images);
-    return search(now.folder, false, chosen, now.options, now.progress);
+    return search(now.folder, chosen, now.options, now.progress);
 }
 
 /// Moves the dataset of an archive into the folder that unpacked/ is in.

@@ -5,6 +5,7 @@
 #include <optional>
 #include <regex>
 
+#include "capture/comparing.h"
 #include "capture/panoramas.h"
 #include "capture/steps.h"
 #include "core/atomic_file.h"
@@ -19,9 +20,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kLeastBlock = 4;                 // photos
+constexpr int kLeastBlock = 4;      // photos
+constexpr int kMostCompared = 200;  // photos, all of which are compared where looks have not placed all
+constexpr int kNext = 2;            // photos that follow, which are compared whatever they look like
 constexpr const char* kMostFeatures = "3000";  // of a view; a 360° photo has six
 constexpr int kRounds = 2;                     // of a rig's bundle adjustment, each with new points
+// COLMAP adjusts all cameras and points after each growth by this ratio, not by a tenth. Whatever is left is undone by the last
+// adjustment: docs/capture.md has the figures. Models of few images count.
+constexpr const char* kGlobalRatio = "1.4";
+constexpr const char* kImagesRatio = "Mapper.ba_global_images_ratio";  // COLMAP 3.12 has frames
+constexpr std::array kMapping{"--Mapper.min_model_size",
+                              "3",
+                              "--Mapper.ba_global_points_ratio",
+                              kGlobalRatio,
+                              "--Mapper.ba_global_max_num_iterations",
+                              "25",
+                              "--Mapper.ba_global_max_refinements",
+                              "2",
+                              "--Mapper.ba_local_max_num_iterations",
+                              "15"};
 constexpr std::array kKnownLens{"--Mapper.ba_refine_focal_length", "0", "--Mapper.ba_refine_extra_params",
                                 "0"};
 constexpr const char* kOverlap =
@@ -45,6 +62,12 @@ class Colmap {
                 return true;
             });
         return help.find("--" + option + " ") != std::string::npos;
+    }
+
+    /// The option that has a matcher use a GPU, which COLMAP 3.13 has renamed.
+    std::string gpu_of_matching(const std::string& command) const {
+        return has_option(command, "FeatureMatching.use_gpu") ? "--FeatureMatching.use_gpu"
+                                                              : "--SiftMatching.use_gpu";
     }
 
     /// Runs a program. done(line): the number of finished units after this line of the output, if it says so.
@@ -165,65 +188,81 @@ std::vector<int> pairs_after_steps(int count, int block) {
     return pairs;
 }
 
-std::string matching_gpu(const Colmap& colmap, const std::string& command) {
-    return colmap.has_option(command, "FeatureMatching.use_gpu") ? "--FeatureMatching.use_gpu"
-                                                                 : "--SiftMatching.use_gpu";
+/// COLMAP verifies the matches of these pairs of images. Their names have no white space.
+void verify_listed(const Colmap& colmap, const PanoramaViews& views, const std::vector<ImagePair>& pairs,
+                   const fs::path& work) {
+    std::string text;
+    for (const auto& [a, b] : pairs)
+        text += views.photos.names[size_t(a)].string() + " " + views.photos.names[size_t(b)].string() + "\n";
+    core::write_text_file(work / "pairs.txt", text);
+    colmap.run({"colmap", "matches_importer", "--database_path", argument(work / "database.db"),
+                "--match_list_path", argument(work / "pairs.txt"), "--match_type", "pairs",
+                colmap.gpu_of_matching("matches_importer"), "0"},
+               {CapturePhase::matches, "verified", "pairs", 0, int(pairs.size()), {}},
+               [](const std::string&) { return std::nullopt; });
 }
 
-/// A run for each photo shows the progress.
-void match_views(const Colmap& colmap, const Photos& panoramas, const fs::path& work) {
-    const fs::path done = work / "matches.done", list = work / "pairs.txt";
-    if (core::is_file(done)) return;
-    const std::string gpu = matching_gpu(colmap, "matches_importer");
-    const std::vector<std::string> pairs = view_pairs(panoramas);
-    const auto lines = [](const std::string& text) { return int(std::ranges::count(text, '\n')); };
-    int before = 0, total = 0;
-    for (const std::string& text : pairs) total += lines(text);
-    for (const std::string& text : pairs) {
-        core::write_text_file(list, text);
-        colmap.run({"colmap", "matches_importer", "--database_path", argument(work / "database.db"),
-                    "--match_list_path", argument(list), "--match_type", "pairs", gpu, "0"},
-                   {CapturePhase::matches, "matched", "pairs", before, total, {}},
-                   [](const std::string&) { return std::nullopt; });
-        before += lines(text);
-    }
-    mark(done);
+/// The pairs of views of two photos each, since those of one photo have no baseline.
+void match_views(const Colmap& colmap, const Photos& panoramas, const PanoramaViews& views, Pairing pairing,
+                 const fs::path& work, const ProgressFunction& progress) {
+    const std::vector<ImagePair> pairs = pairs_of_views(pairs_of(int(panoramas.names.size()), pairing));
+    const auto compared =
+        compare_photos(work / "database.db", views.photos.names,
+                       {.pairs = pairs, .by_look = pairing != Pairing::all}, "views", progress);
+    verify_listed(colmap, views, compared.value_or(pairs), work);
 }
 
-void match(const Colmap& colmap, const Photos& photos, const fs::path& work) {
-    const fs::path done = work / "matches.done";
-    if (core::is_file(done)) return;
-    const std::string command = photos.in_sequence ? "sequential_matcher" : "exhaustive_matcher";
-    const std::string gpu = matching_gpu(colmap, command);
-    std::vector<std::string> words{"colmap", command, "--database_path", argument(work / "database.db"),
-                                   gpu,      "0"};
-    const int count = int(photos.names.size());
-    if (photos.in_sequence) {
-        // Neighbours, and images 2, 4, 8 ... 512 later, which close the loop of a walk round an object.
+/// COLMAP verifies the matches of photos, and compares those whose matches are not known.
+void verify(const Colmap& colmap, int count, Pairing pairing, const fs::path& work) {
+    const std::string command = pairing == Pairing::in_sequence ? "sequential_matcher" : "exhaustive_matcher";
+    std::vector<std::string> words{
+        "colmap", command, "--database_path", argument(work / "database.db"), colmap.gpu_of_matching(command),
+        "0"};
+    if (pairing == Pairing::in_sequence) {
         for (const char* word :
              {"--SequentialMatching.overlap", "10", "--SequentialMatching.quadratic_overlap", "1"})
             words.emplace_back(word);
         static const std::regex pattern(R"(\[(\d+)/(\d+)\])");
-        colmap.run(std::move(words), {CapturePhase::matches, "matched", "photos", 0, count, {}},
+        colmap.run(std::move(words), {CapturePhase::matches, "verified", "photos", 0, count, {}},
                    [](const std::string& line) -> std::optional<int> {
                        const auto numbers = numbers_in(line, pattern);
                        return numbers ? std::optional(numbers->first) : std::nullopt;
                    });
+        return;
+    }
+    // Small blocks show the progress. COLMAP takes each block with each, and keeps five in memory.
+    const int block = std::max(kLeastBlock, (count + 9) / 10), blocks = (count + block - 1) / block;
+    words.insert(words.end(), {"--ExhaustiveMatching.block_size", std::to_string(block)});
+    const std::vector<int> pairs = pairs_after_steps(count, block);
+    static const std::regex pattern(R"(\[(\d+)/\d+, (\d+)/\d+\])");
+    colmap.run(std::move(words), {CapturePhase::matches, "verified", "pairs", 0, pairs.back(), {}},
+               [&pairs, blocks](const std::string& line) -> std::optional<int> {
+                   const auto numbers = numbers_in(line, pattern);
+                   if (!numbers) return {};
+                   // Newer releases print the line at the beginning of a step.
+                   const bool over = line.find("] in ") != std::string::npos;
+                   const int steps = (numbers->first - 1) * blocks + numbers->second - (over ? 0 : 1);
+                   return pairs[size_t(std::clamp(steps, 0, int(pairs.size()) - 1))];
+               });
+}
+
+/// done: the file that says so. views: those that the photos are; null: they are none.
+void match(const Colmap& colmap, const Photos& given, const PanoramaViews* views, Pairing pairing,
+           const fs::path& work, const fs::path& done, const ProgressFunction& progress) {
+    if (core::is_file(done)) return;
+    if (views) {
+        match_views(colmap, given, *views, pairing, work, progress);
     } else {
-        // Small blocks show the progress. COLMAP compares each block with each, and keeps five in memory.
-        const int block = std::max(kLeastBlock, (count + 9) / 10), blocks = (count + block - 1) / block;
-        words.insert(words.end(), {"--ExhaustiveMatching.block_size", std::to_string(block)});
-        const std::vector<int> pairs = pairs_after_steps(count, block);
-        static const std::regex pattern(R"(\[(\d+)/\d+, (\d+)/\d+\])");
-        colmap.run(std::move(words), {CapturePhase::matches, "matched", "pairs", 0, pairs.back(), {}},
-                   [&pairs, blocks](const std::string& line) -> std::optional<int> {
-                       const auto numbers = numbers_in(line, pattern);
-                       if (!numbers) return {};
-                       // Newer releases print the line at the beginning of a step.
-                       const bool over = line.find("] in ") != std::string::npos;
-                       const int steps = (numbers->first - 1) * blocks + numbers->second - (over ? 0 : 1);
-                       return pairs[size_t(std::clamp(steps, 0, int(pairs.size()) - 1))];
-                   });
+        const int count = int(given.names.size());
+        Comparison comparison{.pairs = pairs_of(count, pairing), .by_look = pairing == Pairing::by_look};
+        if (comparison.by_look) {
+            comparison.pass_over_others = true;
+            for (int i = 0; i < count; ++i)
+                for (int k = i + 1; k <= std::min(i + kNext, count - 1); ++k)
+                    comparison.always.emplace_back(i, k);
+        }
+        compare_photos(work / "database.db", given.names, comparison, "photos", progress);
+        verify(colmap, count, pairing, work);
     }
     mark(done);
 }
@@ -263,8 +302,9 @@ std::vector<Model> map(const Colmap& colmap, const Photos& photos, const Panoram
                                    argument(photos.folder),
                                    "--output_path",
                                    argument(folder)};
-    // By default COLMAP throws models of fewer than 10 images away.
-    if (!glomap) words.insert(words.end(), {"--Mapper.min_model_size", "3"});
+    if (!glomap) words.insert(words.end(), kMapping.begin(), kMapping.end());
+    if (!glomap && colmap.has_option("mapper", kImagesRatio))
+        words.insert(words.end(), {"--" + std::string(kImagesRatio), kGlobalRatio});
     if (!glomap && views) words.insert(words.end(), kKnownLens.begin(), kKnownLens.end());
     static const std::regex pattern(R"(Registering image #\d+ \((\d+)\)|num_reg_frames=(\d+))");
     colmap.run(std::move(words),
@@ -274,6 +314,21 @@ std::vector<Model> map(const Colmap& colmap, const Photos& photos, const Panoram
                    return numbers ? std::optional(std::max(numbers->first, numbers->second)) : std::nullopt;
                });
     return models_in(folder);
+}
+
+/// The models that a mapper makes. None where it finds no pair of images to begin with, which COLMAP's takes for a failure.
+std::vector<Model> map_if_possible(const Colmap& colmap, const Photos& photos, const PanoramaViews* views,
+                                   const fs::path& work) try {
+    return map(colmap, photos, views, work);
+} catch (const RunError&) {
+    if (!core::is_folder(work / "models") || !models_in(work / "models").empty()) throw;
+    return {};
+}
+
+/// The photos in the largest model.
+size_t placed_photos(const std::vector<Model>& models, const PanoramaViews* views) {
+    if (models.empty()) return 0;
+    return views ? rig_poses(models.front().folder).photos.size() : size_t(models.front().images);
 }
 
 std::string sizes_text(const std::vector<Model>& models) {
@@ -364,16 +419,18 @@ std::vector<std::string> place_photos(const Photos& given, const fs::path& work,
     const PanoramaViews* views = cut ? &*cut : nullptr;
     const Photos& photos = views ? views->photos : given;
     extract_features(colmap, photos, views, work);
-    if (views)
-        match_views(colmap, given, work);
-    else
-        match(colmap, photos, work);
-    std::vector<Model> models;
-    try {
-        models = map(colmap, photos, views, work);
-    } catch (const RunError&) {
-        // COLMAP's mapper fails, too, where it finds no pair of images to begin with.
-        if (!core::is_folder(work / "models") || !models_in(work / "models").empty()) throw;
+    match(colmap, given, views, given.pairing, work, work / "matches.done", progress);
+    std::vector<Model> models = map_if_possible(colmap, photos, views, work);
+    const size_t placed = placed_photos(models, views);
+    if (given.pairing == Pairing::by_look && placed < given.names.size() &&
+        int(given.names.size()) <= kMostCompared) {
+        // The comparisons that seemed needless may place the others.
+        const fs::path before = work / "models_by_look";
+        fs::remove_all(before);
+        fs::rename(work / "models", before);
+        match(colmap, given, views, Pairing::all, work, work / "all_matches.done", progress);
+        models = map_if_possible(colmap, photos, views, work);
+        if (placed_photos(models, views) < placed) models = models_in(before);
     }
     if (models.empty() || models.front().images < 2)
         throw InputError("COLMAP could not place the " + std::to_string(given.names.size()) +

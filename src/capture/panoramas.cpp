@@ -24,7 +24,6 @@ constexpr int kNear = 16;            // columns differ that are this part of the
 constexpr double kContinues = 0.5;   // the borders differ by less than this part of it
 constexpr double kNoise = 1 / 64.0;  // of white
 constexpr uint64_t kXmpBytes = 1 << 18;
-constexpr int kSequence = 10;  // photos that follow
 
 /// 90 degrees wide and high, with the photo's pixels per degree in its middle.
 Camera view_of(const Camera& panorama) {
@@ -173,7 +172,7 @@ bool are_panoramas(const fs::path& folder, const std::vector<fs::path>& names) {
 
 PanoramaViews views_of_panoramas(const Photos& photos, const fs::path& folder,
                                  const ProgressFunction& progress) {
-    PanoramaViews views{{folder, {}, photos.in_sequence}, {}};
+    PanoramaViews views{{folder, {}, photos.pairing}, {}};
     const int total = int(photos.names.size());
     int done = 0;
     for (const fs::path& name : photos.names) {
@@ -194,24 +193,13 @@ PanoramaViews views_of_panoramas(const Photos& photos, const fs::path& folder,
     return views;
 }
 
-std::vector<std::string> view_pairs(const Photos& photos) {
-    const int count = int(photos.names.size());
-    std::vector<std::string> all;
-    for (int a = 0; a + 1 < count; ++a) {
-        std::string text;
-        for (int b = a + 1; b < count; ++b) {
-            // Neighbours, and photos 16, 32 ... 512 later, which close the loop of a walk.
-            const int apart = b - a;
-            if (photos.in_sequence && apart > kSequence && (apart > 512 || (apart & (apart - 1)) != 0))
-                continue;
-            for (int i = 0; i < kPanoramaViews; ++i)
-                for (int k = 0; k < kPanoramaViews; ++k)
-                    text += view_name(i, photos.names[size_t(a)]).string() + " " +
-                            view_name(k, photos.names[size_t(b)]).string() + "\n";
-        }
-        all.push_back(std::move(text));
-    }
-    return all;
+std::vector<ImagePair> pairs_of_views(const std::vector<ImagePair>& photos) {
+    std::vector<ImagePair> pairs;
+    for (const auto& [a, b] : photos)
+        for (int i = 0; i < kPanoramaViews; ++i)
+            for (int k = 0; k < kPanoramaViews; ++k)
+                pairs.emplace_back(a * kPanoramaViews + i, b * kPanoramaViews + k);
+    return pairs;
 }
 
 }  // namespace ewa::capture

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "capture/matching.h"
 #include "capture/steps.h"
 #include "ewa/image.h"
 
@@ -42,8 +43,9 @@ struct PanoramaViews {
 PanoramaViews views_of_panoramas(const Photos& photos, const std::filesystem::path& folder,
                                  const ProgressFunction& progress);
 
-/// The pairs of views to compare, a text for each photo: of two photos each, since those of one photo have no baseline.
-std::vector<std::string> view_pairs(const Photos& photos);
+/// The pairs of views of these pairs of photos, by places in PanoramaViews::photos. Views of one photo have no baseline, and are
+/// in no pair.
+std::vector<ImagePair> pairs_of_views(const std::vector<ImagePair>& photos);
 
 /// The place and the direction of a photo.
 struct Pose {

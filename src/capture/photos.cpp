@@ -5,10 +5,10 @@
 #include <chrono>
 #include <future>
 #include <map>
-#include <thread>
 
 #include "capture/steps.h"
 #include "core/folders.h"
+#include "core/parallel.h"
 #include "core/sandboxed_path.h"
 #include "core/text.h"
 #include "core/typing.h"
@@ -112,28 +112,37 @@ void require_photos(const fs::path& folder, size_t count, const std::vector<Skip
     throw InputError(text);
 }
 
+void on_all_cores(CaptureProgress now, const ProgressFunction& progress,
+                  const std::function<void(size_t)>& work, size_t most) {
+    if (!progress(now)) throw Stopped();
+    std::atomic<int> done = 0;
+    std::atomic<bool> stopped = false;
+    std::future<void> all = std::async(std::launch::async, [&] {
+        core::on_all_cores(
+            size_t(now.total),
+            [&](size_t i) {
+                if (stopped) return;
+                work(i);
+                ++done;
+            },
+            most);
+    });
+    while (all.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) {
+        now.done = done;
+        if (!stopped && !progress(now)) stopped = true;
+    }
+    all.get();
+    now.done = done;
+    if (stopped || !progress(now)) throw Stopped();
+}
+
 std::vector<Skipped> faults_in(const fs::path& folder, const std::vector<fs::path>& names,
                                const ProgressFunction& progress) {
     std::vector<std::string> faults(names.size());
-    std::atomic<size_t> next = 0, done = 0;
-    const size_t cores = std::max(1u, std::thread::hardware_concurrency());
     const size_t room = std::max<size_t>(1, kDecodingBytes / decoded_bytes(folder, names));
-    const auto look = [&] {
-        for (size_t i; (i = next++) < names.size(); ++done) faults[i] = fault_of(folder, names[i]);
-    };
-    std::vector<std::future<void>> threads;
-    for (size_t i = 0; i < std::min({cores, room, names.size()}); ++i)
-        threads.push_back(std::async(std::launch::async, look));
-    bool stopped = false;
-    for (const auto& thread : threads)
-        while (thread.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready)
-            if (!stopped &&
-                !progress({CapturePhase::photos, "looked at", "photos", int(done), int(names.size()), {}})) {
-                next = names.size();
-                stopped = true;
-            }
-    for (auto& thread : threads) thread.get();
-    if (stopped) throw Stopped();
+    on_all_cores(
+        {CapturePhase::photos, "looked at", "photos", 0, int(names.size()), {}}, progress,
+        [&](size_t i) { faults[i] = fault_of(folder, names[i]); }, room);
     std::vector<Skipped> skipped;
     for (size_t i = 0; i < names.size(); ++i)
         if (!faults[i].empty()) skipped.push_back({names[i], faults[i]});

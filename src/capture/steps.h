@@ -20,6 +20,11 @@ using ProgressFunction = std::function<bool(const CaptureProgress&)>;
 /// Thrown when the caller's progress function has ended the run.
 struct Stopped {};
 
+/// Calls work(i) for each i < now.total on all cores, and says how many are done. most: of them at once. Throws Stopped, and what
+/// work throws.
+void on_all_cores(CaptureProgress now, const ProgressFunction& progress,
+                  const std::function<void(size_t)>& work, size_t most = SIZE_MAX);
+
 /// The variance of a grey image's Laplacian (Pech-Pacheco et al. 2000): larger where the image is sharper. Images of
 /// one size can be compared. 0 for an image of less than 3 x 3 pixels.
 double sharpness(const std::uint8_t* pixels, int width, int height);
@@ -118,11 +123,18 @@ std::vector<LensGroup> lenses_of(const std::filesystem::path& folder,
 /// model cannot be read, RunError.
 void remove_views(const std::filesystem::path& model, const std::set<std::string>& names);
 
+/// Which photos are compared.
+enum class Pairing {
+    by_look,      // those that share prominent features, and neighbours in the order of names
+    in_sequence,  // neighbours in the order of names, and some later ones
+    all
+};
+
 /// What COLMAP has to place.
 struct Photos {
     std::filesystem::path folder;              // of the images
     std::vector<std::filesystem::path> names;  // relative to it
-    bool in_sequence = false;                  // neighbours in the order of names show the same things
+    Pairing pairing = Pairing::all;
 };
 
 /// Runs COLMAP in `work` and leaves its largest model in `model` (cameras.bin, images.bin, points3D.bin). Throws

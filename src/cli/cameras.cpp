@@ -44,8 +44,7 @@ void refuse_frames(const std::string& frames, const fs::path& photos) {
 void place_with_progress(const fs::path& input, const fs::path& folder, const CaptureOptions& options,
                          Progress& progress, const CaptureProgressLine::After& after) {
     const InterruptWatch watch;
-    const bool video = fs::is_regular_file(input) && !is_archive(input);
-    CaptureProgressLine line(progress, video, options.matching, after);
+    CaptureProgressLine line(progress, options.matching, after);
     const Capture capture = make_dataset(input, folder, options, [&](const CaptureProgress& now) {
         line.update(now);
         return !interrupted();
@@ -83,9 +82,9 @@ Action add_cameras(CLI::App& app) {
         {"auto", Matching::automatic}, {"sequence", Matching::sequence}, {"unordered", Matching::unordered}};
     app.add_option_function<std::string>(
            "--matching", [&options](const std::string& name) { options.matching = kMatchings.at(name); },
-           "Which photos to compare. sequence: each with those that follow it in the order of names. "
-           "unordered: all "
-           "with all. auto: sequence for a video and for more than 200 photos")
+           "Which photos to compare. unordered: each with each. sequence: each with those that follow it in "
+           "the order of names. auto: those that look as if they showed the same things, up to 1,000 photos; "
+           "sequence for more")
         ->transform(one_of({"auto", "sequence", "unordered"}))
         ->type_name("ORDER")
         ->default_str("auto");

@@ -14,15 +14,15 @@ namespace {
 // Seconds by those to search a photo, from photos of 270x480 and 540x960. Photos with twice the details take twice the time to
 // search, and four times to compare.
 double seconds_of_pair(double search) {
-    constexpr double kMostDetails = 2.5;  // COLMAP keeps 8,192 details of a photo
-    return std::min(kMostDetails, 3.3 * std::pow(search, 1.75));
+    constexpr double kMostDetails = 0.2;  // COLMAP keeps 8,192 details of a photo
+    return std::min(kMostDetails, 0.24 * std::pow(search, 1.75));
 }
 double seconds_to_place(double search) {
-    return 1.2 * std::sqrt(search);
+    return 1.05 * std::pow(search, 0.8);
 }
 
-constexpr double kNeighbours = 19;   // of a photo in a sequence
-constexpr int kMostUnordered = 200;  // photos, with Matching::automatic
+constexpr double kInSequence = 19, kByLook = 7;  // pairs by photo
+constexpr int kMostByLook = 1000;                // photos, with Matching::automatic
 // Costs on the machine of docs/performance.md, used until this machine has measured its own.
 constexpr double kSearchPerPixel = 0.8e-6;  // s
 constexpr double kPointsPerPixel = 0.1;     // first splats, of the pixels of one photo
@@ -37,9 +37,12 @@ double CaptureProgressLine::rest() const {
     if (phase_ == CapturePhase::cameras) return after;
     const double placing = photos_ * seconds_to_place(search_seconds_) + after;
     if (phase_ == CapturePhase::matches) return placing;
-    const bool in_sequence = matching_ == Matching::automatic ? video_ || photos_ > kMostUnordered
-                                                              : matching_ == Matching::sequence;
-    const double each = in_sequence ? std::min(kNeighbours, (photos_ - 1) / 2.0) : (photos_ - 1) / 2.0;
+    const bool automatic = matching_ == Matching::automatic;
+    double each = (photos_ - 1) / 2.0;
+    if (automatic && photos_ <= kMostByLook)
+        each = std::min(each, kByLook);
+    else if (automatic || matching_ == Matching::sequence)
+        each = std::min(each, kInSequence);
     const double matching = photos_ * each * seconds_of_pair(search_seconds_) + placing;
     return phase_ == CapturePhase::features ? matching : matching + photos_ * search_seconds_;
 }

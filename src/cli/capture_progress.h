@@ -18,15 +18,14 @@ class CaptureProgressLine {
     /// Seconds of the work after the capture, for so many photos that take so many seconds each to search.
     using After = std::function<double(int photos, double search_seconds)>;
 
-    CaptureProgressLine(Progress& progress, bool video, Matching matching, After after)
-        : progress_(progress), video_(video), matching_(matching), after_(std::move(after)) {}
+    CaptureProgressLine(Progress& progress, Matching matching, After after)
+        : progress_(progress), matching_(matching), after_(std::move(after)) {}
     void update(const CaptureProgress& now);
 
   private:
     double rest() const;
 
     Progress& progress_;
-    bool video_;
     Matching matching_;
     After after_;
     std::string what_;  // empty before the first part

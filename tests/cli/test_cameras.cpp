@@ -9,11 +9,13 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "capture/feature_database.h"
 #include "cli/expect.h"
 #include "cli/program.h"
 #include "core/process.h"
 #include "ewa/image.h"
 #include "io/splats/archive.h"
+#include "support/colmap_database.h"
 
 namespace {
 
@@ -49,7 +51,7 @@ done
 if [ "$FAIL" = "$1" ]; then echo "the reason" >&2; exit 1; fi
 if [ "$HANG" = "$1" ]; then echo $$ > "$CALLS.hangs"; exec sleep 1000; fi
 case $1 in
-feature_extractor) touch "$3"; for i in 1 2 3 4; do echo "Processed file [$i/4]"; done;;
+feature_extractor) if [ "$DATABASE" ]; then cp "$DATABASE" "$3"; else touch "$3"; fi; for i in 1 2 3 4; do echo "Processed file [$i/4]"; done;;
 exhaustive_matcher) echo "Matching block [1/1, 1/1] in 0.1s";;
 mapper) cp -r "$MODELS"/. "$output"; echo "Registering image #4 (4)";;
 esac
@@ -133,6 +135,33 @@ TEST_F(Cameras, OfTheLargestModelAreTaken) {
     EXPECT_NE(outcome.out.find("1 of 4 photos could not be placed, and are not used: 2.png"),
               std::string::npos)
         << outcome.out;
+}
+
+/// Photos that nothing connects: neighbours by name are compared, and the others where these do not suffice.
+TEST_F(Cameras, ComeFromComparingWhatLooksAlike) {
+    std::vector<DatabaseImage> images;
+    for (int i = 0; i < 4; ++i) {
+        images.push_back({std::to_string(i) + ".png", std::vector<std::uint8_t>(128, 0), {1.0f}});
+        images.back().descriptors[size_t(i)] = 255;
+    }
+    write_colmap_database(folder_ / "features.db", images);
+    const Circumstances features{.environment = {{"DATABASE", folder_ / "features.db"}}};
+    const auto first_and_last = [&] {
+        return ewa::capture::FeatureDatabase(folder_ / "dataset/colmap/database.db").is_compared(1, 4);
+    };
+    make_model("0", {"0.png", "1.png", "2.png", "3.png"});
+    const Outcome outcome = cameras(features);
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find("matched 5/5 pairs"), std::string::npos) << outcome.out;
+    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nmapper\n");
+    EXPECT_FALSE(first_and_last());
+
+    fs::remove_all(folder_ / "dataset");
+    fs::remove(folder_ / "calls");
+    make_model("0", {"0.png", "1.png", "2.png"});
+    ASSERT_EQ(cameras(features).status, 0);
+    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nmapper\nexhaustive_matcher\nmapper\n");
+    EXPECT_TRUE(first_and_last());
 }
 
 TEST_F(Cameras, ThatCannotBeFoundAreExplained) {
@@ -476,7 +505,7 @@ esac
     EXPECT_NE(outcome.out.find("3 of 3 photos have cameras"), std::string::npos) << outcome.out;
     EXPECT_NE(read_file(folder_ / "calls.ffmpeg").find("select='eq(n,1)+eq(n,4)+eq(n,7)'"),
               std::string::npos);
-    EXPECT_EQ(calls(), "feature_extractor\nsequential_matcher\nmapper\n");
+    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nmapper\n");
 
     EXPECT_NE(read_file(folder_ / "calls.ffmpeg").find("-format_whitelist"), std::string::npos);
 

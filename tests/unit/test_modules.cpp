@@ -97,6 +97,7 @@ const std::vector<std::pair<std::string, Modules>> kLibraries = {
     {"nanoflann", {"src/scene"}},
     {"tiny_gltf", {"src/io/gltf"}},
     {"pugixml", {"src/io/datasets"}},
+    {"sqlite3.h", {"src/capture"}},
     {"zstd", {"src/io/splats"}},
     {"zlib", {"src/image", "src/io/splats", "src/portions", "src/train"}},
     {"nlohmann/",

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/comparing.h"
+
+#include <algorithm>
+#include <set>
+
+#include "capture/feature_database.h"
+#include "core/text.h"
+
+namespace ewa::capture {
+namespace {
+
+constexpr size_t kProminent = 256;  // features of a photo that say whether another one is worth comparing
+constexpr int kEach = 12;           // photos that one is compared with, by look
+
+constexpr int kSequence = 10;       // photos that follow, of a sequence
+constexpr int kFarthest = 512;
+
+using Places = std::vector<ImagePair>;
+
+/// How many prominent features the photos of each pair share.
+std::vector<int> shared_features(const FeatureDatabase& database, const std::vector<std::int64_t>& images,
+                                 const Places& pairs, const char* unit, const ProgressFunction& progress) {
+    std::vector<Descriptors> prominent(images.size());
+    on_all_cores({CapturePhase::matches, "read", unit, 0, int(images.size()), {}}, progress,
+                 [&](size_t i) { prominent[i] = database.prominent(images[i], kProminent); });
+    std::vector<int> shared(pairs.size());
+    on_all_cores({CapturePhase::matches, "looked at", "pairs", 0, int(pairs.size()), {}}, progress,
+                 [&](size_t i) {
+                     const auto [a, b] = pairs[i];
+                     shared[i] = int(matches_of(prominent[size_t(a)], prominent[size_t(b)]).size());
+                 });
+    return shared;
+}
+
+}  // namespace
+
+std::vector<ImagePair> pairs_of(int photos, Pairing pairing) {
+    std::vector<ImagePair> pairs;
+    for (int a = 0; a < photos; ++a)
+        for (int b = a + 1; b < photos; ++b) {
+            const int apart = b - a;
+            if (pairing != Pairing::in_sequence || apart <= kSequence ||
+                (apart <= kFarthest && (apart & (apart - 1)) == 0))
+                pairs.emplace_back(a, b);
+        }
+    return pairs;
+}
+
+std::optional<std::vector<ImagePair>> compare_photos(const std::filesystem::path& file,
+                                                     const std::vector<std::filesystem::path>& names,
+                                                     const Comparison& comparison, const char* unit,
+                                                     const ProgressFunction& progress) {
+    FeatureDatabase database(file);
+    if (!database.is_known()) return {};
+    const auto numbers = database.images();
+    std::vector<std::int64_t> images;  // 0: none
+    for (const std::filesystem::path& name : names) {
+        const auto found = numbers.find(name.string());
+        images.push_back(found == numbers.end() ? 0 : found->second);
+    }
+    Places pairs = comparison.pairs;
+    if (comparison.by_look) {
+        pairs = pairs_by_look(pairs, shared_features(database, images, pairs, unit, progress), kEach);
+        pairs.insert(pairs.end(), comparison.always.begin(), comparison.always.end());
+        std::ranges::sort(pairs);
+        pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+    }
+    const auto has_features = [&](const ImagePair& pair) {
+        return images[size_t(pair.first)] != 0 && images[size_t(pair.second)] != 0;
+    };
+    std::erase_if(pairs, [&](const ImagePair& pair) { return !has_features(pair); });
+    const auto compare = [&](size_t i) {
+        const std::int64_t a = images[size_t(pairs[i].first)], b = images[size_t(pairs[i].second)];
+        if (!database.is_compared(a, b))
+            database.write(a, b, matches_of(database.descriptors(a), database.descriptors(b)));
+    };
+    try {
+        on_all_cores({CapturePhase::matches, "matched", "pairs", 0, int(pairs.size()), {}}, progress, compare);
+    } catch (const Stopped&) {
+        database.commit();
+        throw;
+    }
+    if (comparison.pass_over_others) {
+        const std::set<ImagePair> compared(pairs.begin(), pairs.end());
+        for (int a = 0; a < int(images.size()); ++a)
+            for (int b = a + 1; b < int(images.size()); ++b)
+                if (has_features({a, b}) && !compared.contains({a, b}))
+                    database.pass_over(images[size_t(a)], images[size_t(b)]);
+    }
+    database.commit();
+    return pairs;
+}
+
+}  // namespace ewa::capture

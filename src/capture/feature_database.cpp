@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/feature_database.h"
+
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <numeric>
+#include <span>
+
+#include "core/text.h"
+#include "ewa/error.h"
+
+namespace ewa::capture {
+namespace {
+
+constexpr std::int64_t kMostImages = 2147483647;  // a pair's number is made with it
+constexpr int kUndefined = 0;                     // the configuration of a pair without a geometry
+constexpr int kWait = 10000;                      // ms, for another program that uses the file
+
+struct Pair {
+    std::int64_t number = 0;
+    bool swapped = false;
+};
+
+Pair pair_of(std::int64_t first, std::int64_t second) {
+    const bool swapped = first > second;
+    if (swapped) std::swap(first, second);
+    return {first * kMostImages + second, swapped};
+}
+
+}  // namespace
+
+/// A statement of SQL, from its preparation to its end.
+class FeatureDatabase::Statement {
+  public:
+    Statement(const FeatureDatabase& database, const char* sql) : database_(database) {
+        sqlite3_stmt* statement = nullptr;
+        check(sqlite3_prepare_v2(database.database_.get(), sql, -1, &statement, nullptr) == SQLITE_OK);
+        statement_.reset(statement);
+    }
+
+    Statement& bind(int place, std::int64_t value) {
+        check(sqlite3_bind_int64(statement_.get(), place, value) == SQLITE_OK);
+        return *this;
+    }
+    Statement& bind(int place, std::span<const std::uint32_t> values) {
+        check(sqlite3_bind_blob64(statement_.get(), place, values.data(), values.size_bytes(),
+                                  SQLITE_TRANSIENT) == SQLITE_OK);
+        return *this;
+    }
+    /// Whether there is another row.
+    bool step() {
+        const int result = sqlite3_step(statement_.get());
+        check(result == SQLITE_ROW || result == SQLITE_DONE);
+        return result == SQLITE_ROW;
+    }
+    std::int64_t integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
+    std::string text(int column) const {
+        const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), column));
+        return text ? text : "";
+    }
+    /// The array in the columns rows, cols, data. Throws RunError where the data have another size.
+    template <class T>
+    std::span<const T> array() const {
+        const std::int64_t rows = integer(0), columns = integer(1);
+        const auto* values = static_cast<const T*>(sqlite3_column_blob(statement_.get(), 2));
+        const auto bytes = size_t(sqlite3_column_bytes(statement_.get(), 2));
+        check(rows >= 0 && columns >= 0 && columns <= std::int64_t(kDescriptorSize) &&
+                  rows <= kMostImages && size_t(rows * columns) * sizeof(T) == bytes,
+              "an array has another size than it says");
+        return {values, bytes / sizeof(T)};
+    }
+    void check(bool good, const char* reason = nullptr) const {
+        if (!good)
+            throw RunError(database_.name_ + ": " +
+                           (reason ? reason : sqlite3_errmsg(database_.database_.get())));
+    }
+
+  private:
+    const FeatureDatabase& database_;
+    std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)> statement_{nullptr, sqlite3_finalize};
+};
+
+FeatureDatabase::FeatureDatabase(const std::filesystem::path& file)
+    : name_(core::one_line(file.string())), database_(nullptr, sqlite3_close) {
+    sqlite3* database = nullptr;
+    const int result = sqlite3_open_v2(file.c_str(), &database, SQLITE_OPEN_READWRITE, nullptr);
+    database_.reset(database);
+    if (result != SQLITE_OK) throw RunError(name_ + ": " + sqlite3_errstr(result));
+    sqlite3_busy_timeout(database, kWait);
+    execute("BEGIN");
+}
+
+FeatureDatabase::~FeatureDatabase() = default;
+
+void FeatureDatabase::execute(const char* sql) const {
+    Statement(*this, sql).step();
+}
+
+bool FeatureDatabase::is_known() const {
+    const std::scoped_lock lock(mutex_);
+    Statement count(*this,
+                    "SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name IN "
+                    "('images', 'keypoints', 'descriptors', 'matches', 'two_view_geometries')");
+    return count.step() && count.integer(0) == 5;
+}
+
+std::map<std::string, std::int64_t> FeatureDatabase::images() const {
+    const std::scoped_lock lock(mutex_);
+    std::map<std::string, std::int64_t> images;
+    for (Statement rows(*this, "SELECT image_id, name FROM images"); rows.step();) {
+        rows.check(rows.integer(0) > 0 && rows.integer(0) < kMostImages, "an image has a number out of range");
+        images[rows.text(1)] = rows.integer(0);
+    }
+    return images;
+}
+
+Descriptors FeatureDatabase::descriptors(std::int64_t image) const {
+    const std::scoped_lock lock(mutex_);
+    Statement row(*this, "SELECT rows, cols, data FROM descriptors WHERE image_id = ?");
+    if (!row.bind(1, image).step()) return {};
+    row.check(row.integer(0) == 0 || row.integer(1) == std::int64_t(kDescriptorSize),
+              "its descriptors are not those of SIFT");
+    const auto values = row.array<std::uint8_t>();
+    return {values.begin(), values.end()};
+}
+
+Descriptors FeatureDatabase::prominent(std::int64_t image, size_t most) const {
+    const Descriptors all = descriptors(image);
+    const size_t count = all.size() / kDescriptorSize;
+    std::vector<float> scales(count, 0.0f);
+    {
+        const std::scoped_lock lock(mutex_);
+        Statement row(*this, "SELECT rows, cols, data FROM keypoints WHERE image_id = ?");
+        if (row.bind(1, image).step()) {
+            const auto values = row.array<float>();
+            const auto columns = size_t(row.integer(1));
+            row.check(values.size() == count * columns, "an image has other keypoints than descriptors");
+            // A keypoint is x, y and nothing, or scale and angle, or a 2x2 matrix by rows.
+            for (size_t i = 0; i < count && columns >= 4; ++i)
+                scales[i] = columns < 6 ? values[i * columns + 2]
+                                        : std::hypot(values[i * columns + 2], values[i * columns + 4]);
+        }
+    }
+    std::vector<size_t> order(count);
+    std::iota(order.begin(), order.end(), size_t(0));
+    std::ranges::stable_sort(order, [&](size_t a, size_t b) { return scales[a] > scales[b]; });
+    Descriptors largest;
+    for (size_t i = 0; i < std::min(most, count); ++i) {
+        const auto from = all.begin() + std::ptrdiff_t(order[i] * kDescriptorSize);
+        largest.insert(largest.end(), from, from + std::ptrdiff_t(kDescriptorSize));
+    }
+    return largest;
+}
+
+bool FeatureDatabase::is_compared(std::int64_t first, std::int64_t second) const {
+    const std::scoped_lock lock(mutex_);
+    Statement row(*this,
+                  "SELECT 1 FROM matches WHERE pair_id = ?1 AND (rows > 0 OR NOT EXISTS "
+                  "(SELECT 1 FROM two_view_geometries WHERE pair_id = ?1))");
+    return row.bind(1, pair_of(first, second).number).step();
+}
+
+void FeatureDatabase::write(std::int64_t first, std::int64_t second, const std::vector<FeatureMatch>& matches) {
+    const Pair pair = pair_of(first, second);
+    std::vector<std::uint32_t> places;
+    places.reserve(2 * matches.size());
+    for (const FeatureMatch& match : matches) {
+        places.push_back(pair.swapped ? match.second : match.first);
+        places.push_back(pair.swapped ? match.first : match.second);
+    }
+    const std::scoped_lock lock(mutex_);
+    Statement(*this, "DELETE FROM two_view_geometries WHERE pair_id = ?").bind(1, pair.number).step();
+    Statement(*this, "INSERT OR REPLACE INTO matches (pair_id, rows, cols, data) VALUES (?, ?, 2, ?)")
+        .bind(1, pair.number)
+        .bind(2, std::int64_t(matches.size()))
+        .bind(3, places)
+        .step();
+}
+
+void FeatureDatabase::pass_over(std::int64_t first, std::int64_t second) {
+    const std::int64_t pair = pair_of(first, second).number;
+    const std::scoped_lock lock(mutex_);
+    Statement(*this, "INSERT OR IGNORE INTO matches (pair_id, rows, cols) VALUES (?, 0, 2)").bind(1, pair).step();
+    Statement(*this,
+              "INSERT OR IGNORE INTO two_view_geometries (pair_id, rows, cols, config) VALUES (?, 0, 2, ?)")
+        .bind(1, pair)
+        .bind(2, kUndefined)
+        .step();
+}
+
+void FeatureDatabase::commit() {
+    const std::scoped_lock lock(mutex_);
+    execute("COMMIT");
+    execute("BEGIN");
+}
+
+}  // namespace ewa::capture

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which features of two photos show the same detail, by their SIFT descriptors, and which photos are worth comparing.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+namespace ewa::capture {
+
+/// Values of a descriptor: each fits into a byte, and their length is 512, as COLMAP writes them.
+constexpr size_t kDescriptorSize = 128;
+
+/// The descriptors of an image, [feature][kDescriptorSize]. Values of 16 bits multiply in pairs.
+using Descriptors = std::vector<std::int16_t>;
+
+/// Features of two images, by their places.
+struct FeatureMatch {
+    std::uint32_t first = 0, second = 0;
+
+    bool operator==(const FeatureMatch&) const = default;
+};
+
+/// The features that are nearest to each other in both directions, in the order of the first image's. The angle between their
+/// descriptors is at most 0.7, and less than 0.8 times that to the second nearest (Lowe 2004). COLMAP has the same rules.
+std::vector<FeatureMatch> matches_of(const Descriptors& first, const Descriptors& second);
+
+/// Two images by their places, the lower first.
+using ImagePair = std::pair<int, int>;
+
+/// The candidates that probably show the same things, in their order. shared: how many prominent features the images of each
+/// candidate share (Wu 2013, preemptive matching). An image keeps the `each` candidates with the most, if they share at least 4.
+std::vector<ImagePair> pairs_by_look(const std::vector<ImagePair>& candidates, const std::vector<int>& shared,
+                                     int each);
+
+}  // namespace ewa::capture
