@@ -14,6 +14,7 @@
 #include "core/process.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "ewa/image.h"
 
 namespace ewa::capture {
 namespace {
@@ -123,6 +124,18 @@ struct LensWords {
     std::vector<std::string> words;
 };
 
+/// Whether the photos have so many pixels that COLMAP finds all the features that it keeps without enlarging them. Enlarged, they
+/// take three times as long.
+bool are_large(const fs::path& folder, const std::vector<fs::path>& names) {
+    constexpr double kMostSide = 3200;  // px; COLMAP reduces longer ones
+    constexpr double kEnough = 3e6;     // pixels: 2,600 features each million, of 8,192
+    return std::ranges::all_of(names, [&](const fs::path& name) {
+        const ImageSize size = read_image_size(folder / name);
+        const double reduced = std::min(1.0, kMostSide / std::max({1, size.width, size.height}));
+        return size.width * reduced * (size.height * reduced) >= kEnough;
+    });
+}
+
 std::vector<LensWords> lens_words(const Photos& photos, const PanoramaViews* views) {
     std::vector<LensWords> all;
     if (views)
@@ -134,10 +147,14 @@ std::vector<LensWords> lens_words(const Photos& photos, const PanoramaViews* vie
                             "--SiftExtraction.max_num_features", kMostFeatures}});
         }
     else
-        for (LensGroup& group : lenses_of(photos.folder, photos.names))
-            all.push_back({std::move(group.photos),
-                           {"--ImageReader.single_camera", group.shared ? "1" : "0",
-                            "--ImageReader.camera_model", group.tangential ? "OPENCV" : "SIMPLE_RADIAL"}});
+        for (LensGroup& group : lenses_of(photos.folder, photos.names)) {
+            std::vector<std::string> words{"--ImageReader.single_camera", group.shared ? "1" : "0",
+                                           "--ImageReader.camera_model",
+                                           group.tangential ? "OPENCV" : "SIMPLE_RADIAL"};
+            if (are_large(photos.folder, group.photos))
+                words.insert(words.end(), {"--SiftExtraction.first_octave", "0"});
+            all.push_back({std::move(group.photos), std::move(words)});
+        }
     return all;
 }
 

@@ -13,7 +13,7 @@ namespace {
 constexpr size_t kProminent = 256;  // features of a photo that say whether another one is worth comparing
 constexpr int kEach = 12;           // photos that one is compared with, by look
 
-constexpr int kSequence = 10;       // photos that follow, of a sequence
+constexpr int kSequence = 10;  // photos that follow, of a sequence
 constexpr int kFarthest = 512;
 
 using Places = std::vector<ImagePair>;
@@ -76,7 +76,8 @@ std::optional<std::vector<ImagePair>> compare_photos(const std::filesystem::path
             database.write(a, b, matches_of(database.descriptors(a), database.descriptors(b)));
     };
     try {
-        on_all_cores({CapturePhase::matches, "matched", "pairs", 0, int(pairs.size()), {}}, progress, compare);
+        on_all_cores({CapturePhase::matches, "matched", "pairs", 0, int(pairs.size()), {}}, progress,
+                     compare);
     } catch (const Stopped&) {
         database.commit();
         throw;

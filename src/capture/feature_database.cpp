@@ -67,8 +67,8 @@ class FeatureDatabase::Statement {
         const std::int64_t rows = integer(0), columns = integer(1);
         const auto* values = static_cast<const T*>(sqlite3_column_blob(statement_.get(), 2));
         const auto bytes = size_t(sqlite3_column_bytes(statement_.get(), 2));
-        check(rows >= 0 && columns >= 0 && columns <= std::int64_t(kDescriptorSize) &&
-                  rows <= kMostImages && size_t(rows * columns) * sizeof(T) == bytes,
+        check(rows >= 0 && columns >= 0 && columns <= std::int64_t(kDescriptorSize) && rows <= kMostImages &&
+                  size_t(rows * columns) * sizeof(T) == bytes,
               "an array has another size than it says");
         return {values, bytes / sizeof(T)};
     }
@@ -111,7 +111,8 @@ std::map<std::string, std::int64_t> FeatureDatabase::images() const {
     const std::scoped_lock lock(mutex_);
     std::map<std::string, std::int64_t> images;
     for (Statement rows(*this, "SELECT image_id, name FROM images"); rows.step();) {
-        rows.check(rows.integer(0) > 0 && rows.integer(0) < kMostImages, "an image has a number out of range");
+        rows.check(rows.integer(0) > 0 && rows.integer(0) < kMostImages,
+                   "an image has a number out of range");
         images[rows.text(1)] = rows.integer(0);
     }
     return images;
@@ -163,7 +164,8 @@ bool FeatureDatabase::is_compared(std::int64_t first, std::int64_t second) const
     return row.bind(1, pair_of(first, second).number).step();
 }
 
-void FeatureDatabase::write(std::int64_t first, std::int64_t second, const std::vector<FeatureMatch>& matches) {
+void FeatureDatabase::write(std::int64_t first, std::int64_t second,
+                            const std::vector<FeatureMatch>& matches) {
     const Pair pair = pair_of(first, second);
     std::vector<std::uint32_t> places;
     places.reserve(2 * matches.size());
@@ -183,7 +185,9 @@ void FeatureDatabase::write(std::int64_t first, std::int64_t second, const std::
 void FeatureDatabase::pass_over(std::int64_t first, std::int64_t second) {
     const std::int64_t pair = pair_of(first, second).number;
     const std::scoped_lock lock(mutex_);
-    Statement(*this, "INSERT OR IGNORE INTO matches (pair_id, rows, cols) VALUES (?, 0, 2)").bind(1, pair).step();
+    Statement(*this, "INSERT OR IGNORE INTO matches (pair_id, rows, cols) VALUES (?, 0, 2)")
+        .bind(1, pair)
+        .step();
     Statement(*this,
               "INSERT OR IGNORE INTO two_view_geometries (pair_id, rows, cols, config) VALUES (?, 0, 2, ?)")
         .bind(1, pair)

@@ -22,11 +22,12 @@ EWA_EVERY_PROCESSOR void multiply_descriptors(const std::int16_t* const* rows, c
 
 namespace {
 
-constexpr double kMostAngle = 0.7;   // radians
-constexpr double kMostRatio = 0.8;   // of the angle to the nearest by that to the second nearest
+constexpr double kMostAngle = 0.7;  // radians
+constexpr double kMostRatio = 0.8;  // of the angle to the nearest by that to the second nearest
 constexpr double kLength2 = 512.0 * 512.0;
-constexpr int kLeastShared = 4;      // prominent features
-constexpr size_t kTogether = 4;      // rows whose products are taken in one loop, so that each descriptor is read once for all
+constexpr int kLeastShared = 4;  // prominent features
+constexpr size_t kTogether =
+    4;  // rows whose products are taken in one loop, so that each descriptor is read once for all
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
 /// The place of the largest product, if it is clearly the nearest.

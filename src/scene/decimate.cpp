@@ -66,8 +66,8 @@ double overlap(const Shape& a, const Shape& b) {
                      yy = a.covariance[view.yy] + b.covariance[view.yy];
         const double x = d[view.x], y = d[view.y], determinant = std::max(xx * yy - xy * xy, kSmallest);
         const double squared = (yy * x * x - 2 * xy * x * y + xx * y * y) / determinant;
-        sum += 2 * std::numbers::pi * a.roots[v] * b.roots[v] / std::sqrt(determinant) *
-               std::exp(-squared / 2);
+        sum +=
+            2 * std::numbers::pi * a.roots[v] * b.roots[v] / std::sqrt(determinant) * std::exp(-squared / 2);
     }
     return sum;
 }

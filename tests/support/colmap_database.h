@@ -31,17 +31,20 @@ inline void write_colmap_database(const std::string& file, const std::vector<Dat
     run("CREATE TABLE images (image_id INTEGER PRIMARY KEY NOT NULL, name TEXT NOT NULL UNIQUE)");
     for (const char* table : {"keypoints", "descriptors"})
         run(std::string("CREATE TABLE ") + table +
-            " (image_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT NULL, cols INTEGER NOT NULL, data BLOB)");
+            " (image_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT NULL, cols INTEGER NOT NULL, data "
+            "BLOB)");
     run("CREATE TABLE matches (pair_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT NULL, cols INTEGER NOT "
         "NULL, data BLOB)");
     run("CREATE TABLE two_view_geometries (pair_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT NULL, cols "
-        "INTEGER NOT NULL, data BLOB, config INTEGER NOT NULL, F BLOB, E BLOB, H BLOB, qvec BLOB, tvec BLOB)");
+        "INTEGER NOT NULL, data BLOB, config INTEGER NOT NULL, F BLOB, E BLOB, H BLOB, qvec BLOB, tvec "
+        "BLOB)");
     for (size_t i = 0; i < images.size(); ++i) {
         const std::string number = std::to_string(i + 1), rows = std::to_string(images[i].scales.size());
         run("INSERT INTO images VALUES (" + number + ", '" + images[i].name + "')");
         std::vector<float> keypoints;  // x, y and a matrix
         for (const float scale : images[i].scales)
-            keypoints.insert(keypoints.end(), {1, 2, 0.6f * scale, -0.8f * scale, 0.8f * scale, 0.6f * scale});
+            keypoints.insert(keypoints.end(),
+                             {1, 2, 0.6f * scale, -0.8f * scale, 0.8f * scale, 0.6f * scale});
         run("INSERT INTO keypoints VALUES (" + number + ", " + rows + ", 6, ?)", keypoints.data(),
             keypoints.size() * sizeof(float));
         run("INSERT INTO descriptors VALUES (" + number + ", " + rows + ", 128, ?)",

@@ -53,7 +53,8 @@ TEST(Decimate, KeepsMeanCovarianceColorAndLight) {
     const Gaussians before = g;
     decimate_splats(g, 1);
     ASSERT_EQ(g.size(), 1u);
-    const double a = opacity_of(before, 0) * area_of(before, 0), b = opacity_of(before, 1) * area_of(before, 1);
+    const double a = opacity_of(before, 0) * area_of(before, 0),
+                 b = opacity_of(before, 1) * area_of(before, 1);
     const double p = a / (a + b), q = b / (a + b);
     const glm::dvec3 d = before.world_mean(0) - before.world_mean(1);
     const glm::dmat3 expected = p * scene::covariance_of(before, 0) + q * scene::covariance_of(before, 1) +

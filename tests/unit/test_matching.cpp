@@ -42,8 +42,7 @@ Descriptors random_descriptors(size_t count, std::mt19937& random) {
 void add_near(Descriptors& to, const Descriptors& from, size_t place, int most, std::mt19937& random) {
     std::uniform_int_distribution<int> noise(-most, most);
     for (size_t k = 0; k < kDescriptorSize; ++k)
-        to.push_back(
-            std::int16_t(std::clamp(from[place * kDescriptorSize + k] + noise(random), 0, 255)));
+        to.push_back(std::int16_t(std::clamp(from[place * kDescriptorSize + k] + noise(random), 0, 255)));
 }
 
 /// The rules of matches_of in plain loops.
@@ -69,7 +68,8 @@ std::vector<FeatureMatch> plain_matches(const Descriptors& first, const Descript
     std::vector<FeatureMatch> matches;
     for (size_t i = 0; i < first.size() / kDescriptorSize; ++i) {
         const int j = nearest(first, i, second);
-        if (j >= 0 && nearest(second, size_t(j), first) == int(i)) matches.push_back({uint32_t(i), uint32_t(j)});
+        if (j >= 0 && nearest(second, size_t(j), first) == int(i))
+            matches.push_back({uint32_t(i), uint32_t(j)});
     }
     return matches;
 }
@@ -181,17 +181,18 @@ TEST_F(MatchingDatabase, HoldsMatchesByTheLowerNumber) {
     sqlite3* database = nullptr;
     ASSERT_EQ(sqlite3_open(file_.c_str(), &database), SQLITE_OK);
     sqlite3_stmt* row = nullptr;
-    ASSERT_EQ(sqlite3_prepare_v2(database, "SELECT rows, data FROM matches WHERE pair_id = 4294967298", -1, &row,
-                                 nullptr),
+    ASSERT_EQ(sqlite3_prepare_v2(database, "SELECT rows, data FROM matches WHERE pair_id = 4294967298", -1,
+                                 &row, nullptr),
               SQLITE_OK);  // 2 * 2147483647 + 4
     ASSERT_EQ(sqlite3_step(row), SQLITE_ROW);
     EXPECT_EQ(sqlite3_column_int(row, 0), 2);
     const auto* places = static_cast<const uint32_t*>(sqlite3_column_blob(row, 1));
     EXPECT_EQ((std::vector<uint32_t>(places, places + 4)), (std::vector<uint32_t>{8, 7, 1, 9}));
     sqlite3_finalize(row);
-    ASSERT_EQ(sqlite3_prepare_v2(database, "SELECT COUNT(*) FROM two_view_geometries WHERE pair_id = 2147483649",
-                                 -1, &row, nullptr),
-              SQLITE_OK);
+    ASSERT_EQ(
+        sqlite3_prepare_v2(database, "SELECT COUNT(*) FROM two_view_geometries WHERE pair_id = 2147483649",
+                           -1, &row, nullptr),
+        SQLITE_OK);
     ASSERT_EQ(sqlite3_step(row), SQLITE_ROW);
     EXPECT_EQ(sqlite3_column_int(row, 0), 1);
     sqlite3_finalize(row);
