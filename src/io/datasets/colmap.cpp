@@ -11,12 +11,12 @@
 #include <string_view>
 #include <vector>
 
-#include "core/atomic_file.h"
 #include "core/file_reader.h"
 #include "core/folders.h"
 #include "core/sandboxed_path.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "io/datasets/colmap_lens.h"
 #include "io/datasets/image_records.h"
 #include "scene/native_lens.h"
 
@@ -26,18 +26,6 @@ namespace {
 
 /// Throws InputError that names the position in the file.
 using Fail = std::function<void(const std::string&)>;
-
-/// A lens model. A camera's parameters are f or fx fy, then cx cy, then the terms.
-struct ColmapLens {
-    std::string_view name;
-    size_t focal_lengths = 1;
-    Lens lens = Lens::brown;
-    std::array<double Distortion::*, 12> terms{};  // null after the last
-
-    size_t parameters() const {
-        return focal_lengths + 2 + size_t(std::find(terms.begin(), terms.end(), nullptr) - terms.begin());
-    }
-};
 
 /// Collects a model and checks its ids. Errors go to the Fail of the file that is being read.
 class ColmapBuilder {
@@ -68,52 +56,7 @@ class ColmapBuilder {
     ImageRecords result_;
 };
 
-using D = Distortion;
-
-/// Its two parameters are the width and height again.
-constexpr std::string_view kEquirectangular = "EQUIRECTANGULAR";
-
-// In the order of COLMAP's model ids. The terms are in the order of the file, after the principal point
-// (COLMAP, src/colmap/sensor/models.h).
-constexpr ColmapLens kLenses[] = {
-    {"SIMPLE_PINHOLE", 1, Lens::brown, {}},
-    {"PINHOLE", 2, Lens::brown, {}},
-    {"SIMPLE_RADIAL", 1, Lens::brown, {&D::k1}},
-    {"RADIAL", 1, Lens::brown, {&D::k1, &D::k2}},
-    {"OPENCV", 2, Lens::brown, {&D::k1, &D::k2, &D::p1, &D::p2}},
-    {"OPENCV_FISHEYE", 2, Lens::fisheye, {&D::k1, &D::k2, &D::k3, &D::k4}},
-    {"FULL_OPENCV", 2, Lens::brown, {&D::k1, &D::k2, &D::p1, &D::p2, &D::k3, &D::k4, &D::k5, &D::k6}},
-    {"FOV", 2, Lens::fov, {&D::k1}},
-    {"SIMPLE_RADIAL_FISHEYE", 1, Lens::fisheye, {&D::k1}},
-    {"RADIAL_FISHEYE", 1, Lens::fisheye, {&D::k1, &D::k2}},
-    {"THIN_PRISM_FISHEYE",
-     2,
-     Lens::fisheye,
-     {&D::k1, &D::k2, &D::p1, &D::p2, &D::k3, &D::k4, &D::s1, &D::s3}},
-    {"RAD_TAN_THIN_PRISM_FISHEYE",
-     2,
-     Lens::fisheye624,
-     {&D::k1, &D::k2, &D::k3, &D::k4, &D::k5, &D::k6, &D::p2, &D::p1, &D::s1, &D::s2, &D::s3, &D::s4}},
-    {"SIMPLE_DIVISION", 1, Lens::division, {&D::k1}},
-    {"DIVISION", 2, Lens::division, {&D::k1}},
-    {"SIMPLE_FISHEYE", 1, Lens::fisheye, {}},
-    {"FISHEYE", 2, Lens::fisheye, {}},
-    {"EUCM", 2, Lens::unified, {&D::k1, &D::k2}},
-    {kEquirectangular, 0, Lens::equirectangular, {}}};
-
 constexpr uint64_t kMaxSize = 1u << 20;  // px
-
-/// By COLMAP's number, or null.
-const ColmapLens* colmap_lens(int64_t id) {
-    return id >= 0 && id < int64_t(std::size(kLenses)) ? &kLenses[id] : nullptr;
-}
-
-/// By COLMAP's name, or null.
-const ColmapLens* colmap_lens(std::string_view name) {
-    const auto* found =
-        std::find_if(std::begin(kLenses), std::end(kLenses), [&](auto& lens) { return lens.name == name; });
-    return found == std::end(kLenses) ? nullptr : found;
-}
 
 void ColmapBuilder::add_camera(uint32_t id, const ColmapLens& lens, uint64_t width, uint64_t height,
                                const std::vector<double>& parameters, const Fail& fail) {
@@ -384,101 +327,6 @@ ImageRecords read_colmap(const std::filesystem::path& model, const std::filesyst
     for (const char* file : {"cameras", "images", "points3D"})
         records.files.push_back(model / (file + extension));
     return records;
-}
-
-namespace {
-
-/// The position in kLenses of the first lens model that has all of the distortion's terms, and not one focal length; empty: none has.
-std::optional<int32_t> lens_with(const Distortion& distortion) {
-    for (size_t i = 0; i < std::size(kLenses); ++i) {
-        const ColmapLens& lens = kLenses[i];
-        if (lens.focal_lengths == 1 || lens.lens != distortion.lens) continue;
-        Distortion kept;
-        kept.lens = lens.lens;
-        for (const auto term : lens.terms)
-            if (term) kept.*term = distortion.*term;
-        if (kept == distortion) return int32_t(i);
-    }
-    return std::nullopt;
-}
-
-/// A file of COLMAP, piece by piece.
-class BinaryFile {
-  public:
-    explicit BinaryFile(const std::filesystem::path& path) : file_(path) {}
-    template <class... Values>
-    void add(const Values&... values) {
-        (file_.write(&values, sizeof(values)), ...);
-    }
-    void add_text(const std::string& text) { file_.write(text.c_str(), text.size() + 1); }
-    void commit() { file_.commit(); }
-
-  private:
-    core::AtomicFile file_;
-};
-
-bool same_lens(const ImageRecord& a, const ImageRecord& b) {
-    const Camera &x = a.camera, &y = b.camera;
-    return x.width == y.width && x.height == y.height && x.fx == y.fx && x.fy == y.fy && x.cx == y.cx &&
-           x.cy == y.cy && a.distortion == b.distortion;
-}
-
-void write_camera(BinaryFile& file, uint32_t id, const ImageRecord& image) {
-    const Camera& c = image.camera;
-    const std::optional<int32_t> lens = lens_with(image.distortion);
-    if (!lens) throw RunError("COLMAP has no lens model with these distortion terms");
-    file.add(id, *lens, uint64_t(c.width), uint64_t(c.height));
-    if (kLenses[*lens].focal_lengths == 0) return file.add(double(c.width), double(c.height));
-    file.add(c.fx, c.fy, c.cx, c.cy);
-    for (const auto term : kLenses[*lens].terms)
-        if (term) file.add(image.distortion.*term);
-}
-
-}  // namespace
-
-bool fits_colmap(const ImageRecord& image) {
-    if (image.distortion.lens != Lens::equirectangular) return lens_with(image.distortion).has_value();
-    Camera whole = image.camera;
-    scene::set_equirectangular(whole);
-    constexpr double kSame = 1e-9;  // of the focal length
-    return std::abs(whole.fx - image.camera.fx) < kSame * whole.fx &&
-           std::abs(whole.fy - image.camera.fy) < kSame * whole.fy;
-}
-
-void write_colmap(const std::filesystem::path& model, const std::vector<ImageRecord>& images,
-                  const PointCloud& points) {
-    core::make_folder(model);
-    // Neighbours with the same lens share a camera.
-    std::vector<uint32_t> camera_of;
-    std::vector<size_t> first;
-    for (size_t i = 0; i < images.size(); ++i) {
-        if (i == 0 || !same_lens(images[i - 1], images[i])) first.push_back(i);
-        camera_of.push_back(uint32_t(first.size()));
-    }
-    BinaryFile cameras(model / "cameras.bin");
-    cameras.add(uint64_t(first.size()));
-    for (size_t i = 0; i < first.size(); ++i) write_camera(cameras, uint32_t(i + 1), images[first[i]]);
-    cameras.commit();
-
-    BinaryFile poses(model / "images.bin");
-    poses.add(uint64_t(images.size()));
-    for (size_t i = 0; i < images.size(); ++i) {
-        const glm::dquat q = glm::quat_cast(images[i].camera.rotation);
-        const glm::dvec3& t = images[i].camera.translation;
-        poses.add(uint32_t(i + 1), q.w, q.x, q.y, q.z, t.x, t.y, t.z, camera_of[i]);
-        poses.add_text(images[i].name);
-        poses.add(uint64_t(0));  // observations
-    }
-    poses.commit();
-
-    BinaryFile cloud(model / "points3D.bin");
-    cloud.add(uint64_t(points.positions.size()));
-    for (size_t i = 0; i < points.positions.size(); ++i) {
-        const glm::dvec3& p = points.positions[i];
-        const auto& [r, g, b] = points.colors[i];
-        cloud.add(uint64_t(i + 1), p.x, p.y, p.z, r, g, b, double(0), uint64_t(0));  // error, track
-    }
-    cloud.commit();
 }
 
 }  // namespace ewa::io
