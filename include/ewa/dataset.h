@@ -53,6 +53,8 @@ struct Frame {
     std::shared_ptr<const Image> left_out;
     /// With left_out, if `masks` cuts: the colour of pixels that are cut out. Empty: they do not count.
     std::optional<std::array<float, 3>> behind;
+    /// Indices in Dataset::points of the points that the reconstruction saw in this image. Null: the dataset does not say.
+    std::shared_ptr<const std::vector<uint32_t>> seen;
     Distortion distortion;  // of the file, which load_frame_image takes out; none with LensUse::native
     Camera pinhole;         // `camera` before downscaling
     int downscale = 1;      // factor that is applied to the file, which may be a smaller copy already

@@ -169,6 +169,7 @@ Frame frame_of(const FrameState& state) {
             .depth_path = {},
             .left_out = nullptr,
             .behind = std::nullopt,
+            .seen = nullptr,
             .distortion = distortion_of(n[4], k),
             .pinhole = camera_of(cameras[2]),
             .downscale = n[2],

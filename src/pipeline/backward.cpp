@@ -178,15 +178,16 @@ void FramePasses::compare_alpha(const gpu::Buffer& photo, bool cut, const shared
     mean_of_partials(shared::REDUCE_TO_ALPHA, frame.sizes.partials / 3, 1, float(share));
 }
 
-/// The depth map of a photo as a term of the loss, and the gradient by the planes of depth and transmittance.
-void FramePasses::compare_depth(const gpu::Buffer* depths) const {
+/// The depths of a photo as a term of the loss, and the gradient by the planes of depth and transmittance.
+void FramePasses::compare_depth(const DepthUse& depths) const {
     const shared::ImageLayout image = frame.sizes.image();
     const uint64_t plane = uint64_t(image.plane_floats) * 4;
     if (plan.loss.alpha == 0) recording.fill(frame.image_gradient, 0, shared::PLANE_T * plane, plane);
-    if (!depths) return recording.fill(frame.image_gradient, 0, shared::PLANE_DEPTH * plane, plane);
-    const double share = 1.0 / (double(image.size[0]) * image.size[1]);
+    if (!depths.map) return recording.fill(frame.image_gradient, 0, shared::PLANE_DEPTH * plane, plane);
+    const double share =
+        1.0 / (depths.pixels > 0 ? double(depths.pixels) : double(image.size[0]) * image.size[1]);
     record(passes::DepthLoss{.planes = frame.planes,
-                             .depths = *depths,
+                             .depths = *depths.map,
                              .image_gradient = frame.image_gradient,
                              .partials = frame.partials},
            {.image = image, .scale = float(plan.loss.depth * share)});
@@ -195,7 +196,7 @@ void FramePasses::compare_depth(const gpu::Buffer* depths) const {
 }
 
 void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse* exposure,
-                       const AppearanceUse* appearance, bool cut, const gpu::Buffer* depths) const {
+                       const AppearanceUse* appearance, bool cut, const DepthUse& depths) const {
     const shared::ImageLayout layout = frame.sizes.image();
     const Band whole{.rows = layout.size[1], .own_end = layout.size[1]};
     const Band& band = inputs.band.rows > 0 ? inputs.band : whole;

@@ -25,6 +25,12 @@ struct Sorted {
     const gpu::Buffer* indices = nullptr;  // with gradients: each emitted instance's sorted index and slot
 };
 
+/// Depths that the loss compares with the render's.
+struct DepthUse {
+    const gpu::Buffer* map = nullptr;  // width * height floats, 0 where there is no depth; null: none
+    uint64_t pixels = 0;               // that the mean is over; 0: all
+};
+
 /// Records the passes of a frame.
 struct FramePasses : passes::Recorder {
     const Plan& plan;
@@ -50,10 +56,9 @@ struct FramePasses : passes::Recorder {
     /// exposure, appearance: of the training image, one of them if it is learned. It takes its own step of Adam; `frame`
     /// must be reserved with its model.
     /// cut: the photo is composited, and its alpha is compared with the render's if the loss has that term.
-    /// depths: width * height floats, the photo's depth map, if the loss has that term; 0 where it has no depth.
+    /// depths: of the photo, if the loss has that term.
     void loss(const gpu::Buffer& photo, bool masked = false, const ExposureUse* exposure = nullptr,
-              const AppearanceUse* appearance = nullptr, bool cut = false,
-              const gpu::Buffer* depths = nullptr) const;
+              const AppearanceUse* appearance = nullptr, bool cut = false, const DepthUse& depths = {}) const;
 
     /// After the loss: leaves the gradient by the sky in the slot of its view in the step.
     void sky_gradient(const LearnedSky& sky, uint32_t slot) const;
@@ -94,7 +99,7 @@ struct FramePasses : passes::Recorder {
     void compare(const gpu::Buffer& image, const shared::LossPush& push, float share) const;
     void compare_alpha(const gpu::Buffer& photo, bool cut, const shared::MaskPush& at,
                        const shared::LossPush& loss) const;
-    void compare_depth(const gpu::Buffer* depths) const;
+    void compare_depth(const DepthUse& depths) const;
     void mean_of_partials(uint32_t target, uint32_t items, uint32_t rows, float scale) const;
     void expose_backward(const ExposureUse& use) const;
     void apply_appearance(const AppearanceUse& use) const;

@@ -356,7 +356,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
         run_until_it_fits(cache, executor, frame, size, [&](const passes::Recorder& recorder) {
             const FramePasses on{recorder, plan, frame, inputs};
             const Sorted sorted = on.forward(model);
-            on.loss(photo, plan.masks, nullptr, nullptr, cut, map ? &map : nullptr);
+            on.loss(photo, plan.masks, nullptr, nullptr, cut, {map ? &map : nullptr});
             on.backward(model, sorted, {});
         });
     LossGradient result;

@@ -18,9 +18,10 @@ namespace {
 
 constexpr double kMostWeight = 1e6;
 
-constexpr std::array kTerms{std::pair{"l1", &LossWeights::l1}, std::pair{"l2", &LossWeights::l2},
-                            std::pair{"ssim", &LossWeights::ssim}, std::pair{"alpha", &LossWeights::alpha},
-                            std::pair{"depth", &LossWeights::depth}};
+constexpr std::array kTerms{
+    std::pair{"l1", &LossWeights::l1},       std::pair{"l2", &LossWeights::l2},
+    std::pair{"ssim", &LossWeights::ssim},   std::pair{"alpha", &LossWeights::alpha},
+    std::pair{"depth", &LossWeights::depth}, std::pair{"sfm-depth", &LossWeights::sfm_depth}};
 
 std::vector<std::string> term_names() {
     std::vector<std::string> names;
@@ -41,7 +42,8 @@ LossWeights parse_loss(const std::string& text) {
         const std::string name = core::lower(core::trim(std::string_view(part).substr(0, equals)));
         const auto term = std::ranges::find_if(kTerms, [&](const auto& each) { return name == each.first; });
         if (term == kTerms.end())
-            throw InputError("'" + name + "' is no term of the loss; l1, l2, ssim, alpha and depth are" +
+            throw InputError("'" + name +
+                             "' is no term of the loss; l1, l2, ssim, alpha, depth and sfm-depth are" +
                              core::did_you_mean(name, term_names()));
         if (equals == std::string::npos)
             throw InputError("'" + name + "' has no weight; " + name + "=0.5 has one");
@@ -50,12 +52,15 @@ LossWeights parse_loss(const std::string& text) {
         std::string weight(core::trim(std::string_view(part).substr(equals + 1)));
         const std::string problem = core::settle_number(weight, 0.0, kMostWeight);
         if (!problem.empty()) throw InputError(name + ": " + problem);
-        const bool color = name != "alpha" && name != "depth";
-        if (color && !std::exchange(colors, true)) weights = {0, 0, 0, weights.alpha, weights.depth};
+        const bool color = name != "alpha" && name != "depth" && name != "sfm-depth";
+        if (color && !std::exchange(colors, true))
+            weights = {0, 0, 0, weights.alpha, weights.depth, weights.sfm_depth};
         weights.*(term->second) = core::parse_number(weight).value();
     }
     if (weights.l1 == 0 && weights.l2 == 0 && weights.ssim == 0)
         throw InputError("'" + text + "' has no weight above 0; l1=0.8,ssim=0.2 is the usual loss");
+    if (weights.depth > 0 && weights.sfm_depth > 0)
+        throw InputError("'" + text + "' has depth and sfm-depth, which exclude each other");
     return weights;
 }
 

@@ -226,8 +226,7 @@ RunOption loss_option() {
         "Weights of the loss: of the absolute differences (l1), the squared ones (l2) and 1 - SSIM "
         "(ssim). Of these, a term that is not named has the weight 0. alpha: of the differences between the "
         "opacity and the alpha of cut-out images [0.2]. depth: of those between the logarithms of the mean "
-        "depth "
-        "and of depth maps [0]",
+        "depth and of depth maps [0]. sfm-depth: the same with the depths of the dataset's points [0]",
         kDecides};
     option.get = [](const RunOptions& options) { return loss_text(options.train.loss); };
     option.set = [](RunOptions& options, const std::string& text) { options.train.loss = parse_loss(text); };

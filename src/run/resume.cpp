@@ -84,8 +84,11 @@ void add_distortion(Hash& hash, const Distortion& d) {
 
 }  // namespace
 
-std::string dataset_fingerprint(const Dataset& dataset, const Split& split) {
+std::string dataset_fingerprint(const Dataset& dataset, const Split& split, bool points) {
     Hash hash;
+    if (points)
+        for (const glm::dvec3& p : dataset.points.positions)
+            for (int c = 0; c < 3; ++c) hash.add(p[c]);
     for (const auto* frames : {&split.train, &split.test}) {
         hash.add(uint64_t(frames->size()));
         for (const int index : *frames) {

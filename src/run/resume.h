@@ -12,8 +12,9 @@
 namespace ewa::train {
 
 /// 16 hexadecimal digits that differ between datasets. They are a hash of the name, split and camera of each frame,
-/// and of the size and the first 64 KiB of its image and mask. A frame without a file counts with name and camera.
-std::string dataset_fingerprint(const Dataset& dataset, const Split& split);
+/// and of the size and the first 64 KiB of its image and mask. A frame without a file counts with name and camera. points: the
+/// positions of the points count, too.
+std::string dataset_fingerprint(const Dataset& dataset, const Split& split, bool points = false);
 
 /// The settings of a checkpoint: version, the dataset's fingerprint, and the options that decide the result.
 /// The run adds the device.

@@ -132,8 +132,9 @@ void Run::read_checkpoint(const TrainOptions& asked) {
         earlier_->steps =
             train::continue_from(folder_.checkpoint(), earlier_->reader->checkpoint(), asked, input_.options);
     }
-    saves_.settings() =
-        train::checkpoint_settings(options(), train::dataset_fingerprint(input_.dataset, input_.split));
+    const bool points = options().train.loss.sfm_depth > 0;
+    saves_.settings() = train::checkpoint_settings(
+        options(), train::dataset_fingerprint(input_.dataset, input_.split, points));
     if (earlier_ && options().robust && earlier_->reader->checkpoint().state.report.step > 0) {
         masks_ = train::saved_masks(input_);
         saves_.settings()[train::kMasksSetting] = train::fingerprint_of(*masks_);

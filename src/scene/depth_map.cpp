@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
 #include "core/text.h"
 #include "ewa/error.h"
 #include "scene/camera.h"
 #include "scene/lens.h"
+#include "scene/native_lens.h"
 #include "scene/readout.h"
 
 namespace ewa {
@@ -85,6 +87,25 @@ Image load_depth_map(const Frame& frame) {
                 unit * double(depth_at(map, inside, kAgreement * *map.at(int(inside.x), int(inside.y))));
             *depths.at(x, y) = depth > 0 && depth <= kMostDepth ? float(depth) : 0.0f;
         }
+    return depths;
+}
+
+Image depths_of_points(const Frame& frame, std::span<const glm::dvec3> points) {
+    const Camera camera = frame.camera.readout ? scene::at_middle(frame.camera) : frame.camera;
+    const double limit = scene::lens_limit(camera);
+    const bool by_distance = scene::ordered_by_distance(camera.distortion.lens);
+    Image depths(camera.width, camera.height, 1);
+    for (const uint32_t i : *frame.seen) {
+        const glm::dvec3 p = camera.rotation * points[i] + camera.translation;
+        const auto pixel = scene::pixel_of(camera, limit, p);
+        if (!pixel ||
+            !(pixel->x >= 0 && pixel->y >= 0 && pixel->x < camera.width && pixel->y < camera.height))
+            continue;
+        const double depth = by_distance ? glm::length(p) : p.z;
+        float& nearest = *depths.at(int(pixel->x), int(pixel->y));
+        if (depth > 0 && depth <= kMostDepth && (nearest == 0 || depth < double(nearest)))
+            nearest = float(depth);
+    }
     return depths;
 }
 

@@ -2,6 +2,8 @@
 // Depth maps of training images.
 #pragma once
 #include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <span>
 
 #include "ewa/dataset.h"
 #include "ewa/image.h"
@@ -13,6 +15,10 @@ namespace ewa {
 /// agree to a tenth. frame.depth_path: not empty. Throws InputError, also where the frame's lens is neither a pinhole nor OpenCV's
 /// perspective model, which is undistorted.
 Image load_depth_map(const Frame& frame);
+
+/// The depths of the points that the frame has seen, as an image of one channel: the nearest one of a pixel, 0 without. They are view z,
+/// or the distance with scene::ordered_by_distance. points: the dataset's, in the world. frame.seen: not null, indices of them.
+Image depths_of_points(const Frame& frame, std::span<const glm::dvec3> points);
 
 /// The depth at a position in px, 0 outside and where there is none. Bilinear where the four pixels around it differ by at most
 /// `step`. At an edge of something it is that of the nearest pixel: a mean would lie where nothing is.

@@ -38,7 +38,7 @@ inline constexpr std::array kExclusions{
               {true, true, true, true},
               "a camera learns while the splats of its own step are moved"},
     Exclusion{"--loss depth",
-              [](const TrainOptions& options) { return options.loss.depth > 0; },
+              [](const TrainOptions& options) { return options.loss.any_depth() > 0; },
               {true, true, true, true},
               "the gradient by the depth of a splat is gathered within the one picture that shows it"},
     Exclusion{"--appearance",
@@ -73,7 +73,7 @@ inline constexpr std::array kPointExclusions{
                                   "spheres have no gradient by the camera"}};
 
 inline bool compares_depths(const TrainOptions& options) {
-    return options.loss.depth > 0;
+    return options.loss.any_depth() > 0;
 }
 
 inline constexpr std::array kDepthExclusions{

@@ -25,22 +25,24 @@ double mean_weight(const Image& image) {
     return sum / (double(image.width) * image.height);
 }
 
-bool has_depths(const Frame& frame, bool depths) {
-    return depths && !frame.depth_path.empty();
+bool has_depths(const Frame& frame, const LossWeights& loss) {
+    return (loss.sfm_depth > 0 && frame.seen) || (loss.depth > 0 && !frame.depth_path.empty());
 }
 
-LoadedPhoto load_photo(const Frame& frame, bool depths) {
+LoadedPhoto load_photo(const Frame& frame, const DepthSource& depths) {
     LoadedPhoto loaded{load_frame_image(frame), {}};
-    if (!has_depths(frame, depths)) return loaded;
-    loaded.depths = load_depth_map(frame);
-    drop_masked(loaded.depths, loaded.image);
+    if (!depths.points.empty() && frame.seen)
+        loaded.depths = depths_of_points(frame, depths.points);
+    else if (depths.maps && !frame.depth_path.empty())
+        loaded.depths = load_depth_map(frame);
+    if (!loaded.depths.pixels.empty()) drop_masked(loaded.depths, loaded.image);
     return loaded;
 }
 
 /// Loads images on all cores and hands them out in order.
 class ParallelLoader {
   public:
-    ParallelLoader(std::vector<const Frame*> frames, bool depths)
+    ParallelLoader(std::vector<const Frame*> frames, const DepthSource& depths)
         : frames_(std::move(frames)), depths_(depths) {
         ahead_ = std::min<size_t>(scene::images_at_once(frames_),
                                   std::max(1u, std::thread::hardware_concurrency()));
@@ -59,7 +61,7 @@ class ParallelLoader {
 
   private:
     std::vector<const Frame*> frames_;
-    bool depths_;
+    const DepthSource& depths_;
     size_t started_ = 0;
     size_t ahead_ = 1;
     std::deque<std::future<LoadedPhoto>> loading_;
@@ -67,8 +69,8 @@ class ParallelLoader {
 
 }  // namespace
 
-uint64_t photo_bytes_of(const Frame& frame, int width, int height, bool depths) {
-    const uint64_t map = has_depths(frame, depths) ? 4 * uint64_t(width) * uint64_t(height) : 0;
+uint64_t photo_bytes_of(const Frame& frame, int width, int height, const LossWeights& loss) {
+    const uint64_t map = has_depths(frame, loss) ? 4 * uint64_t(width) * uint64_t(height) : 0;
     return pipeline::photo_bytes(width, height, frame.eight_bit) + map;
 }
 
@@ -80,8 +82,10 @@ bool may_be_cut(const Frame& frame) {
 
 ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, const Dataset& dataset,
                        const std::vector<int>& frames, uint64_t cache_bytes, const glm::dvec3& origin,
-                       int reduction, bool depths)
-    : device_(device), depths_(depths), photos_(frames.size()) {
+                       int reduction, const LossWeights& loss)
+    : device_(device), depths_(std::make_unique<DepthSource>()), photos_(frames.size()) {
+    depths_->maps = loss.depth > 0;
+    if (loss.sfm_depth > 0) depths_->points = dataset.points.positions;
     const uint64_t align = std::max<uint64_t>(device.limits().uniform_alignment, 16);
     camera_stride_ = (sizeof(shared::CameraBlock) + align - 1) / align * align;
     std::vector<std::byte> blocks(camera_stride_ * std::max<size_t>(frames.size(), 1));
@@ -96,8 +100,8 @@ ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, 
         }
         const shared::CameraBlock block = pipeline::camera_block(frame.camera, config, origin);
         std::memcpy(&blocks[i * camera_stride_], &block, sizeof(block));
-        const uint64_t bytes = photo_bytes_of(frame, frame.camera.width, frame.camera.height, depths);
-        any_depths_ = any_depths_ || has_depths(frame, depths);
+        const uint64_t bytes = photo_bytes_of(frame, frame.camera.width, frame.camera.height, loss);
+        any_depths_ = any_depths_ || has_depths(frame, loss);
         if (cached_bytes + bytes <= cache_bytes) {
             cached_bytes += bytes;
             cached.push_back(i);
@@ -109,7 +113,7 @@ ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, 
     }
     std::vector<const Frame*> to_load;
     for (const size_t i : cached) to_load.push_back(&frames_[i]);
-    ParallelLoader loader(std::move(to_load), depths);
+    ParallelLoader loader(std::move(to_load), *depths_);
     for (const size_t i : cached) {
         photos_[i] = upload(frames_[i], loader.next());
         any_masked_ = any_masked_ || photos_[i].masked;
@@ -125,13 +129,20 @@ ImageCache::Photo ImageCache::upload(const Frame& frame, const LoadedPhoto& load
         throw InputError("frame " + frame.name + " changed its size while it was read");
     const bool partly = pipeline::transparent(image), masked = partly && frame.alpha_weighs();
     gpu::Buffer depths;
-    if (!loaded.depths.pixels.empty()) {
+    // Points say nothing of the pixels between them.
+    const auto& values = loaded.depths.pixels;
+    const uint64_t counted =
+        depths_->maps ? values.size() : values.size() - size_t(std::ranges::count(values, 0.0f));
+    if (counted > 0) {
         depths = gpu::Buffer(device_, "depth map", 4 * loaded.depths.pixels.size());
         depths.upload(std::span<const float>(loaded.depths.pixels));
     }
-    return {pipeline::upload_photo(device_, image, frame.eight_bit), masked,
-            partly && !masked && frame.masks == MaskUse::cut, masked ? mean_weight(image) : 1,
-            std::move(depths)};
+    return {pipeline::upload_photo(device_, image, frame.eight_bit),
+            masked,
+            partly && !masked && frame.masks == MaskUse::cut,
+            masked ? mean_weight(image) : 1,
+            std::move(depths),
+            counted};
 }
 
 const ImageCache::Photo& ImageCache::photo(size_t i) {
@@ -146,7 +157,7 @@ void ImageCache::prepare(size_t i) {
     if (photos_[i].texels || (reading_.valid() && coming_ == i)) return;
     coming_ = i;
     reading_ = std::async(std::launch::async,
-                          [&frame = frames_[i], depths = depths_] { return load_photo(frame, depths); });
+                          [&frame = frames_[i], &depths = *depths_] { return load_photo(frame, depths); });
 }
 
 pipeline::CameraUse ImageCache::camera(size_t i) const {
@@ -159,7 +170,7 @@ ImageLevels::ImageLevels(gpu::Device& device, const passes::KernelConfig& config
                          const glm::dvec3& origin) {
     for (int level = 0; level <= options.halvings; ++level)
         levels_.emplace_back(device, config, dataset, frames, cache_share(options, level), origin, 1 << level,
-                             options.loss.depth > 0);
+                             options.loss);
 }
 
 ImageCache& ImageLevels::at(size_t level) {

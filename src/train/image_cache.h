@@ -2,9 +2,11 @@
 // The training images and their cameras on the device.
 #pragma once
 #include <future>
+#include <memory>
 #include <vector>
 
 #include "ewa/dataset.h"
+#include "ewa/loss_weights.h"
 #include "ewa/train_options.h"
 #include "gpu/buffer.h"
 #include "passes/kernel_config.h"
@@ -15,13 +17,19 @@ namespace ewa::train {
 /// Whether an image that is not read yet may have transparent pixels that cut it out.
 bool may_be_cut(const Frame& frame);
 
-/// A frame's image on the host, and its depth map if the loss reads it; else that has no pixels.
+/// A frame's image on the host, and the depths that the loss compares; else these have no pixels.
 struct LoadedPhoto {
     Image image, depths;
 };
 
 /// Device bytes of a photo of this size.
-uint64_t photo_bytes_of(const Frame& frame, int width, int height, bool depths);
+uint64_t photo_bytes_of(const Frame& frame, int width, int height, const LossWeights& loss);
+
+/// Where the depths of an image come from: the depth map of its frame, or points, if there are any.
+struct DepthSource {
+    bool maps = false;
+    std::vector<glm::dvec3> points;  // world
+};
 
 /// Caches decoded images on the device up to a number of bytes: the first frames that fit. The others are read
 /// again at each use. Which images are cached changes no result. Besides the cache, one image is on the device
@@ -29,11 +37,11 @@ uint64_t photo_bytes_of(const Frame& frame, int width, int height, bool depths);
 class ImageCache {
   public:
     /// Loads and uploads the cached images, with their sides divided by `reduction`. frames: indices into
-    /// dataset.frames. origin: of the model's positions. depths: depth maps are loaded with the images. Throws InputError
-    /// that names the frame.
+    /// dataset.frames. origin: of the model's positions. loss: decides which depths are loaded with the images. Throws
+    /// InputError that names the frame.
     ImageCache(gpu::Device& device, const passes::KernelConfig& config, const Dataset& dataset,
                const std::vector<int>& frames, uint64_t cache_bytes, const glm::dvec3& origin,
-               int reduction = 1, bool depths = false);
+               int reduction = 1, const LossWeights& loss = {});
 
     size_t count() const { return photos_.size(); }
     /// Whether photo(i) returns at once.
@@ -42,11 +50,12 @@ class ImageCache {
 
     /// An image as the loss reads it. Valid until the next call of photo.
     struct Photo {
-        gpu::Buffer texels;   // empty: on disk
-        bool masked = false;  // its alpha weights the pixels, and some weigh less than 1
-        bool cut = false;     // its alpha cuts pixels out
-        double weight = 1;    // with a mask: mean square of the pixels' weights
-        gpu::Buffer depths;   // the depth map, as the loss reads it; empty: none
+        gpu::Buffer texels;         // empty: on disk
+        bool masked = false;        // its alpha weights the pixels, and some weigh less than 1
+        bool cut = false;           // its alpha cuts pixels out
+        double weight = 1;          // with a mask: mean square of the pixels' weights
+        gpu::Buffer depths;         // the depth map or those of points, as the loss reads them; empty: none
+        uint64_t depth_pixels = 0;  // that the mean of the term of depth is over
     };
     /// Reads image i if it is not cached. The device must be idle. Throws InputError.
     const Photo& photo(size_t i);
@@ -55,7 +64,7 @@ class ImageCache {
 
     /// Whether an image may be masked.
     bool any_masked() const { return any_masked_; }
-    /// Whether depth maps are loaded, and some image has one.
+    /// Whether depths are loaded, and some image has some.
     bool any_depths() const { return any_depths_; }
     /// Whether an image may be cut out by its alpha.
     bool any_cut() const { return any_cut_; }
@@ -65,7 +74,7 @@ class ImageCache {
     Photo upload(const Frame& frame, const LoadedPhoto& loaded) const;
 
     gpu::Device& device_;
-    bool depths_;  // whether depth maps are loaded
+    std::unique_ptr<DepthSource> depths_;
     std::vector<Frame> frames_;
     std::vector<Photo> photos_;
     size_t on_disk_ = 0;

@@ -162,8 +162,8 @@ uint64_t image_bytes(const Dataset& dataset, const std::vector<int>& frames, con
         uint64_t cached = 0, other = 0;
         for (const int index : frames) {
             const Frame& frame = dataset.frames[size_t(index)];
-            const uint64_t bytes = photo_bytes_of(frame, frame.camera.width >> h, frame.camera.height >> h,
-                                                  options.loss.depth > 0);
+            const uint64_t bytes =
+                photo_bytes_of(frame, frame.camera.width >> h, frame.camera.height >> h, options.loss);
             if (cached + bytes <= cache_share(options, h))
                 cached += bytes;
             else

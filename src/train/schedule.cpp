@@ -42,6 +42,13 @@ double decayed(double first, double last, double share) {
     return std::exp((1 - t) * std::log(first) + t * std::log(last));
 }
 
+/// The pipeline has one term of depth, whatever the depths are of.
+LossWeights pipeline_loss(LossWeights loss) {
+    loss.depth = loss.any_depth();
+    loss.sfm_depth = 0;
+    return loss;
+}
+
 }  // namespace
 
 bool few_photos(const TrainOptions& options, size_t photos) {
@@ -54,7 +61,7 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
     return {.purpose = pipeline::Purpose::training,
             .scene_degree = start.sh_degree,
             .render = options.render,
-            .loss = options.loss,
+            .loss = pipeline_loss(options.loss),
             .masks = masks,
             .alpha = cut,
             .depths = true,

@@ -156,6 +156,10 @@ Training::Training(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
         throw InputError(
             "the loss has a term of depth, but no training image has a depth map; they are in depth/ beside "
             "images/, or depth_file_path names them");
+    if (options.loss.sfm_depth > 0 && !images_.full().any_depths())
+        throw InputError(
+            "the loss has a term of sfm-depth, but the dataset does not say which point an image shows; "
+            "models of COLMAP do");
     check_bands(options, tools_.cache.config(), images_.lowest());
     if (options.final_splats > 0)
         portions::check_portions(std::min(options.final_splats, portions_.splats()), portions_.all());

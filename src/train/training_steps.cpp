@@ -210,7 +210,8 @@ portions::StepView Training::view_of(int step, ImageCache& seen, int sh_degree, 
                 const auto& photo = seen.photo(index);
                 *weight = photo.weight;
                 on.loss(photo.texels, photo.masked, affine ? &exposure : nullptr,
-                        learned ? &appearance : nullptr, photo.cut, photo.depths ? &photo.depths : nullptr);
+                        learned ? &appearance : nullptr, photo.cut,
+                        {photo.depths ? &photo.depths : nullptr, photo.depth_pixels});
                 if (plan_.sky) on.sky_gradient(learned_.sky, slot);
             },
         .weight = [weight] { return *weight; },

@@ -58,16 +58,21 @@ TEST_P(DepthLoss, ValueAndGradientMatchTheReference) {
         pipeline::FrameBuffers& frame = guarded.frame;
         frame.planes.upload(std::span<const float>(pack_planes(in.planes, 5, frame.sizes.stride)));
         const pipeline::FrameInputs inputs{{nullptr, 0, uint32_t(width), uint32_t(height)}, {1, 1, 1}};
-        const auto run = [&](const gpu::Buffer* map) {
+        const auto run = [&](const gpu::Buffer* map, uint64_t counted = 0) {
             rig().run([&](gpu::Recording& recording) {
                 recording.fill(frame.counts, 0, 0, sizeof(shared::Counts));
                 pipeline::FramePasses{{recording, rig().cache}, plan, frame, inputs}.loss(
-                    texels, false, nullptr, nullptr, alpha, map);
+                    texels, false, nullptr, nullptr, alpha, {map, counted});
             });
             return frame.image_gradient.download<float>(frame.sizes.image_gradient / 4);
         };
         const std::vector<float> without = run(nullptr);
         EXPECT_EQ(frame.read_counts().depth, 0);
+        // A mean over half as many pixels is twice as large.
+        const uint64_t pixels = uint64_t(width) * uint64_t(height), half = (pixels + 1) / 2;
+        run(&depths, half);
+        EXPECT_NEAR(frame.read_counts().depth, cpu.difference * double(pixels) / double(half),
+                    1e-6 + 4e-6 * cpu.difference);
         const std::vector<float> gradient = run(&depths);
         EXPECT_TRUE(guarded.intact());
         const shared::Counts counts = frame.read_counts();

@@ -422,7 +422,7 @@ void record_gradient(const FrameParts& parts, gpu::Recording& recording, const p
     const auto plan = plan_for(request);
     const pipeline::FramePasses on{{recording, rig().cache}, plan, parts.frame, inputs};
     const auto sorted = on.forward(parts.model);
-    on.loss(parts.photo, masked, nullptr, nullptr, cut, depths ? &parts.photo : nullptr);
+    on.loss(parts.photo, masked, nullptr, nullptr, cut, {depths ? &parts.photo : nullptr});
     on.backward(parts.model, sorted, {});
 }
 

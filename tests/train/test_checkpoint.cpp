@@ -88,6 +88,11 @@ TEST(Fingerprint, TellsDatasetsApart) {
     EXPECT_EQ(own.size(), 16u);
     EXPECT_EQ(own, train::dataset_fingerprint(small_capture().dataset, split()));
     EXPECT_NE(own, train::dataset_fingerprint(dataset, split_frames(dataset, 3)));
+    EXPECT_NE(own, train::dataset_fingerprint(dataset, split(), true));
+    const std::string with_points = train::dataset_fingerprint(dataset, split(), true);
+    dataset.points.positions.emplace_back(1, 2, 3);
+    EXPECT_EQ(own, train::dataset_fingerprint(dataset, split()));
+    EXPECT_NE(with_points, train::dataset_fingerprint(dataset, split(), true));
     dataset.frames[2].camera.translation.x += 1e-12;
     EXPECT_NE(own, train::dataset_fingerprint(dataset, split()));
     dataset = small_capture().dataset;

@@ -2,12 +2,15 @@
 // Training on images with depth maps.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <glm/matrix.hpp>
 
 #include "ewa/renderer.h"
 #include "ewa/trainer.h"
 #include "gpu/test_device.h"
 #include "run/depth_evaluation.h"
+#include "scene/depth_map.h"
 #include "support/temp_folder.h"
 #include "train/synthetic.h"
 
@@ -109,6 +112,65 @@ TEST(Depths, AreNotUsedWithoutAWeight) {
     }
     EXPECT_EQ(trained[0].means, trained[1].means);
     EXPECT_EQ(trained[0].opacity_logits, trained[1].opacity_logits);
+}
+
+/// A point at every fifth pixel of each image, where the truth is.
+Dataset with_points(size_t every) {
+    Dataset dataset = measured().dataset;
+    dataset.points = {};
+    for (Frame& frame : dataset.frames) {
+        const Image map = load_depth_map(frame);
+        std::vector<uint32_t> seen;
+        for (size_t i = 0; i < map.pixels.size(); i += every) {
+            if (map.pixels[i] == 0) continue;
+            const double x = double(i % 64) + 0.5, y = double(i / 64) + 0.5, z = map.pixels[i];
+            const Camera& camera = frame.camera;
+            const glm::dvec3 p{z * (x - camera.cx) / camera.fx, z * (y - camera.cy) / camera.fy, z};
+            seen.push_back(uint32_t(dataset.points.positions.size()));
+            dataset.points.positions.push_back(glm::transpose(camera.rotation) * (p - camera.translation));
+        }
+        frame.seen = std::make_shared<const std::vector<uint32_t>>(std::move(seen));
+        frame.depth_path.clear();
+    }
+    return dataset;
+}
+
+Gaussians trained(const Dataset& dataset, const TrainOptions& options, int steps) {
+    Trainer trainer(device(), dataset, all_frames(dataset), moved_start(), options);
+    while (trainer.steps_done() < steps) trainer.step();
+    return trainer.gaussians();
+}
+
+/// Points are few, and the mean over them has the weight of one over all pixels.
+TEST(Depths, OfPointsMoveTheSplats) {
+    const Dataset dataset = with_points(7);
+    TrainOptions options = quick(80);
+    const double usual = depth_error(trained(dataset, options, 80));
+    options.loss.sfm_depth = 0.5;
+    const Gaussians with = trained(dataset, options, 80);
+    printf("    %.4f without points, %.4f with them\n", usual, depth_error(with));
+    EXPECT_LT(depth_error(with), 0.8 * usual);
+    options.image_cache_bytes = 0;
+    EXPECT_EQ(trained(dataset, options, 80).means, with.means) << "from disk";
+    Dataset none = dataset;
+    for (Frame& frame : none.frames) frame.seen = nullptr;
+    expect_error<InputError>([&] { trained(none, options, 1); }, {"sfm-depth", "which point an image shows"});
+}
+
+/// Only the mean differs: points at all pixels with a depth are a depth map.
+TEST(Depths, OfPointsAreThoseOfMapsOverTheirPixels) {
+    Dataset maps = measured().dataset, points = with_points(1);
+    maps.frames.resize(1);
+    points.frames.resize(1);
+    const Image map = load_depth_map(maps.frames[0]);
+    const double share =
+        double(std::ranges::count_if(map.pixels, [](float z) { return z > 0; })) / double(map.pixels.size());
+    TrainOptions by_points = quick(3), by_map = quick(3);
+    by_points.loss.sfm_depth = 0.5 * share;
+    by_map.loss.depth = 0.5;
+    const Gaussians a = trained(points, by_points, 3), b = trained(maps, by_map, 3);
+    for (size_t i = 0; i < a.means.size(); ++i) EXPECT_NEAR(a.means[i], b.means[i], 2e-4) << i;
+    EXPECT_NE(a.means, trained(maps, quick(3), 3).means);
 }
 
 TEST(Depths, SomeImagesMayHaveNone) {

@@ -444,11 +444,11 @@ TEST(RunOptions, ALossHasTheTermsThatItNames) {
     EXPECT_EQ(train::parse_loss(" L1 = 0.5 , ssim=1e-1"), (LossWeights{0.5, 0, 0.1}));
     EXPECT_EQ(train::parse_loss("l2=1,ssim=0"), (LossWeights{0, 1, 0}));
     EXPECT_EQ(train::parse_loss("alpha=0,depth=1"), (LossWeights{0.8, 0, 0.2, 0, 1}));
-    EXPECT_EQ(train::parse_loss("alpha=2,l2=1,depth=0.1"), (LossWeights{0, 1, 0, 2, 0.1}));
+    EXPECT_EQ(train::parse_loss("alpha=2,l2=1,sfm-depth=0.1"), (LossWeights{0, 1, 0, 2, 0, 0.1}));
     EXPECT_EQ(train::loss_text({0.8, 0, 0.2, 0}), "l1=0.8,ssim=0.2,alpha=0");
     EXPECT_EQ(train::loss_text({}), "l1=0.8,ssim=0.2");
     const std::pair<const char*, const char*> wrong[] = {
-        {"", "'' is no term of the loss; l1, l2, ssim, alpha and depth are"},
+        {"", "'' is no term of the loss; l1, l2, ssim, alpha, depth and sfm-depth are"},
         {"sim=1", "did you mean ssim?"},
         {"l1=1,", "'' is no term"},
         {"l1", "'l1' has no weight; l1=0.5 has one"},
@@ -456,7 +456,7 @@ TEST(RunOptions, ALossHasTheTermsThatItNames) {
         {"l1=-1", "l1: '-1' is not a number from 0 to"},
         {"l1=", "l1: '' is not a number"},
         {"ssim=nan", "ssim: 'nan' is not a number"},
-        {"l2=inf", "l2: 'inf' is not a number"},
+        {"depth=1,sfm-depth=1", "'depth=1,sfm-depth=1' has depth and sfm-depth"},
         {"l1=0,ssim=0", "'l1=0,ssim=0' has no weight above 0; l1=0.8,ssim=0.2 is the usual loss"}};
     for (const auto& [text, message] : wrong)
         expect_error<InputError>([&, t = text] { train::parse_loss(t); }, {message});

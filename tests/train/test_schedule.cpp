@@ -44,7 +44,7 @@ TEST(Exclusions, AreThoseOfTheDocument) {
             if (row.option == "--integrator") options.render.integrator = Integrator::fast_ray;
             options.sky = row.option == "--background sky";
             if (row.option == "--appearance") options.appearance = AppearanceModel::ppisp;
-            options.loss.depth = row.option == "--loss depth" ? 0.1 : 0;
+            (by % 2 ? options.loss.depth : options.loss.sfm_depth) = row.option == "--loss depth" ? 0.1 : 0;
             EXPECT_TRUE(row.used(options));
             EXPECT_EQ(refusal(options, 1), "");
             if (by == by_batch) options.batch = 2;

@@ -327,6 +327,15 @@ TEST(Colmap, TextErrorsNameTheLine) {
     refuse(camera_line, "# none\n", "", {"no images"});
 }
 
+TEST(Colmap, TracksSayWhichPointsAnImageSees) {
+    Model model;
+    model.points = list({point({1, 2, 3}, {}, 1), point({kNan, 0, 0}, {}, 1), point({-1, 0, 1}, {}, 1)});
+    model.write();
+    const Dataset dataset = model.load();
+    EXPECT_EQ(*dataset.frames[0].seen, (std::vector<uint32_t>{0, 1})) << "without the dropped one";
+    EXPECT_FALSE(dataset.frames[1].seen);
+}
+
 /// What is written is read back: every kind of lens, names with spaces, and points.
 TEST(ColmapWriter, WhatIsWrittenIsReadBack) {
     TempFolder folder;

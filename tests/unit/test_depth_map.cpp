@@ -2,12 +2,15 @@
 // Depth maps of datasets: where they are found, and what they hold.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
 #include "ewa/dataset.h"
 #include "scene/depth_map.h"
 #include "scene/lens.h"
+#include "scene/native_lens.h"
 #include "support/png_bytes.h"
 #include "support/temp_folder.h"
 
@@ -130,6 +133,44 @@ TEST(DepthMap, PixelsMayHaveNoDepth) {
     drop_masked(map, photo);
     EXPECT_EQ(*map.at(3, 1), 0);
     EXPECT_GT(*map.at(4, 1), 0);
+}
+
+/// The nearest of a pixel's points, in front of the camera and inside the image. Others than the frame's do not count.
+TEST(DepthMap, PointsHaveDepths) {
+    Frame frame;
+    frame.camera = {.width = 8, .height = 6, .fx = 10, .fy = 10, .cx = 4, .cy = 3};
+    frame.camera.translation = {0, 0, 1};
+    frame.pinhole = frame.source = frame.camera;
+    const std::vector<glm::dvec3> points{{0.01, 0.01, 3}, {0.02, 0.01, 1}, {0.03, 0.01, 2},   {0.62, 0, 1},
+                                         {0, 0, -2},      {2, 0, 1},       {-0.5, -0.5, 1.5}, {0.3, 0.3, 1}};
+    frame.seen = std::make_shared<const std::vector<uint32_t>>(std::vector<uint32_t>{0, 2, 1, 3, 4, 5, 6});
+    const Image depths = depths_of_points(frame, points);
+    ASSERT_EQ(depths.channels, 1);
+    Image expected(8, 6, 1);
+    *expected.at(4, 3) = 2;
+    *expected.at(7, 3) = 2;
+    *expected.at(2, 1) = 2.5f;
+    EXPECT_EQ(depths.pixels, expected.pixels);
+    frame.camera.height = 4;
+    frame.camera.distortion.lens = Lens::equirectangular;
+    scene::set_equirectangular(frame.camera);
+    const Image around = depths_of_points(frame, points);
+    EXPECT_FLOAT_EQ(*around.at(4, 2), float(glm::length(glm::dvec3(0.02, 0.01, 2))));
+    EXPECT_FLOAT_EQ(*around.at(3, 1), float(glm::length(glm::dvec3(0.5, 0.5, 2.5))));
+}
+
+/// The tracks of text files. Images that the model lacks do not count, nor does what is no track.
+TEST(DepthMap, TracksSayWhichPointsAnImageSees) {
+    const TempFolder folder;
+    fs::create_directories(folder / "images");
+    for (const char* name : {"a.png", "b.png"}) save_image(folder / "images" / name, Image(8, 6, 3));
+    folder.write("sparse/0/cameras.txt", "1 PINHOLE 8 6 10 11 4 3\n");
+    folder.write("sparse/0/images.txt", "4 1 0 0 0 0 0 0 1 b.png\n\n7 1 0 0 0 0 0 0 1 a.png\n\n");
+    folder.write("sparse/0/points3D.txt",
+                 "1 1 2 3 0 0 0 0.5 4 17 9 2\n2 1 2 3 0 0 0 0.5\n3 1 2 3 0 0 0 0.5 9 1 4 1 x\n");
+    const Dataset dataset = load_dataset(folder.path(), {});
+    EXPECT_FALSE(dataset.frames[0].seen);
+    EXPECT_EQ(*dataset.frames[1].seen, (std::vector<uint32_t>{0, 2}));
 }
 
 /// Beside images/, without a name in the model.

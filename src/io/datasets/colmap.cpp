@@ -37,12 +37,15 @@ class ColmapBuilder {
     void add_camera(uint32_t id, const ColmapLens& lens, uint64_t width, uint64_t height,
                     const std::vector<double>& parameters, const Fail& fail);
     /// pose: qw qx qy qz tx ty tz, world to camera.
-    void add_image(const std::array<double, 7>& pose, uint32_t camera_id, const std::string& name,
-                   const Fail& fail);
-    /// `where` is called for the first dropped point.
+    void add_image(uint32_t id, const std::array<double, 7>& pose, uint32_t camera_id,
+                   const std::string& name, const Fail& fail);
+    /// images: ids of those that saw the point. Others than the model's do not count. `where` is called for the first dropped point.
     void add_point(const glm::dvec3& position, const std::array<uint8_t, 3>& color,
-                   const std::function<std::string()>& where) {
-        io::add_point(result_.points, result_.dropped, position, color, where);
+                   const std::vector<uint32_t>& images, const std::function<std::string()>& where) {
+        if (!io::add_point(result_.points, result_.dropped, position, color, where)) return;
+        for (const uint32_t id : images)
+            if (const auto image = image_of_.find(id); image != image_of_.end())
+                result_.images[image->second].seen.push_back(uint32_t(result_.points.positions.size() - 1));
     }
     ImageRecords take() { return std::move(result_); }
 
@@ -53,6 +56,7 @@ class ColmapBuilder {
     };
     std::filesystem::path images_;
     std::map<uint32_t, CameraModel> cameras_;
+    std::map<uint32_t, size_t> image_of_;  // by id: of result_.images
     ImageRecords result_;
 };
 
@@ -87,8 +91,8 @@ void ColmapBuilder::add_camera(uint32_t id, const ColmapLens& lens, uint64_t wid
         fail(camera_name + " is defined twice");
 }
 
-void ColmapBuilder::add_image(const std::array<double, 7>& pose, uint32_t camera_id, const std::string& name,
-                              const Fail& fail) {
+void ColmapBuilder::add_image(uint32_t id, const std::array<double, 7>& pose, uint32_t camera_id,
+                              const std::string& name, const Fail& fail) {
     const std::string image_name = "image \"" + core::one_line(name) + "\"";
     const auto inside = core::name_inside(name);
     if (!inside) return fail(image_name + " is outside the images folder");
@@ -112,6 +116,7 @@ void ColmapBuilder::add_image(const std::array<double, 7>& pose, uint32_t camera
     image.distortion = camera->second.distortion;
     image.camera.rotation = glm::mat3_cast(q);
     image.camera.translation = {pose[4], pose[5], pose[6]};
+    image_of_.emplace(id, result_.images.size());
     result_.images.push_back(std::move(image));
 }
 
@@ -150,12 +155,12 @@ void read_binary_images(const std::filesystem::path& path, ColmapBuilder& builde
     const Fail fail = [&](const std::string& text) { reader.fail(text); };
     const uint64_t count = read_count(reader, kImageBytes, "images");
     for (uint64_t i = 0; i < count; ++i) {
-        reader.skip(sizeof(uint32_t), "an image");  // its id
+        const auto id = reader.read<uint32_t>("an image");
         std::array<double, 7> pose;
         for (double& value : pose) value = reader.read<double>("an image");
         const auto camera_id = reader.read<uint32_t>("an image");
         const std::string name = reader.read_zero_terminated(kMaxName, "the name of an image");
-        builder.add_image(pose, camera_id, name, fail);
+        builder.add_image(id, pose, camera_id, name, fail);
         const uint64_t observations = read_count(reader, kObservationBytes, "observations");
         reader.skip(observations * kObservationBytes, "observations");
     }
@@ -173,8 +178,12 @@ void read_binary_points(const std::filesystem::path& path, ColmapBuilder& builde
         for (uint8_t& channel : color) channel = reader.read<uint8_t>("a point");
         reader.skip(sizeof(double), "a point");  // its reprojection error
         const uint64_t track = read_count(reader, kTrackBytes, "entries of a track");
-        reader.skip(track * kTrackBytes, "a track");
-        builder.add_point(position, color, [&] {
+        std::vector<uint32_t> images;
+        for (uint64_t entry = 0; entry < track; ++entry) {
+            images.push_back(reader.read<uint32_t>("a track"));
+            reader.skip(sizeof(uint32_t), "a track");  // which of the image's observations it is
+        }
+        builder.add_point(position, color, images, [&] {
             return core::one_line(path.string()) + ": the point at byte " + std::to_string(begin);
         });
     }
@@ -265,12 +274,12 @@ void read_text_images(const std::filesystem::path& path, ColmapBuilder& builder)
     Lines lines(path);
     const Fail fail = [&](const std::string& text) { lines.fail(text); };
     while (lines.next_entry()) {
-        lines.value<uint32_t>("image id");
+        const auto id = lines.value<uint32_t>("image id");
         std::array<double, 7> pose;
         for (double& value : pose) value = lines.value<double>("pose");
         const auto camera_id = lines.value<uint32_t>("camera id");
         if (lines.rest().empty()) lines.fail("the image has no name");
-        builder.add_image(pose, camera_id, std::string(lines.rest()), fail);
+        builder.add_image(id, pose, camera_id, std::string(lines.rest()), fail);
         lines.next();
     }
 }
@@ -285,7 +294,13 @@ void read_text_points(const std::filesystem::path& path, ColmapBuilder& builder)
         std::array<uint8_t, 3> color;
         for (uint8_t& channel : color) channel = lines.value<uint8_t>("colour");
         lines.value<double>("reprojection error");
-        builder.add_point(position, color, [&] { return lines.where(); });
+        std::vector<uint32_t> images;
+        // Other programs write other tracks, or none.
+        while (const auto id = core::parse_integer<uint32_t>(lines.word())) {
+            images.push_back(*id);
+            lines.word();  // which of the image's observations it is
+        }
+        builder.add_point(position, color, images, [&] { return lines.where(); });
     }
 }
 

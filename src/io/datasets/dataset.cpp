@@ -380,6 +380,7 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
         frame.mask_path = find_mask(image, model.folder, options.downscale);
         frame.depth_path = find_depth(image, model.folder);
         frame.depth_unit = image.depth_unit;
+        if (!image.seen.empty()) frame.seen = std::make_shared<const std::vector<uint32_t>>(image.seen);
     }
     settle_masks(dataset, options.masks);
     check_positions(dataset);

@@ -42,15 +42,16 @@ void note_partial_spheres(ImageRecords& records) {
         " degrees upright");
 }
 
-void add_point(PointCloud& points, DroppedPoints& dropped, const glm::dvec3& position,
+bool add_point(PointCloud& points, DroppedPoints& dropped, const glm::dvec3& position,
                const std::array<uint8_t, 3>& color, const std::function<std::string()>& where) {
     for (int axis = 0; axis < 3; ++axis)
         if (!std::isfinite(static_cast<float>(position[axis]))) {
             if (dropped.count++ == 0) dropped.first = where();
-            return;
+            return false;
         }
     points.positions.push_back(position);
     points.colors.push_back(color);
+    return true;
 }
 
 bool is_point_cloud(const std::filesystem::path& path) {

@@ -2,6 +2,7 @@
 // The content of a dataset's model file, before any image is read, and the readers of the formats: COLMAP's
 // sparse model, transforms.json (transforms.cpp describes its keys), and points as a PLY.
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -21,7 +22,8 @@ struct ImageRecord {
     std::filesystem::path depth;  // the depth map that the model names; empty: none
     double depth_unit = Frame().depth_unit;
     Distortion distortion;
-    int split = 0;  // Frame::split
+    int split = 0;                 // Frame::split
+    std::vector<uint32_t> seen{};  // Frame::seen; empty: the model does not say
 };
 
 /// Points that are skipped: float32, in which splats are stored, cannot hold a coordinate as a finite number.
@@ -53,8 +55,8 @@ void set_sphere(Camera& camera, const std::string& where);
 /// Adds a note if there are 360° images that do not show all directions.
 void note_partial_spheres(ImageRecords& records);
 
-/// Adds a point, or counts it as dropped. `where` is called for the first dropped point.
-void add_point(PointCloud& points, DroppedPoints& dropped, const glm::dvec3& position,
+/// Adds a point, or counts it as dropped and returns false. `where` is called for the first dropped point.
+bool add_point(PointCloud& points, DroppedPoints& dropped, const glm::dvec3& position,
                const std::array<uint8_t, 3>& color, const std::function<std::string()>& where);
 
 /// Reads the vertices of a PLY: x y z, in the frame of the file. Colours are red green blue, as integers
