@@ -315,10 +315,11 @@ std::vector<Row> rows() {
              "Start with the images' sides halved N times. Each tenth of the run doubles them", kDecides,
              [](RunOptions& o) -> int& { return o.train.halvings; }, 0, 6)},
         {"Data", "",
-         words("init", "sfm|random|FILE",
-               "First splats. sfm: the dataset's points, or random if it has none. random: where the cameras "
-               "look. FILE: a splat file, a PLY of points, or the folder of a run",
-               kDecides, [](RunOptions& o) -> std::string& { return o.init; })},
+         words(
+             "init", "sfm|random|FILE",
+             "First splats. sfm: the dataset's points. Without, points of its depth maps, or random. random: "
+             "where the cameras look. FILE: a splat file, a PLY of points, or the folder of a run",
+             kDecides, [](RunOptions& o) -> std::string& { return o.init; })},
         {"Data", "dense_start", dense_start_option()},
         {"Data", "init_opacity",
          real(

@@ -20,6 +20,7 @@
 #include "ewa/splat_files.h"
 #include "io/datasets/image_records.h"
 #include "run/blurred_images.h"
+#include "run/depth_points.h"
 #include "run/pose_options.h"
 #include "run/region_option.h"
 #include "scene/dense_points.h"
@@ -177,14 +178,17 @@ std::optional<std::string> inria_remark(const Dataset& dataset) {
 }
 
 void add_remarks(RunInput& input) {
-    settle_depths(input);
     const Dataset& dataset = input.dataset;
+    const bool measured = has_depth_maps(dataset, input.split.train);
+    settle_depths(input);
     if (const auto remark = idle_ranks_remark(input.options.train, input.options.ranks->size()))
         input.remarks.push_back(*remark);
     if (input.without_view_dependence())
         input.notes.emplace_back("the dataset says that no colour depends on the view: SH degree 0");
     if (input.options.init == "sfm" && dataset.points.positions.empty())
-        input.remarks.emplace_back("the dataset has no points: training starts from random splats");
+        input.remarks.emplace_back(measured
+                                       ? "the dataset has no points: training starts from its depth maps"
+                                       : "the dataset has no points: training starts from random splats");
     if (const size_t points = dataset.points.positions.size();
         input.options.init == "sfm" && points > 0 && input.start.size() > points)
         input.notes.push_back(
@@ -277,6 +281,12 @@ size_t dense_start_size(const RunOptions& options, const Dataset& dataset, const
     return train.max_splats == kAutomaticMaxSplats ? wanted : std::min(wanted, size_t(train.max_splats));
 }
 
+/// How many first splats there are where no points say so.
+uint32_t first_splats(const RunOptions& options) {
+    const uint32_t most = options.train.max_splats;
+    return most == kAutomaticMaxSplats ? kRandomSplats : std::min(kRandomSplats, most);
+}
+
 void refuse_dense_start(const RunOptions& options, const std::string& start) {
     if (options.dense_start == DenseStart::on)
         throw InputError("--dense-start on puts splats between points, and " + start + " has none");
@@ -304,13 +314,15 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
                 fmt::format("{}: a coordinate is not finite ({} such points in all); remove them, or start "
                             "from --init random",
                             dataset.first_dropped_point, dataset.dropped_points));
-        if (!dataset.points.positions.empty()) start = splats_of(dataset.points, options, dataset, frames);
+        PointCloud measured;
+        if (dataset.points.positions.empty())
+            measured = points_of_depth_maps(dataset, frames, first_splats(options), options.train.seed);
+        const PointCloud& points = measured.positions.empty() ? dataset.points : measured;
+        if (!points.positions.empty()) start = splats_of(points, options, dataset, frames);
     }
     if (options.init == "random" || (options.init == "sfm" && start.size() == 0)) {
         refuse_dense_start(options, options.init == "random" ? "--init random" : "the dataset");
-        const uint32_t most = options.train.max_splats;
-        const uint32_t count = most == kAutomaticMaxSplats ? kRandomSplats : std::min(kRandomSplats, most);
-        start = random_gaussians(dataset, frames, static_cast<int>(count), options.train.seed, degree);
+        start = random_gaussians(dataset, frames, int(first_splats(options)), options.train.seed, degree);
     } else if (options.init != "sfm" && io::is_point_cloud(file)) {
         const io::PlyPoints cloud = io::read_points_ply(file);
         if (cloud.dropped.count > 0)

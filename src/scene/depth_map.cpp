@@ -33,15 +33,12 @@ double unit_of(const Frame& frame) {
     return kLevels * frame.depth_unit;
 }
 
-void check_lens_of(const Frame& frame) {
-    const bool pinhole = frame.camera.distortion.none() && !frame.camera.readout;
-    if (!pinhole || (!frame.distortion.none() && frame.distortion.lens != Lens::brown))
-        throw InputError(
-            "frame \"" + core::one_line(frame.name) +
-            "\": depth maps need a pinhole, or --lens undistort with OpenCV's perspective model");
-}
-
 }  // namespace
+
+bool takes_depth_map(const Frame& frame) {
+    const bool pinhole = frame.camera.distortion.none() && !frame.camera.readout;
+    return pinhole && (frame.distortion.none() || frame.distortion.lens == Lens::brown);
+}
 
 float depth_at(const Image& depth, const glm::vec2& at, float step) {
     if (!(at.x >= 0 && at.y >= 0 && at.x < float(depth.width) && at.y < float(depth.height))) return 0;
@@ -62,7 +59,10 @@ float depth_at(const Image& depth, const glm::vec2& at, float step) {
 }
 
 Image load_depth_map(const Frame& frame) {
-    check_lens_of(frame);
+    if (!takes_depth_map(frame))
+        throw InputError(
+            "frame \"" + core::one_line(frame.name) +
+            "\": depth maps need a pinhole, or --lens undistort with OpenCV's perspective model");
     const double unit = unit_of(frame);
     Image map = load_image(frame.depth_path);
     if (frame.orientation != 1) map = oriented(map, frame.orientation);

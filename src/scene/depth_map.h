@@ -10,10 +10,12 @@
 
 namespace ewa {
 
+/// Whether the frame's lens is one that load_depth_map takes: a pinhole, or OpenCV's perspective model, which is undistorted.
+bool takes_depth_map(const Frame& frame);
+
 /// The frame's depth map as `frame.camera` sees it: one channel of view z in world units, 0 where the file has no depth
 /// (0, negative, or not finite). The file may have another size than the image. Depths are those of depth_at, where pixels
-/// agree to a tenth. frame.depth_path: not empty. Throws InputError, also where the frame's lens is neither a pinhole nor OpenCV's
-/// perspective model, which is undistorted.
+/// agree to a tenth. frame.depth_path: not empty. Throws InputError, also without takes_depth_map.
 Image load_depth_map(const Frame& frame);
 
 /// The depths of the points that the frame has seen, as an image of one channel: the nearest one of a pixel, 0 without. They are view z,

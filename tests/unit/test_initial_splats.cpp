@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "run/depth_points.h"
 #include "run/run_input.h"
 #include "support/temp_folder.h"
 
@@ -201,6 +203,72 @@ TEST(Initialise, StartsFromPointsOrRandomSplats) {
     dataset.first_dropped_point = "points.ply: vertex 7";
     expect_error<InputError>([&] { initial_splats(options, dataset, frames); },
                              {"vertex 7", "3 such points"});
+}
+
+/// A dataset without points: two images of 20 x 10 pixels, the second with a depth map, in which a column has no depth.
+Dataset measured(const TempFolder& folder) {
+    Dataset dataset = circle({1, 2, 3}, true, 2, 25);
+    std::filesystem::create_directories(folder / "images");
+    for (size_t i = 0; i < 2; ++i) {
+        Frame& frame = dataset.frames[i];
+        frame.camera.width = 20;
+        frame.camera.height = 10;
+        frame.camera.cx = 9;
+        frame.camera.cy = 6;
+        frame.pinhole = frame.source = frame.camera;
+        frame.image_exists = true;
+        frame.image_path = folder / ("images/" + std::to_string(i) + ".png");
+        Image image(20, 10, 3), map(20, 10, 1);
+        for (int y = 0; y < 10; ++y)
+            for (int x = 0; x < 20; ++x) {
+                image.at(x, y)[0] = float(x) / 255;
+                image.at(x, y)[1] = float(y) / 255;
+                *map.at(x, y) = x == 7 ? 0 : 2 + 0.05f * float(y);
+            }
+        save_image(frame.image_path, image);
+        save_image(folder / "depth.exr", map);
+    }
+    dataset.frames[1].depth_path = folder / "depth.exr";
+    return dataset;
+}
+
+TEST(Initialise, DepthMapsStandInForPoints) {
+    const TempFolder folder;
+    Dataset dataset = measured(folder);
+    const std::vector<int> frames = every_frame(dataset);
+    const PointCloud points = points_of_depth_maps(dataset, frames, 60, 5);
+    ASSERT_EQ(points.positions.size(), 60u);
+    std::vector<int> pixels;
+    const Camera& camera = dataset.frames[1].camera;
+    for (size_t i = 0; i < 60; ++i) {
+        const int x = points.colors[i][0], y = points.colors[i][1];
+        EXPECT_NE(x, 7);
+        pixels.push_back(20 * y + x);
+        const glm::dvec3 p = camera.rotation * points.positions[i] + camera.translation;
+        EXPECT_NEAR(p.z, 2 + 0.05 * y, 1e-6);
+        EXPECT_NEAR(25 * p.x / p.z + 9, x + 0.5, 1e-5);
+        EXPECT_NEAR(25 * p.y / p.z + 6, y + 0.5, 1e-5);
+    }
+    EXPECT_TRUE(std::ranges::is_sorted(pixels));
+    EXPECT_EQ(std::ranges::adjacent_find(pixels), pixels.end()) << "each pixel once";
+    EXPECT_LT(pixels.front(), 4);
+    EXPECT_GE(pixels.back(), 196);
+    EXPECT_EQ(points_of_depth_maps(dataset, frames, 60, 5).positions, points.positions);
+    EXPECT_NE(points_of_depth_maps(dataset, frames, 60, 6).positions, points.positions);
+    EXPECT_EQ(points_of_depth_maps(dataset, frames, 1000, 5).positions.size(), 190u);
+
+    RunOptions options;
+    options.train.sh_degree = 0;
+    options.train.max_splats = 150;
+    EXPECT_EQ(initial_splats(options, dataset, frames).size(), 150u);
+    EXPECT_TRUE(has_depth_maps(dataset, frames));
+    EXPECT_FALSE(has_depth_maps(dataset, {0}));
+    options.train.max_splats = 400;
+    EXPECT_EQ(initial_splats(options, dataset, frames).size(), 190u);
+    EXPECT_EQ(initial_splats(options, dataset, {0}).size(), 400u) << "random";
+    dataset.frames[1].camera.distortion.lens = Lens::fisheye;
+    dataset.frames[1].camera.distortion.k1 = 0.1;
+    EXPECT_EQ(initial_splats(options, dataset, frames).size(), 400u) << "random";
 }
 
 }  // namespace

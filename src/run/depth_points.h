@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Points where the depth maps of a dataset are.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "ewa/dataset.h"
+
+namespace ewa::train {
+
+/// Whether one of the frames has a depth map that its lens allows.
+bool has_depth_maps(const Dataset& dataset, const std::vector<int>& frames);
+
+/// About `count` points in the world: as many of each frame with a depth map, spread over its pixels with a depth, with the image's
+/// colours. Frames without one have none, nor do those whose lens has no depth maps. The seed decides which pixels. Throws InputError.
+PointCloud points_of_depth_maps(const Dataset& dataset, const std::vector<int>& frames, uint32_t count,
+                                uint64_t seed);
+
+}  // namespace ewa::train
