@@ -2,6 +2,7 @@
 #include "capture/comparing.h"
 
 #include <algorithm>
+#include <atomic>
 #include <set>
 
 #include "capture/feature_database.h"
@@ -15,6 +16,7 @@ constexpr int kEach = 12;           // photos that one is compared with, by look
 
 constexpr int kSequence = 10;  // photos that follow, of a sequence
 constexpr int kFarthest = 512;
+constexpr int kLasting = 200;  // pairs, after which a killed search need not begin again
 
 using Places = std::vector<ImagePair>;
 
@@ -70,10 +72,12 @@ std::optional<std::vector<ImagePair>> compare_photos(const std::filesystem::path
         return images[size_t(pair.first)] != 0 && images[size_t(pair.second)] != 0;
     };
     std::erase_if(pairs, [&](const ImagePair& pair) { return !has_features(pair); });
+    std::atomic<int> written = 0;
     const auto compare = [&](size_t i) {
         const std::int64_t a = images[size_t(pairs[i].first)], b = images[size_t(pairs[i].second)];
-        if (!database.is_compared(a, b))
-            database.write(a, b, matches_of(database.descriptors(a), database.descriptors(b)));
+        if (database.is_compared(a, b)) return;
+        database.write(a, b, matches_of(database.descriptors(a), database.descriptors(b)));
+        if (++written % kLasting == 0) database.commit();
     };
     try {
         on_all_cores({CapturePhase::matches, "matched", "pairs", 0, int(pairs.size()), {}}, progress,
