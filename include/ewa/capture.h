@@ -13,7 +13,7 @@ namespace ewa {
 
 /// Which pairs of images are compared.
 enum class Matching {
-    automatic,  // those that look as if they showed the same things, up to 1,000 images; else sequence
+    automatic,  // those that look as if they showed the same things, up to 1,000 images; else sequence. 360° photos: unordered up to 50
     sequence,   // each image with those that follow it in the order of names
     unordered   // all pairs; the time grows with the square of their number
 };

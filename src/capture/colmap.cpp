@@ -23,6 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr int kLeastBlock = 4;      // photos
 constexpr int kMostCompared = 200;  // photos, all of which are compared where looks have not placed all
+constexpr int kMostPanoramas = 50;  // 360° photos, all pairs of which are compared
 constexpr int kNext = 2;            // photos that follow, which are compared whatever they look like
 constexpr const char* kMostFeatures = "3000";  // of a view; a 360° photo has six
 constexpr int kRounds = 2;                     // of a rig's bundle adjustment, each with new points
@@ -219,14 +220,15 @@ void verify_listed(const Colmap& colmap, const PanoramaViews& views, const std::
                [](const std::string&) { return std::nullopt; });
 }
 
-/// The pairs of views of two photos each, since those of one photo have no baseline.
-void match_views(const Colmap& colmap, const Photos& panoramas, const PanoramaViews& views, Pairing pairing,
+/// The views of two photos are all compared. Few photos are compared with each other, and many in sequence.
+void match_views(const Colmap& colmap, const Photos& panoramas, const PanoramaViews& views,
                  const fs::path& work, const ProgressFunction& progress) {
-    const std::vector<ImagePair> pairs = pairs_of_views(pairs_of(int(panoramas.names.size()), pairing));
-    const auto compared =
-        compare_photos(work / "database.db", views.photos.names,
-                       {.pairs = pairs, .by_look = pairing != Pairing::all}, "views", progress);
-    verify_listed(colmap, views, compared.value_or(pairs), work);
+    const int count = int(panoramas.names.size());
+    Pairing pairing = panoramas.pairing;
+    if (pairing == Pairing::by_look) pairing = count > kMostPanoramas ? Pairing::in_sequence : Pairing::all;
+    const std::vector<ImagePair> pairs = pairs_of_views(pairs_of(count, pairing));
+    compare_photos(work / "database.db", views.photos.names, {.pairs = pairs}, "views", progress);
+    verify_listed(colmap, views, pairs, work);
 }
 
 /// COLMAP verifies the matches of photos, and compares those whose matches are not known.
@@ -263,24 +265,28 @@ void verify(const Colmap& colmap, int count, Pairing pairing, const fs::path& wo
                });
 }
 
+void match_photos(const Colmap& colmap, const Photos& photos, Pairing pairing, const fs::path& work,
+                  const ProgressFunction& progress) {
+    const int count = int(photos.names.size());
+    Comparison comparison{.pairs = pairs_of(count, pairing), .by_look = pairing == Pairing::by_look};
+    if (comparison.by_look) {
+        comparison.pass_over_others = true;
+        for (int i = 0; i < count; ++i)
+            for (int k = i + 1; k <= std::min(i + kNext, count - 1); ++k)
+                comparison.always.emplace_back(i, k);
+    }
+    compare_photos(work / "database.db", photos.names, comparison, "photos", progress);
+    verify(colmap, count, pairing, work);
+}
+
 /// done: the file that says so. views: those that the photos are; null: they are none.
-void match(const Colmap& colmap, const Photos& given, const PanoramaViews* views, Pairing pairing,
+void match(const Colmap& colmap, const Photos& photos, const PanoramaViews* views, Pairing pairing,
            const fs::path& work, const fs::path& done, const ProgressFunction& progress) {
     if (core::is_file(done)) return;
-    if (views) {
-        match_views(colmap, given, *views, pairing, work, progress);
-    } else {
-        const int count = int(given.names.size());
-        Comparison comparison{.pairs = pairs_of(count, pairing), .by_look = pairing == Pairing::by_look};
-        if (comparison.by_look) {
-            comparison.pass_over_others = true;
-            for (int i = 0; i < count; ++i)
-                for (int k = i + 1; k <= std::min(i + kNext, count - 1); ++k)
-                    comparison.always.emplace_back(i, k);
-        }
-        compare_photos(work / "database.db", given.names, comparison, "photos", progress);
-        verify(colmap, count, pairing, work);
-    }
+    if (views)
+        match_views(colmap, photos, *views, work, progress);
+    else
+        match_photos(colmap, photos, pairing, work, progress);
     mark(done);
 }
 
@@ -340,12 +346,6 @@ std::vector<Model> map_if_possible(const Colmap& colmap, const Photos& photos, c
 } catch (const RunError&) {
     if (!core::is_folder(work / "models") || !models_in(work / "models").empty()) throw;
     return {};
-}
-
-/// The photos in the largest model.
-size_t placed_photos(const std::vector<Model>& models, const PanoramaViews* views) {
-    if (models.empty()) return 0;
-    return views ? rig_poses(models.front().folder).photos.size() : size_t(models.front().images);
 }
 
 std::string sizes_text(const std::vector<Model>& models) {
@@ -438,8 +438,8 @@ std::vector<std::string> place_photos(const Photos& given, const fs::path& work,
     extract_features(colmap, photos, views, work);
     match(colmap, given, views, given.pairing, work, work / "matches.done", progress);
     std::vector<Model> models = map_if_possible(colmap, photos, views, work);
-    const size_t placed = placed_photos(models, views);
-    if (given.pairing == Pairing::by_look && placed < given.names.size() &&
+    const size_t placed = models.empty() ? 0 : size_t(models.front().images);
+    if (!views && given.pairing == Pairing::by_look && placed < given.names.size() &&
         int(given.names.size()) <= kMostCompared) {
         // The comparisons that seemed needless may place the others.
         const fs::path before = work / "models_by_look";
@@ -447,7 +447,7 @@ std::vector<std::string> place_photos(const Photos& given, const fs::path& work,
         fs::rename(work / "models", before);
         match(colmap, given, views, Pairing::all, work, work / "all_matches.done", progress);
         models = map_if_possible(colmap, photos, views, work);
-        if (placed_photos(models, views) < placed) models = models_in(before);
+        if (models.empty() || models.front().images < placed) models = models_in(before);
     }
     if (models.empty() || models.front().images < 2)
         throw InputError("COLMAP could not place the " + std::to_string(given.names.size()) +

@@ -108,7 +108,7 @@ TEST_F(PanoramaCameras, FollowFromThoseOfTheirViews) {
          {"COLMAP has placed 18 of their 24 views", "1 view disagrees with others of the same photo",
           "could not be placed, and are not used: photo 3.png", "3 of 4 photos have cameras"})
         EXPECT_NE(outcome.out.find(text), std::string::npos) << text << outcome.out;
-    EXPECT_EQ(calls(), kSearched + "mapper\nmatches_importer\nmapper\n" + kRound + kRound);
+    EXPECT_EQ(calls(), kSearched + "mapper\n" + kRound + kRound);
     EXPECT_EQ(read_json(folder_ / "dataset/colmap/rig.json").at(0).at("cameras").size(), size_t(kViews));
     const ewa::Dataset dataset = ewa::load_dataset(folder_ / "dataset", {});
     ASSERT_EQ(dataset.frames.size(), 3u);
