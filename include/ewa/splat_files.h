@@ -14,7 +14,7 @@ namespace ewa {
 std::string_view name_of(SplatFormat format);
 
 /// The format of an extension, in upper or lower case: .ply .compressed.ply .splat .ksplat .spz .glb .gltf
-/// .sog .usda .usdz, or of the name meta.json. Throws InputError for any other.
+/// .sog .usda .usdz, or of the names meta.json and lod-meta.json. Throws InputError for any other.
 SplatFormat format_of_name(const std::filesystem::path& path);
 
 /// The same for a file to write. Throws InputError also for .ksplat, which ewa only reads.
@@ -30,6 +30,10 @@ SplatFormat format_of_file(const std::filesystem::path& path);
 /// property.
 SplatScene read_splats(const std::filesystem::path& path);
 
+/// Reads a level of a lod-meta.json; read_splats reads level 0. Throws InputError as read_splats does, and for a level that the
+/// file lacks.
+SplatScene read_splat_level(const std::filesystem::path& path, size_t level);
+
 /// Reads the splats alone. Skipped contents are warnings on standard error.
 Gaussians load_splats(const std::filesystem::path& path);
 
@@ -39,6 +43,11 @@ Gaussians load_splats(const std::filesystem::path& path);
 /// Throws InputError for an unknown extension or values out of the format's range. The values of a .gltf or a meta.json
 /// go to files beside it whose names are free; those that the replaced file named are removed.
 std::vector<std::string> save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
+                                     const SaveOptions& options);
+
+/// Writes a lod-meta.json and its chunks, in folders beside it: the scene as level 0, and further levels that decimate_splats halves
+/// in place. So it takes no memory for a copy. Returns and throws as save_splats does, which writes a lod-meta.json from a copy.
+std::vector<std::string> save_levels(const std::filesystem::path& path, Gaussians gaussians,
                                      const SaveOptions& options);
 
 /// The bytes of the .sog that save_splats would write. Adds a line to `remarks` for each thing that it does not store.

@@ -10,8 +10,22 @@
 
 namespace ewa {
 
-/// The sources in src/io/splats describe the layouts. sog is one file, sog_meta a meta.json with images beside it.
-enum class SplatFormat { ply, compressed_ply, splat, spz, glb, gltf, sog, sog_meta, usda, usdz, ksplat };
+/// The sources in src/io/splats describe the layouts. sog is one file, sog_meta a meta.json with images beside it, and sog_levels a
+/// lod-meta.json with folders of those beside it.
+enum class SplatFormat {
+    ply,
+    compressed_ply,
+    splat,
+    spz,
+    glb,
+    gltf,
+    sog,
+    sog_meta,
+    sog_levels,
+    usda,
+    usdz,
+    ksplat
+};
 
 struct SplatScene {
     Gaussians gaussians;  // in the frame of an INRIA PLY (x right, y down, z forward), whatever the file uses
@@ -26,7 +40,8 @@ struct SplatScene {
 struct SaveOptions {
     std::vector<std::string> comments = {};  // one line each; kept by the formats that can store them
     bool antialiased = false;
-    int spz_version = 3;                                    // 3 or 4
+    int spz_version = 3;  // 3 or 4
+    int levels = 0;       // of a lod-meta.json; 0: until one has a million splats
     std::function<void(uint64_t, uint64_t)> progress = {};  // splats written, all splats
 };
 

@@ -40,7 +40,7 @@ struct ConvertArguments {
     std::string crop, decimate, sort;
     Edits edits;
     Cleaning cleaning;
-    int spz_version = 3;
+    int spz_version = 3, levels = 0, level = 0;
     fs::path json;
     bool bake_sky = false, check = false, allow_empty = false, quiet = false;
     std::optional<live::Run> run;  // that the only input is of
@@ -53,10 +53,19 @@ struct Work {
     Json inputs = Json::array(), removed = Json::object();  // removed: splats by option
 };
 
+struct SceneSize {
+    size_t splats;
+    int sh_degree;
+};
+
+SceneSize scene_size(const Gaussians& gaussians) {
+    return {gaussians.size(), gaussians.sh_degree};
+}
+
 std::string described(const fs::path& path, std::string_view format, const std::string& variant,
-                      const Gaussians& gaussians) {
+                      const SceneSize& size) {
     return fmt::format("{}: {}{}, {} splats of SH degree {}, {}", core::one_line(path.string()), format,
-                       variant.empty() ? "" : " (" + variant + ")", gaussians.size(), gaussians.sh_degree,
+                       variant.empty() ? "" : " (" + variant + ")", size.splats, size.sh_degree,
                        core::bytes_text(fs::file_size(path)));
 }
 
@@ -75,11 +84,13 @@ Work read_all(const ConvertArguments& arguments) {
     std::set<bool> marks, densities;
     for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
         const fs::path& path = arguments.files[i];
-        SplatScene scene = read_splats(path);
+        SplatScene scene =
+            arguments.level > 0 ? read_splat_level(path, size_t(arguments.level)) : read_splats(path);
         if (arguments.bake_sky) bake_sky(path, scene.gaussians);
         place_splats(scene.gaussians, arguments.placements.at(i), path.string());
         if (!arguments.quiet)
-            fmt::print("{}\n", described(path, name_of(scene.format), scene.variant, scene.gaussians));
+            fmt::print("{}\n",
+                       described(path, name_of(scene.format), scene.variant, scene_size(scene.gaussians)));
         work.inputs.push_back({{"file", path.string()},
                                {"format", name_of(scene.format)},
                                {"splats", scene.gaussians.size()},
@@ -120,10 +131,11 @@ Json check(const ConvertArguments& arguments, const Work& work) {
     return json;
 }
 
-/// The files that hold the values of an existing .gltf or meta.json; empty for other formats.
+/// The files that hold the values of an existing .gltf, meta.json or lod-meta.json; empty for other formats.
 std::vector<fs::path> values_of(const fs::path& path) {
     const std::string name = core::lower(path.filename().string());
     if (name.ends_with(".gltf")) return io::gltf_values(path);
+    if (name == "lod-meta.json") return io::level_files(path);
     return name == "meta.json" ? io::sog_images(path) : std::vector<fs::path>();
 }
 
@@ -133,6 +145,16 @@ uint64_t bytes_of(const std::vector<fs::path>& files) {
     return sum;
 }
 
+/// Throws if an input is a chunk in one of the folders N_M that a lod-meta.json writes.
+void check_chunks(const fs::path& out, const fs::path& input) {
+    const fs::path folder = fs::weakly_canonical(input).parent_path();
+    const std::string name = folder.filename().string();
+    if (name.find('_') != std::string::npos && name.find_first_not_of("0123456789_") == std::string::npos &&
+        folder.parent_path() == fs::weakly_canonical(out).parent_path())
+        throw InputError(core::one_line(out.string()) + ": would replace chunks, of which an input, " +
+                         core::one_line(input.string()) + ", is one; write to another folder");
+}
+
 /// Throws if an output is another file of this command, or cannot be written.
 void check_files(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
@@ -140,6 +162,7 @@ void check_files(const ConvertArguments& arguments) {
         outputs = {{"OUT", out}, {"--json", arguments.json}, {"--dry-run", arguments.cleaning.picture}};
     for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
         inputs.push_back({"an input", arguments.files[i]});
+        if (core::lower(out.filename().string()) == "lod-meta.json") check_chunks(out, arguments.files[i]);
         for (const fs::path& values : values_of(arguments.files[i]))
             inputs.push_back({"values of an input", values});
     }
@@ -163,13 +186,13 @@ void check_not_empty(const ConvertArguments& arguments, size_t read, size_t left
                      "; --allow-empty writes a file without splats");
 }
 
-Json output_json(const ConvertArguments& arguments, const Gaussians& gaussians) {
+Json output_json(const ConvertArguments& arguments, const SceneSize& size) {
     const fs::path& out = arguments.files.back();
     const std::vector<fs::path> values = values_of(out);
     Json json = {{"file", out.string()},
                  {"format", names_page(out) ? "page" : name_of(format_of_name(out))},
-                 {"splats", gaussians.size()},
-                 {"sh_degree", gaussians.sh_degree},
+                 {"splats", size.splats},
+                 {"sh_degree", size.sh_degree},
                  {"bytes", fs::file_size(out)}};
     if (!values.empty()) json["values"]["bytes"] = bytes_of(values);
     for (const fs::path& file : values) json["values"]["files"].push_back(file.string());
@@ -204,6 +227,11 @@ int run(const ConvertArguments& arguments) {
     if (page && arguments.check)
         throw InputError("--check: ewa does not read a page; check a .sog, which it holds");
     const SplatFormat format = page ? SplatFormat::sog : format_to_write(out);
+    const bool levels = format == SplatFormat::sog_levels;
+    if (levels && arguments.check)
+        throw InputError(
+            "--check: its splats are in another order; check a .sog, which level 0 holds in chunks");
+    if (!levels && arguments.levels > 0) throw InputError("--levels: only a lod-meta.json has levels");
     // Report wrong use before the inputs are read: they may be large.
     Edits edits = arguments.edits;
     edits.transform = parse_transform(arguments.transform);
@@ -223,31 +251,35 @@ int run(const ConvertArguments& arguments) {
     for (std::string& remark : apply_edits(work.gaussians, edits, format))
         work.lost.push_back(std::move(remark));
 
-    const size_t count = work.gaussians.size();
+    const SceneSize size = scene_size(work.gaussians);
+    const size_t count = size.splats;
     check_not_empty(arguments, read, count);
     make_folder(out.parent_path());
     constexpr size_t kShowFrom = 500'000;
     Progress progress("written", static_cast<int>(std::min<size_t>(count, 1u << 30)), "splats",
                       arguments.quiet || count < kShowFrom);
     work.save.spz_version = arguments.spz_version;
+    work.save.levels = arguments.levels;
     work.save.progress = [&](uint64_t done, uint64_t) { progress.update(static_cast<int>(done)); };
     const std::vector<std::string> quantised =
-        page ? write_page(out, work.gaussians, work.save, in_place ? arguments.run : std::nullopt)
-             : save_splats(out, work.gaussians, work.save);
+        page     ? write_page(out, work.gaussians, work.save, in_place ? arguments.run : std::nullopt)
+        : levels ? save_levels(out, std::move(work.gaussians), work.save)
+                 : save_splats(out, work.gaussians, work.save);
     std::vector<std::string> remarks = work.lost;
     remarks.insert(remarks.end(), quantised.begin(), quantised.end());
 
     if (!arguments.quiet) {
-        fmt::print("{}\n", described(out, page ? "page" : name_of(format), "", work.gaussians));
+        fmt::print("{}\n", described(out, page ? "page" : name_of(format), "", size));
         const std::vector<fs::path> values = values_of(out);
         if (!values.empty())
             fmt::print("{}{}: the values of this {}, {}\n", core::one_line(values[0].string()),
-                       values.size() > 1 ? fmt::format(" and {} other images", values.size() - 1) : "",
+                       values.size() > 1
+                           ? fmt::format(" and {} other {}", values.size() - 1, levels ? "files" : "images")
+                           : "",
                        name_of(format), core::bytes_text(bytes_of(values)));
         for (const std::string& remark : remarks) fmt::print("  {}\n", core::one_line(remark));
     }
-    Json json = {
-        {"inputs", work.inputs}, {"output", output_json(arguments, work.gaussians)}, {"remarks", remarks}};
+    Json json = {{"inputs", work.inputs}, {"output", output_json(arguments, size)}, {"remarks", remarks}};
     if (!work.removed.empty()) json["removed"] = work.removed;
     if (arguments.check) json["check"] = check(arguments, work);
     if (!arguments.json.empty()) write_json(arguments.json, json);
@@ -290,7 +322,8 @@ Action add_convert(CLI::App& app) {
     const auto arguments = std::make_shared<ConvertArguments>();
     app.add_option("FILES", arguments->files,
                    "One or more inputs, which are joined, then the output unless -o names it. Formats: .ply "
-                   ".compressed.ply .splat .spz .sog meta.json .glb .gltf .usda .usdz, inputs also .ksplat, "
+                   ".compressed.ply .splat .spz .sog meta.json lod-meta.json .glb .gltf .usda .usdz, inputs "
+                   "also .ksplat, "
                    "and an output "
                    "also .html, a page that shows the scene in a browser. An input may be the folder of a "
                    "training run. IN:STEP, as in b.ply:move=1,0,0, moves one input alone; more steps follow "
@@ -307,6 +340,16 @@ Action add_convert(CLI::App& app) {
         ->transform(one_of({"3", "4"}))
         ->type_name("3|4")
         ->capture_default_str();
+    app.add_option(
+           "--levels", arguments->levels,
+           "Levels of a lod-meta.json, each with half of the splats of the one before [until one has at "
+           "most a million]")
+        ->transform(in_range(1, 32))
+        ->type_name("N");
+    app.add_option("--level", arguments->level,
+                   "Level of the inputs to read, each a lod-meta.json. 0: the finest")
+        ->transform(in_range(0, 31))
+        ->type_name("N");
     app.add_flag("--bake-sky", arguments->bake_sky,
                  "Add opaque splats far away in place of the sky of the run: for viewers that have none");
     app.add_flag("--allow-empty", arguments->allow_empty, "Write the output even if no splat is left");

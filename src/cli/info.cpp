@@ -167,7 +167,8 @@ void info_splats(const fs::path& path, const live::Run* run, const InfoArguments
 
 /// Whether the path names an unpacked SOG: by its name, else by its content.
 bool is_sog(const fs::path& path) {
-    return core::lower(path.filename().string()) == "meta.json" || io::is_sog_meta(path);
+    const std::string name = core::lower(path.filename().string());
+    return name == "meta.json" || name == "lod-meta.json" || io::is_sog_meta(path);
 }
 
 /// Whether a zip archive has the list of a SOG.
@@ -389,7 +390,8 @@ int run(const InfoArguments& arguments) {
 Action add_info(CLI::App& app) {
     const auto arguments = std::make_shared<InfoArguments>();
     app.add_option("PATH", arguments->path,
-                   "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json .glb .gltf .usda "
+                   "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json lod-meta.json .glb "
+                   ".gltf .usda "
                    ".usdz), COLMAP folder, "
                    "transforms.json, cameras of another program, zip archive of one of these, "
                    "glTF file of meshes, image, or folder of a training run")

@@ -269,9 +269,9 @@ TEST(Convert, SaysWhatToWriteInstead) {
     make_splats(folder / "s.ply");
     for (const char* name : {"o.obj", "o.ksplat"}) {
         const Outcome outcome = run_ewa({"convert", folder / "s.ply", folder / name});
-        expect_failure(
-            outcome, 2,
-            ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, .glb, .gltf, .usda, .usdz\n");
+        expect_failure(outcome, 2,
+                       ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, lod-meta.json, .glb, "
+                       ".gltf, .usda, .usdz\n");
     }
     EXPECT_EQ(files_below(folder / ""), Names{"s.ply"});
 }

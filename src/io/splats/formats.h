@@ -102,11 +102,28 @@ std::string pack_sog(const std::filesystem::path& path, const Gaussians& gaussia
 std::vector<std::string> write_sog_meta(const std::filesystem::path& path, const Gaussians& gaussians,
                                         const SaveOptions& options);
 
+/// The same with the splats in the order of the scene, not in Morton order.
+std::vector<std::string> write_sog_rows(const std::filesystem::path& path, const Gaussians& gaussians,
+                                        const SaveOptions& options);
+
 /// The images that an existing meta.json names. Empty if it cannot be read.
 std::vector<std::filesystem::path> sog_images(const std::filesystem::path& meta);
 
 /// What write_sog_meta does beside a meta.json. The usual names are means_l.webp and so on.
 ValueFiles sog_value_files(const std::filesystem::path& meta);
+
+/// Streamed SOG, a lod-meta.json. read_levels reads level 0. Splats come in the order of the chunks and their rows. Errors name the
+/// file and the property. The names in it must stay in its folder. The environment is skipped with a remark.
+SplatScene read_level(const std::filesystem::path& path, size_t level);
+SplatScene read_levels(const std::filesystem::path& path);
+
+/// Writes the chunks, one level after the other, then the lod-meta.json. Throws InputError for a scene without splats. The same
+/// scene gives the same bytes.
+std::vector<std::string> write_levels(const std::filesystem::path& path, Gaussians gaussians,
+                                      const SaveOptions& options);
+
+/// The files that an existing lod-meta.json names, with the images that those name. Empty if it cannot be read.
+std::vector<std::filesystem::path> level_files(const std::filesystem::path& path);
 
 /// OpenUSD's ParticleField3DGaussianSplat, as text and as a package of it. Reads every prim of that type that is defined in
 /// the layer, in the order of the text, into one scene, placed by the transforms of its parents. Refuses the binary format.

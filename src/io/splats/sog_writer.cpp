@@ -2,6 +2,7 @@
 // Writes SOG, whose layout sog.h describes, in version 2.
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <numeric>
 
 #include "core/atomic_file.h"
 #include "core/text.h"
@@ -36,13 +37,21 @@ Pixel packed_rotation(const float* stored) {
     return pixel;
 }
 
+std::vector<uint32_t> order_of_scene(const Gaussians& gaussians) {
+    std::vector<uint32_t> order(gaussians.size());
+    std::iota(order.begin(), order.end(), 0u);
+    return order;
+}
+
 /// The files of a SOG: their names and contents. meta.json comes last.
 class SogPacker {
   public:
     using Files = std::vector<std::pair<std::string, std::string>>;
 
-    SogPacker(const Gaussians& gaussians, const SaveOptions& options)
-        : g_(gaussians), options_(options), order_(morton_order(gaussians)) {
+    SogPacker(const Gaussians& gaussians, const SaveOptions& options, bool morton)
+        : g_(gaussians),
+          options_(options),
+          order_(morton ? morton_order(gaussians) : order_of_scene(gaussians)) {
         const auto side = uint64_t(std::ceil(std::sqrt(double(g_.size())) / 4)) * 4;
         width_ = std::max<uint64_t>(4, side);
         height_ = std::max<uint64_t>(4, (g_.size() + 4 * width_ - 1) / (4 * width_) * 4);
@@ -188,8 +197,8 @@ std::vector<std::string> remarks_of(const Gaussians& gaussians, uint64_t palette
 }
 
 SogPacker packer_for(const std::filesystem::path& path, const Gaussians& gaussians,
-                     const SaveOptions& options) {
-    SogPacker packer(gaussians, options);
+                     const SaveOptions& options, bool morton = true) {
+    SogPacker packer(gaussians, options, morton);
     if (!packer.fits())
         throw InputError(path.string() +
                          ": SOG holds about 268 million splats, as many as a WebP image has pixels");
@@ -223,9 +232,11 @@ ValueFiles sog_value_files(const std::filesystem::path& meta) {
     return value_files(meta, usual, sog_images);
 }
 
-std::vector<std::string> write_sog_meta(const std::filesystem::path& path, const Gaussians& gaussians,
-                                        const SaveOptions& options) {
-    SogPacker packer = packer_for(path, gaussians, options);
+namespace {
+
+std::vector<std::string> write_meta(const std::filesystem::path& path, const Gaussians& gaussians,
+                                    const SaveOptions& options, bool morton) {
+    SogPacker packer = packer_for(path, gaussians, options, morton);
     const ValueFiles beside = sog_value_files(path);
     // All files are on disk before any is renamed, and meta.json comes last. Its rename replaces the SOG at once.
     std::vector<std::unique_ptr<core::AtomicFile>> files;
@@ -237,6 +248,18 @@ std::vector<std::string> write_sog_meta(const std::filesystem::path& path, const
     for (const auto& file : files) file->commit();
     remove_values(beside);
     return remarks_of(gaussians, packer.palette());
+}
+
+}  // namespace
+
+std::vector<std::string> write_sog_meta(const std::filesystem::path& path, const Gaussians& gaussians,
+                                        const SaveOptions& options) {
+    return write_meta(path, gaussians, options, true);
+}
+
+std::vector<std::string> write_sog_rows(const std::filesystem::path& path, const Gaussians& gaussians,
+                                        const SaveOptions& options) {
+    return write_meta(path, gaussians, options, false);
 }
 
 }  // namespace ewa::io

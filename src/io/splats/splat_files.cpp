@@ -19,6 +19,11 @@ namespace ewa {
 
 namespace {
 
+std::vector<std::string> write_levels_of_copy(const std::filesystem::path& path, const Gaussians& gaussians,
+                                              const SaveOptions& options) {
+    return io::write_levels(path, gaussians, options);
+}
+
 struct Kind {
     SplatFormat format;
     std::string_view extension, name;
@@ -42,6 +47,7 @@ constexpr Kind kKinds[] = {
     {SplatFormat::gltf, ".gltf", "glTF", {"{"}, io::read_gltf_splats, io::write_gltf_splats},
     {SplatFormat::sog, ".sog", "SOG", {"PK\x03\x04"}, io::read_sog, io::write_sog},
     {SplatFormat::sog_meta, "meta.json", "SOG", {}, io::read_sog_meta, io::write_sog_meta},
+    {SplatFormat::sog_levels, "lod-meta.json", "streamed SOG", {}, io::read_levels, write_levels_of_copy},
     {SplatFormat::usda, ".usda", "USD", {"#usd", "PXR-"}, io::read_usda, io::write_usda},
     {SplatFormat::usdz, ".usdz", "USDZ", {}, io::read_usdz, io::write_usdz},
     {SplatFormat::ksplat, ".ksplat", "ksplat", {std::string_view("\0\1\0\0", 4)}, io::read_ksplat, nullptr}};
@@ -59,7 +65,7 @@ const Kind* kind_of_name(const std::filesystem::path& path) {
 }
 
 constexpr const char* kWritten =
-    ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, .glb, .gltf, .usda, .usdz";
+    ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, lod-meta.json, .glb, .gltf, .usda, .usdz";
 
 std::string all_kinds() {
     return std::string(kWritten) + ", .ksplat";
@@ -172,7 +178,8 @@ SplatFormat format_of_file(const std::filesystem::path& path) {
     constexpr uint64_t kHeadBytes = 4;
     const size_t size = size_t(std::min(reader.size(), kHeadBytes));
     const std::string head(reinterpret_cast<const char*>(reader.take(size, "the header")), size);
-    // glTF and the meta.json of a SOG are both JSON.
+    // glTF, the meta.json of a SOG and a lod-meta.json are all JSON.
+    if (kind && kind->format == SplatFormat::sog_levels) return SplatFormat::sog_levels;
     const bool sog_meta =
         head.starts_with('{') && ((kind && kind->format == SplatFormat::sog_meta) || io::is_sog_meta(path));
     if (sog_meta)
@@ -188,6 +195,12 @@ SplatScene read_splats(const std::filesystem::path& path) {
     return kind_of(format_of_file(path)).read(path);
 }
 
+SplatScene read_splat_level(const std::filesystem::path& path, size_t level) {
+    if (format_of_file(path) != SplatFormat::sog_levels)
+        throw InputError(core::one_line(path.string()) + ": has no levels; a lod-meta.json has");
+    return io::read_level(path, level);
+}
+
 Gaussians load_splats(const std::filesystem::path& path) {
     SplatScene scene = read_splats(path);
     warn_of(path, scene.remarks);
@@ -197,6 +210,7 @@ Gaussians load_splats(const std::filesystem::path& path) {
 std::vector<std::string> save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                      const SaveOptions& options) {
     const SplatFormat format = format_to_write(path);
+    if (format == SplatFormat::sog_levels) return save_levels(path, gaussians, options);
     std::vector<std::string> remarks, more;
     const bool ply = format == SplatFormat::ply;
     if (ply || format == SplatFormat::compressed_ply) check_comments(path, options.comments);
@@ -227,6 +241,26 @@ std::vector<std::string> save_splats(const std::filesystem::path& path, const Ga
         remarks.push_back("the mark that the scene was trained anti-aliased is dropped");
     if (!options.comments.empty() && !ply && format != SplatFormat::compressed_ply)
         remarks.push_back("comments are dropped");
+    return remarks;
+}
+
+std::vector<std::string> save_levels(const std::filesystem::path& path, Gaussians gaussians,
+                                     const SaveOptions& options) {
+    std::vector<std::string> remarks;
+    if (gaussians.origin != glm::dvec3(0)) {
+        remarks.push_back(rounding_remark(gaussians.origin));
+        gaussians = in_float_positions(std::move(gaussians));
+    }
+    if (gaussians.density) {
+        fit_opacities(gaussians, false);
+        remarks.emplace_back("opacities of --kernel density are fitted to 3DGS's kernel");
+    }
+    bool whole = true;
+    for (size_t i = 0; i < gaussians.size() && whole; ++i) whole = drawable(gaussians, i);
+    if (!whole) gaussians = drawable_only(gaussians, remarks);
+    const std::vector<std::string> more = io::write_levels(path, std::move(gaussians), options);
+    remarks.insert(remarks.end(), more.begin(), more.end());
+    if (!options.comments.empty()) remarks.emplace_back("comments are dropped");
     return remarks;
 }
 

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Streamed SOG (PlayCanvas): a lod-meta.json beside folders with unpacked SOGs, the chunks. Level 0 is the scene, and each further
+// level has fewer splats.
+//   version    1; older files lack it
+//   lodLevels  how many levels there are
+//   counts     the splats of each level; count is their sum
+//   filenames  the meta.json of each chunk
+//   tree       inner nodes have `bound` and `children`, leaves `bound` and `lods`: by level, the rows offset to offset + count
+//              of the chunk with the index `file`
+//   environment  the meta.json of a SOG that is shown at all levels
+// A bound is the box of the leaf's ellipsoids at one standard deviation, over all levels. The frame is that of an INRIA PLY.
+#pragma once
+#include <cstddef>
+
+namespace ewa::io {
+
+inline constexpr const char* kLevelsName = "lod-meta.json";
+inline constexpr size_t kMostLevels = 32;
+
+}  // namespace ewa::io

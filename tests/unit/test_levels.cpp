@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+// Streamed SOG: what is written is read back, level by level, and damaged files are errors of one line.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "core/text.h"
+#include "ewa/error.h"
+#include "ewa/splat_files.h"
+#include "support/splat_scenes.h"
+#include "support/temp_folder.h"
+
+namespace {
+
+using namespace ewa;
+using nlohmann::json;
+using test::TempFolder;
+
+/// Splats in a box of 80 units: a tree of several leaves.
+Gaussians wide_scene(size_t count) {
+    Gaussians g = test::storable_splats(21, count, 0);
+    for (float& v : g.means) v *= 8;
+    for (float& v : g.log_scales) v = std::fmin(v, -2.f);
+    return g;
+}
+
+json read_json(const std::filesystem::path& path) {
+    return json::parse(std::ifstream(path));
+}
+
+/// Calls visit(leaf) for each leaf of a node.
+template <class Visit>
+void visit_leaves(const json& node, const Visit& visit) {
+    if (node.contains("lods")) return visit(node);
+    for (const json& child : node["children"]) {
+        for (size_t k = 0; k < 3; ++k) {
+            EXPECT_LE(node["bound"]["min"][k], child["bound"]["min"][k]);
+            EXPECT_GE(node["bound"]["max"][k], child["bound"]["max"][k]);
+        }
+        visit_leaves(child, visit);
+    }
+}
+
+TEST(Levels, RoundTrip) {
+    const TempFolder folder;
+    const Gaussians scene = wide_scene(20'000);
+    SaveOptions options;
+    options.levels = 3;
+    options.antialiased = true;
+    save_splats(folder / "lod-meta.json", scene, options);
+    const json meta = read_json(folder / "lod-meta.json");
+    EXPECT_EQ(meta["version"], 1);
+    EXPECT_EQ(meta["counts"], json({20'000, 10'000, 5'000}));
+    EXPECT_EQ(meta["count"], 35'000);
+    EXPECT_EQ(meta["lodLevels"], 3);
+    EXPECT_EQ(meta["filenames"], json({"0_0/meta.json", "1_0/meta.json", "2_0/meta.json"}));
+    EXPECT_EQ(read_json(folder / "1_0/meta.json")["count"], 10'000);
+
+    for (const size_t level : {0u, 1u, 2u}) {
+        const SplatScene back = read_splat_level(folder / "lod-meta.json", level);
+        EXPECT_EQ(back.format, SplatFormat::sog_levels);
+        EXPECT_TRUE(back.antialiased);
+        EXPECT_EQ(back.gaussians.size(), meta["counts"][level]);
+        size_t leaves = 0, next = 0;
+        visit_leaves(meta["tree"], [&](const json& leaf) {
+            const json& rows = leaf["lods"][std::to_string(level)];
+            ++leaves;
+            EXPECT_EQ(rows["file"], level);
+            EXPECT_EQ(rows["offset"], next);
+            for (size_t i = 0; i < rows["count"].get<size_t>(); ++i, ++next)
+                for (size_t k = 0; k < 3; ++k) {
+                    const double place = back.gaussians.means[3 * next + k];
+                    ASSERT_GE(place, leaf["bound"]["min"][k].get<double>() - 0.01);
+                    ASSERT_LE(place, leaf["bound"]["max"][k].get<double>() + 0.01);
+                }
+        });
+        EXPECT_EQ(next, back.gaussians.size());
+        EXPECT_EQ(leaves, 4u);
+    }
+    // Level 0 is the scene, in another order.
+    const Gaussians finest = load_splats(folder / "lod-meta.json");
+    double sum = 0, expected = 0;
+    for (size_t i = 0; i < scene.means.size(); ++i) {
+        sum += std::abs(finest.means[i]);
+        expected += std::abs(scene.means[i]);
+    }
+    EXPECT_NEAR(sum, expected, 1e-4 * expected);
+    EXPECT_NE(read_splats(folder / "lod-meta.json").variant.find("level 0 of 3 with 20000, 10000, 5000"),
+              std::string::npos);
+}
+
+TEST(Levels, TheSameBytesTwice) {
+    const TempFolder folder;
+    SaveOptions options;
+    options.levels = 2;
+    for (const char* name : {"a", "b"}) {
+        std::filesystem::create_directory(folder / name);
+        save_levels(folder / name / "lod-meta.json", wide_scene(3000), options);
+    }
+    for (const char* file : {"lod-meta.json", "1_0/meta.json", "1_0/means_l.webp", "0_0/quats.webp"})
+        EXPECT_EQ(test::file_bytes(folder / "a" / file), test::file_bytes(folder / "b" / file)) << file;
+}
+
+TEST(Levels, SmallScenesHaveOneLevel) {
+    const TempFolder folder;
+    save_splats(folder / "lod-meta.json", wide_scene(100));
+    EXPECT_EQ(read_json(folder / "lod-meta.json")["counts"], json({100}));
+    Gaussians none;
+    test::expect_error<InputError>([&] { save_splats(folder / "lod-meta.json", none); }, {"without splats"});
+}
+
+TEST(Levels, DamagedFilesAreErrorsOfOneLine) {
+    const TempFolder folder;
+    SaveOptions options;
+    options.levels = 2;
+    const auto path = folder / "lod-meta.json";
+    save_splats(path, wide_scene(300), options);
+    const json whole = read_json(path);
+    const auto refuse = [&](const char* text, const auto& damage) {
+        json meta = whole;
+        damage(meta);
+        std::ofstream(path) << meta;
+        try {
+            read_splats(path);
+            FAIL() << text;
+        } catch (const InputError& error) {
+            const std::string what = error.what();
+            EXPECT_NE(what.find(text), std::string::npos) << what;
+            EXPECT_EQ(what, core::one_line(what));
+        }
+    };
+    const auto lods = [](json& m) -> json& { return m["tree"]["lods"]["0"]; };
+    refuse("unknown", [](json& m) { m["version"] = 2; });
+    refuse("no \"lodLevels\"", [](json& m) { m.erase("lodLevels"); });
+    refuse("\"lodLevels\" is 0", [](json& m) { m["lodLevels"] = 0; });
+    refuse("whole number of 0 to 32", [](json& m) { m["lodLevels"] = 1000; });
+    refuse("no \"filenames\"", [](json& m) { m.erase("filenames"); });
+    refuse("no \"tree\"", [](json& m) { m.erase("tree"); });
+    refuse("not a list", [](json& m) { m["filenames"] = "0_0/meta.json"; });
+    refuse("not in its folder", [](json& m) { m["filenames"][0] = "../0_0/meta.json"; });
+    refuse("not in its folder", [](json& m) { m["filenames"][0] = "/etc/passwd"; });
+    refuse("not in its folder", [](json& m) { m["filenames"][0] = 5; });
+    refuse("twice", [](json& m) { m["filenames"][1] = "./0_0/meta.json"; });
+    refuse("0_7", [](json& m) { m["filenames"][0] = "0_7/meta.json"; });
+    refuse("rows of file 9", [&](json& m) { lods(m)["file"] = 9; });
+    refuse("has 300", [&](json& m) { lods(m)["offset"] = 1; });
+    refuse("has 300", [&](json& m) { lods(m)["count"] = 301; });
+    refuse("\"count\" is not a whole", [&](json& m) { lods(m)["count"] = -1; });
+    refuse("\"offset\" is not a whole", [&](json& m) { lods(m)["offset"] = 1e300; });
+    refuse("no \"file\"", [&](json& m) { lods(m).erase("file"); });
+    refuse("not an object", [](json& m) { m["tree"] = 3; });
+    refuse("not an object", [](json& m) { m["tree"]["children"] = json({1}); });
+    refuse("not a list", [](json& m) { m["tree"]["children"] = 1; });
+    refuse("the level \"5\"", [&](json& m) { m["tree"]["lods"]["5"] = lods(m); });
+    refuse("the same rows", [&](json& m) { m["tree"]["children"] = json({m["tree"]}); });
+    std::ofstream(path) << "[]";
+    test::expect_error<InputError>([&] { read_splats(path); }, {"not an object"});
+    std::ofstream(path) << whole;
+    test::expect_error<InputError>([&] { read_splat_level(path, 2); }, {"the last is 1"});
+    save_splats(folder / "s.ply", wide_scene(3));
+    test::expect_error<InputError>([&] { read_splat_level(folder / "s.ply", 1); }, {"has no levels"});
+}
+
+}  // namespace
