@@ -23,7 +23,8 @@ TEST(ConvertLevels, WritesReadsAndTells) {
     expect_success(told);
     EXPECT_NE(told.out.find("level 0 of 3 with 1000, 500, 250 splats"), std::string::npos) << told.out;
     for (const auto& [level, splats] : {std::pair{"0", 1000u}, {"1", 500u}, {"2", 250u}}) {
-        expect_success(run_ewa({"convert", folder / "lod/lod-meta.json", folder / "o.ply", "--level", level}));
+        expect_success(
+            run_ewa({"convert", folder / "lod/lod-meta.json", folder / "o.ply", "--level", level}));
         EXPECT_EQ(ewa::load_splats(folder / "o.ply").size(), splats);
     }
 }

@@ -99,8 +99,8 @@ class SplatTree {
                 if (place(i, axis) > float(box.low[axis])) plane = std::min(plane, place(i, axis));
         }
         // Sorted parts keep the result independent of how nth_element leaves them.
-        const auto second = std::partition(splats.begin(), splats.end(),
-                                           [&](uint32_t i) { return place(i, axis) < plane; });
+        const auto second =
+            std::partition(splats.begin(), splats.end(), [&](uint32_t i) { return place(i, axis) < plane; });
         const size_t below = size_t(second - splats.begin());
         const size_t left = build(splats.subspan(0, below)), right = build(splats.subspan(below));
         nodes_[index].axis = axis;
@@ -133,7 +133,8 @@ Gaussians rows_of(const Gaussians& g, std::span<const uint32_t> rows) {
 /// The box of the splat's ellipsoid at one standard deviation.
 void add_ellipsoid(Box& box, const Gaussians& g, size_t i) {
     const glm::dmat3 c = scene::covariance_of(g, i);
-    const glm::dvec3 mean = g.world_mean(i), reach(std::sqrt(c[0][0]), std::sqrt(c[1][1]), std::sqrt(c[2][2]));
+    const glm::dvec3 mean = g.world_mean(i),
+                     reach(std::sqrt(c[0][0]), std::sqrt(c[1][1]), std::sqrt(c[2][2]));
     box.add(mean - reach, mean + reach);
 }
 
