@@ -4,6 +4,7 @@
 #include <array>
 #include <optional>
 #include <regex>
+#include <set>
 
 #include "capture/comparing.h"
 #include "capture/panoramas.h"
@@ -15,14 +16,16 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/image.h"
+#include "io/datasets/image_records.h"
 
 namespace ewa::capture {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kLeastBlock = 4;      // photos
-constexpr int kMostCompared = 200;  // photos, all of which are compared where looks have not placed all
+constexpr int kBlock = 1225;  // pairs that COLMAP verifies before it says so
+constexpr int kMostCompared =
+    200;  // photos, the rest of which are compared with all where looks have not placed them
 constexpr int kMostPanoramas = 50;  // 360° photos, all pairs of which are compared
 constexpr int kNext = 2;            // photos that follow, which are compared whatever they look like
 constexpr const char* kMostFeatures = "3000";  // of a view; a 360° photo has six
@@ -190,103 +193,59 @@ void extract_features(const Colmap& colmap, const Photos& photos, const Panorama
     mark(work / "features.done");
 }
 
-/// The pairs of photos that COLMAP has compared after some of its steps. A step compares a block of photos with a block;
-/// the blocks have `block` photos, the last one maybe fewer. Pairs that another step has are not among them.
-std::vector<int> pairs_after_steps(int count, int block) {
-    const int blocks = (count + block - 1) / block;
-    std::vector<int> pairs{0};
-    for (int i = 0; i < blocks; ++i)
-        for (int j = 0; j < blocks; ++j) {
-            int now = pairs.back();
-            for (int a = i * block; a < std::min(count, (i + 1) * block); ++a)
-                for (int b = j * block; b < std::min(count, (j + 1) * block); ++b)
-                    now += (a > b && a % block <= b % block) || (a < b && a % block < b % block);
-            pairs.push_back(now);
-        }
-    return pairs;
+/// A list of COLMAP separates names by spaces.
+bool has_white_space(const fs::path& name) {
+    return name.string().find_first_of(" \t\r\n\v\f") != std::string::npos;
 }
 
-/// COLMAP verifies the matches of these pairs of images. Their names have no white space.
-void verify_listed(const Colmap& colmap, const PanoramaViews& views, const std::vector<ImagePair>& pairs,
-                   const fs::path& work) {
-    std::string text;
-    for (const auto& [a, b] : pairs)
-        text += views.photos.names[size_t(a)].string() + " " + views.photos.names[size_t(b)].string() + "\n";
-    core::write_text_file(work / "pairs.txt", text);
-    colmap.run({"colmap", "matches_importer", "--database_path", argument(work / "database.db"),
-                "--match_list_path", argument(work / "pairs.txt"), "--match_type", "pairs",
-                colmap.gpu_of_matching("matches_importer"), "0"},
-               {CapturePhase::matches, "verified", "pairs", 0, int(pairs.size()), {}},
-               [](const std::string&) { return std::nullopt; });
-}
-
-/// The views of two photos are all compared. Few photos are compared with each other, and many in sequence.
-void match_views(const Colmap& colmap, const Photos& panoramas, const PanoramaViews& views,
-                 const fs::path& work, const ProgressFunction& progress) {
-    const int count = int(panoramas.names.size());
-    Pairing pairing = panoramas.pairing;
-    if (pairing == Pairing::by_look) pairing = count > kMostPanoramas ? Pairing::in_sequence : Pairing::all;
-    const std::vector<ImagePair> pairs = pairs_of_views(pairs_of(count, pairing));
-    compare_photos(work / "database.db", views.photos.names, {.pairs = pairs}, "views", progress);
-    verify_listed(colmap, views, pairs, work);
-}
-
-/// COLMAP verifies the matches of photos, and compares those whose matches are not known.
-void verify(const Colmap& colmap, int count, Pairing pairing, const fs::path& work) {
-    const std::string command = pairing == Pairing::in_sequence ? "sequential_matcher" : "exhaustive_matcher";
+/// COLMAP verifies the matches of these pairs. listed: no name has white space; otherwise all others are passed over.
+void verify(const Colmap& colmap, const Photos& photos, const std::vector<ImagePair>& pairs, bool listed,
+            const fs::path& work) {
+    const std::string command = listed ? "matches_importer" : "exhaustive_matcher";
     std::vector<std::string> words{
         "colmap", command, "--database_path", argument(work / "database.db"), colmap.gpu_of_matching(command),
         "0"};
-    if (pairing == Pairing::in_sequence) {
-        for (const char* word :
-             {"--SequentialMatching.overlap", "10", "--SequentialMatching.quadratic_overlap", "1"})
-            words.emplace_back(word);
-        static const std::regex pattern(R"(\[(\d+)/(\d+)\])");
-        colmap.run(std::move(words), {CapturePhase::matches, "verified", "photos", 0, count, {}},
-                   [](const std::string& line) -> std::optional<int> {
-                       const auto numbers = numbers_in(line, pattern);
-                       return numbers ? std::optional(numbers->first) : std::nullopt;
-                   });
-        return;
+    if (listed) {
+        std::string text;
+        for (const auto& [a, b] : pairs)
+            text += photos.names[size_t(a)].string() + " " + photos.names[size_t(b)].string() + "\n";
+        core::write_text_file(work / "pairs.txt", text);
+        words.insert(words.end(),
+                     {"--match_list_path", argument(work / "pairs.txt"), "--match_type", "pairs"});
     }
-    // Small blocks show the progress. COLMAP takes each block with each, and keeps five in memory.
-    const int block = std::max(kLeastBlock, (count + 9) / 10), blocks = (count + block - 1) / block;
-    words.insert(words.end(), {"--ExhaustiveMatching.block_size", std::to_string(block)});
-    const std::vector<int> pairs = pairs_after_steps(count, block);
-    static const std::regex pattern(R"(\[(\d+)/\d+, (\d+)/\d+\])");
-    colmap.run(std::move(words), {CapturePhase::matches, "verified", "pairs", 0, pairs.back(), {}},
-               [&pairs, blocks](const std::string& line) -> std::optional<int> {
+    static const std::regex pattern(R"(Matching block \[(\d+)/(\d+)\])");
+    colmap.run(std::move(words), {CapturePhase::matches, "verified", "pairs", 0, int(pairs.size()), {}},
+               [](const std::string& line) -> std::optional<int> {
                    const auto numbers = numbers_in(line, pattern);
-                   if (!numbers) return {};
-                   // Newer releases print the line at the beginning of a step.
-                   const bool over = line.find("] in ") != std::string::npos;
-                   const int steps = (numbers->first - 1) * blocks + numbers->second - (over ? 0 : 1);
-                   return pairs[size_t(std::clamp(steps, 0, int(pairs.size()) - 1))];
+                   return numbers ? std::optional(numbers->first * kBlock) : std::nullopt;
                });
 }
 
-void match_photos(const Colmap& colmap, const Photos& photos, Pairing pairing, const fs::path& work,
-                  const ProgressFunction& progress) {
+/// What is compared at first. The views of two 360° photos are all compared: few photos with each other, and many in sequence.
+Comparison first_comparison(const Photos& photos, bool panoramas) {
     const int count = int(photos.names.size());
-    Comparison comparison{.pairs = pairs_of(count, pairing), .by_look = pairing == Pairing::by_look};
-    if (comparison.by_look) {
-        comparison.pass_over_others = true;
+    if (panoramas) {
+        Pairing pairing = photos.pairing;
+        if (pairing == Pairing::by_look)
+            pairing = count > kMostPanoramas ? Pairing::in_sequence : Pairing::all;
+        return {.pairs = pairs_of_views(pairs_of(count, pairing))};
+    }
+    Comparison comparison{.pairs = pairs_of(count, photos.pairing),
+                          .by_look = photos.pairing == Pairing::by_look};
+    if (comparison.by_look)
         for (int i = 0; i < count; ++i)
             for (int k = i + 1; k <= std::min(i + kNext, count - 1); ++k)
                 comparison.always.emplace_back(i, k);
-    }
-    compare_photos(work / "database.db", photos.names, comparison, "photos", progress);
-    verify(colmap, count, pairing, work);
+    return comparison;
 }
 
-/// done: the file that says so. views: those that the photos are; null: they are none.
-void match(const Colmap& colmap, const Photos& photos, const PanoramaViews* views, Pairing pairing,
-           const fs::path& work, const fs::path& done, const ProgressFunction& progress) {
+/// done: the file that says so.
+void match(const Colmap& colmap, const Photos& photos, Comparison comparison, const fs::path& work,
+           const fs::path& done, const ProgressFunction& progress) {
     if (core::is_file(done)) return;
-    if (views)
-        match_views(colmap, photos, *views, work, progress);
-    else
-        match_photos(colmap, photos, pairing, work, progress);
+    comparison.pass_over_others = std::ranges::any_of(photos.names, has_white_space);
+    const auto compared = compare_photos(work / "database.db", photos.names, comparison, progress);
+    verify(colmap, photos, compared.value_or(comparison.pairs), !comparison.pass_over_others, work);
     mark(done);
 }
 
@@ -346,6 +305,15 @@ std::vector<Model> map_if_possible(const Colmap& colmap, const Photos& photos, c
 } catch (const RunError&) {
     if (!core::is_folder(work / "models") || !models_in(work / "models").empty()) throw;
     return {};
+}
+
+/// The images in the largest model.
+std::set<std::string> names_in(const std::vector<Model>& models) {
+    std::set<std::string> names;
+    if (!models.empty())
+        for (const io::ImageRecord& image : io::read_colmap(models.front().folder, {}).images)
+            names.insert(image.name);
+    return names;
 }
 
 std::string sizes_text(const std::vector<Model>& models) {
@@ -436,18 +404,25 @@ std::vector<std::string> place_photos(const Photos& given, const fs::path& work,
     const PanoramaViews* views = cut ? &*cut : nullptr;
     const Photos& photos = views ? views->photos : given;
     extract_features(colmap, photos, views, work);
-    match(colmap, given, views, given.pairing, work, work / "matches.done", progress);
-    std::vector<Model> models = map_if_possible(colmap, photos, views, work);
-    const size_t placed = models.empty() ? 0 : size_t(models.front().images);
-    if (!views && given.pairing == Pairing::by_look && placed < given.names.size() &&
-        int(given.names.size()) <= kMostCompared) {
+    match(colmap, photos, first_comparison(given, views != nullptr), work, work / "matches.done", progress);
+    // Models from before a search was interrupted in the other comparisons.
+    const fs::path before = work / "models_by_look";
+    const bool resumed = core::is_folder(before);
+    std::vector<Model> models = resumed ? models_in(before) : map_if_possible(colmap, photos, views, work);
+    const std::set<std::string> placed = names_in(models);
+    if (!views && given.pairing == Pairing::by_look && int(given.names.size()) <= kMostCompared) {
         // The comparisons that seemed needless may place the others.
-        const fs::path before = work / "models_by_look";
-        fs::remove_all(before);
-        fs::rename(work / "models", before);
-        match(colmap, given, views, Pairing::all, work, work / "all_matches.done", progress);
-        models = map_if_possible(colmap, photos, views, work);
-        if (models.empty() || models.front().images < placed) models = models_in(before);
+        Comparison others;
+        for (const ImagePair& pair : pairs_of(int(given.names.size()), Pairing::all))
+            if (!placed.contains(given.names[size_t(pair.first)].string()) ||
+                !placed.contains(given.names[size_t(pair.second)].string()))
+                others.pairs.push_back(pair);
+        if (!others.pairs.empty()) {
+            if (!resumed) fs::rename(work / "models", before);
+            match(colmap, photos, others, work, work / "other_matches.done", progress);
+            models = map_if_possible(colmap, photos, views, work);
+            if (names_in(models).size() < placed.size()) models = models_in(before);
+        }
     }
     if (models.empty() || models.front().images < 2)
         throw InputError("COLMAP could not place the " + std::to_string(given.names.size()) +

@@ -22,9 +22,9 @@ using Places = std::vector<ImagePair>;
 
 /// How many prominent features the photos of each pair share.
 std::vector<int> shared_features(const FeatureDatabase& database, const std::vector<std::int64_t>& images,
-                                 const Places& pairs, const char* unit, const ProgressFunction& progress) {
+                                 const Places& pairs, const ProgressFunction& progress) {
     std::vector<Descriptors> prominent(images.size());
-    on_all_cores({CapturePhase::matches, "read", unit, 0, int(images.size()), {}}, progress,
+    on_all_cores({CapturePhase::matches, "read", "images", 0, int(images.size()), {}}, progress,
                  [&](size_t i) { prominent[i] = database.prominent(images[i], kProminent); });
     std::vector<int> shared(pairs.size());
     on_all_cores({CapturePhase::matches, "looked at", "pairs", 0, int(pairs.size()), {}}, progress,
@@ -51,7 +51,7 @@ std::vector<ImagePair> pairs_of(int photos, Pairing pairing) {
 
 std::optional<std::vector<ImagePair>> compare_photos(const std::filesystem::path& file,
                                                      const std::vector<std::filesystem::path>& names,
-                                                     const Comparison& comparison, const char* unit,
+                                                     const Comparison& comparison,
                                                      const ProgressFunction& progress) {
     FeatureDatabase database(file);
     if (!database.is_known()) return {};
@@ -63,7 +63,7 @@ std::optional<std::vector<ImagePair>> compare_photos(const std::filesystem::path
     }
     Places pairs = comparison.pairs;
     if (comparison.by_look) {
-        pairs = pairs_by_look(pairs, shared_features(database, images, pairs, unit, progress), kEach);
+        pairs = pairs_by_look(pairs, shared_features(database, images, pairs, progress), kEach);
         pairs.insert(pairs.end(), comparison.always.begin(), comparison.always.end());
         std::ranges::sort(pairs);
         pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
@@ -87,11 +87,14 @@ std::optional<std::vector<ImagePair>> compare_photos(const std::filesystem::path
         throw;
     }
     if (comparison.pass_over_others) {
-        const std::set<ImagePair> compared(pairs.begin(), pairs.end());
-        for (int a = 0; a < int(images.size()); ++a)
-            for (int b = a + 1; b < int(images.size()); ++b)
-                if (has_features({a, b}) && !compared.contains({a, b}))
-                    database.pass_over(images[size_t(a)], images[size_t(b)]);
+        std::set<std::pair<std::int64_t, std::int64_t>> compared;
+        for (const auto& [a, b] : pairs) compared.insert(std::minmax({images[size_t(a)], images[size_t(b)]}));
+        std::vector<std::int64_t> all;
+        for (const auto& [name, image] : numbers) all.push_back(image);
+        std::ranges::sort(all);
+        for (size_t a = 0; a < all.size(); ++a)
+            for (size_t b = a + 1; b < all.size(); ++b)
+                if (!compared.contains({all[a], all[b]})) database.pass_over(all[a], all[b]);
     }
     database.commit();
     return pairs;

@@ -27,7 +27,7 @@ struct Comparison {
 /// database whose tables it does not know, which stays as it is. Throws RunError, Stopped.
 std::optional<std::vector<ImagePair>> compare_photos(const std::filesystem::path& database,
                                                      const std::vector<std::filesystem::path>& names,
-                                                     const Comparison& comparison, const char* unit,
+                                                     const Comparison& comparison,
                                                      const ProgressFunction& progress);
 
 }  // namespace ewa::capture

@@ -36,7 +36,7 @@ double CaptureProgressLine::rest() const {
     const double after = after_ ? after_(photos_, search_seconds_) : 0;
     if (phase_ == CapturePhase::cameras) return after;
     const double placing = photos_ * seconds_to_place(search_seconds_) + after;
-    if (phase_ == CapturePhase::matches) return placing;
+    if (phase_ == CapturePhase::matches && (what_ == "matched" || what_ == "verified")) return placing;
     const bool automatic = matching_ == Matching::automatic;
     double each = (photos_ - 1) / 2.0;
     if (automatic && photos_ <= kMostByLook)
@@ -44,7 +44,9 @@ double CaptureProgressLine::rest() const {
     else if (automatic || matching_ == Matching::sequence)
         each = std::min(each, kInSequence);
     const double matching = photos_ * each * seconds_of_pair(search_seconds_) + placing;
-    return phase_ == CapturePhase::features ? matching : matching + photos_ * search_seconds_;
+    return phase_ == CapturePhase::photos || phase_ == CapturePhase::frames
+               ? matching + photos_ * search_seconds_
+               : matching;
 }
 
 void CaptureProgressLine::update(const CaptureProgress& now) {

@@ -52,7 +52,7 @@ if [ "$FAIL" = "$1" ]; then echo "the reason" >&2; exit 1; fi
 if [ "$HANG" = "$1" ]; then echo $$ > "$CALLS.hangs"; exec sleep 1000; fi
 case $1 in
 feature_extractor) if [ "$DATABASE" ]; then cp "$DATABASE" "$3"; else touch "$3"; fi; for i in 1 2 3 4; do echo "Processed file [$i/4]"; done;;
-exhaustive_matcher) echo "Matching block [1/1, 1/1] in 0.1s";;
+matches_importer) echo "Matching block [1/1] in 0.1s";;
 mapper) cp -r "$MODELS"/. "$output"; echo "Registering image #4 (4)";;
 esac
 )sh");
@@ -117,13 +117,13 @@ TEST_F(Cameras, OfPhotosBecomeADataset) {
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_NE(outcome.out.find("4 of 4 photos have cameras"), std::string::npos) << outcome.out;
     EXPECT_EQ(outcome.out.find("could not be placed"), std::string::npos) << outcome.out;
-    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nmapper\n");
+    EXPECT_EQ(calls(), "feature_extractor\nmatches_importer\nmapper\n");
     EXPECT_EQ(run_ewa({"info", folder_ / "dataset"}).status, 0);
     EXPECT_NE(read_file(folder_ / "dataset/colmap/log.txt").find("Processed file [4/4]"), std::string::npos);
 
     // A second run has nothing to do.
     EXPECT_EQ(cameras().status, 0);
-    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nmapper\n");
+    EXPECT_EQ(calls(), "feature_extractor\nmatches_importer\nmapper\n");
 }
 
 TEST_F(Cameras, OfTheLargestModelAreTaken) {
@@ -153,15 +153,29 @@ TEST_F(Cameras, ComeFromComparingWhatLooksAlike) {
     const Outcome outcome = cameras(features);
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_NE(outcome.out.find("matched 5/5 pairs"), std::string::npos) << outcome.out;
-    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nmapper\n");
+    EXPECT_EQ(calls(), "feature_extractor\nmatches_importer\nmapper\n");
     EXPECT_FALSE(first_and_last());
 
     fs::remove_all(folder_ / "dataset");
     fs::remove(folder_ / "calls");
     make_model("0", {"0.png", "1.png", "2.png"});
     ASSERT_EQ(cameras(features).status, 0);
-    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nmapper\nexhaustive_matcher\nmapper\n");
+    EXPECT_EQ(calls(), "feature_extractor\nmatches_importer\nmapper\nmatches_importer\nmapper\n");
     EXPECT_TRUE(first_and_last());
+
+    // A search that failed at the end continues there.
+    fs::remove_all(folder_ / "dataset/sparse");
+    fs::remove(folder_ / "calls");
+    ASSERT_EQ(cameras(features).status, 0);
+    EXPECT_EQ(calls(), "mapper\n");
+}
+
+/// COLMAP's lists end a name at a space.
+TEST_F(Cameras, OfNamesWithSpacesAreVerifiedWithoutAList) {
+    fs::rename(folder_ / "photos/1.png", folder_ / "photos/a b.png");
+    make_model("0", {"0.png", "2.png", "3.png", "a b.png"});
+    ASSERT_EQ(cameras().status, 0);
+    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nmapper\n");
 }
 
 TEST_F(Cameras, ThatCannotBeFoundAreExplained) {
@@ -174,19 +188,19 @@ TEST_F(Cameras, ThatCannotBeFoundAreExplained) {
 TEST_F(Cameras, AFailureNamesTheLogAndCanBeRepeated) {
     make_model("0", {"0.png", "1.png", "2.png", "3.png"});
     expect_failure(
-        cameras({.environment = {{"FAIL", "exhaustive_matcher"}}}), 1,
-        "colmap exhaustive_matcher failed; " + folder_ / "dataset/colmap/log.txt" + " has its reason");
+        cameras({.environment = {{"FAIL", "matches_importer"}}}), 1,
+        "colmap matches_importer failed; " + folder_ / "dataset/colmap/log.txt" + " has its reason");
     EXPECT_NE(read_file(folder_ / "dataset/colmap/log.txt").find("the reason"), std::string::npos);
     EXPECT_EQ(cameras().status, 0);
     // What was done is kept.
-    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nexhaustive_matcher\nmapper\n");
+    EXPECT_EQ(calls(), "feature_extractor\nmatches_importer\nmatches_importer\nmapper\n");
 }
 
 TEST_F(Cameras, CtrlCEndsColmapToo) {
     make_model("0", {"0.png", "1.png", "2.png", "3.png"});
     const Outcome outcome = cameras({.await_file = folder_ / "calls.hangs",
                                      .signal = SIGINT,
-                                     .environment = {{"HANG", "exhaustive_matcher"}}});
+                                     .environment = {{"HANG", "matches_importer"}}});
     EXPECT_EQ(outcome.status, 130) << outcome.err;
     EXPECT_NE(outcome.out.find("interrupted; to continue, repeat the command"), std::string::npos)
         << outcome.out;
@@ -225,7 +239,7 @@ TEST_F(Cameras, ThatWereFoundOutlastChangesOfThePhotos) {
     EXPECT_NE(trained.out.find("1 image is missing and skipped"), std::string::npos) << trained.out;
     fs::copy(folder_ / "photos/1.png", folder_ / "photos/0.png");
     told("1 photo has changed since the search for its camera, and its view is not used: 0.png\n");
-    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nmapper\n");
+    EXPECT_EQ(calls(), "feature_extractor\nmatches_importer\nmapper\n");
     EXPECT_EQ(run_ewa({"info", folder_ / "dataset"}).out.find("frames          4"), std::string::npos);
     EXPECT_NE(run_ewa({"info", folder_ / "dataset"}).out.find("frames          3"), std::string::npos);
 
@@ -384,7 +398,7 @@ TEST_F(Cameras, ColmapEndsWithAKilledEwa) {
     make_model("0", {"0.png", "1.png", "2.png", "3.png"});
     const Outcome outcome = cameras({.await_file = folder_ / "calls.hangs",
                                      .signal = SIGKILL,
-                                     .environment = {{"HANG", "exhaustive_matcher"}}});
+                                     .environment = {{"HANG", "matches_importer"}}});
     EXPECT_EQ(outcome.status, 128 + SIGKILL);
     const std::string process =
         "/proc/" + std::to_string(std::stoi(read_file(folder_ / "calls.hangs"))) + "/stat";
@@ -412,7 +426,7 @@ exit 1
     EXPECT_NE(alone.out.find("searched 3/4 photos, "), std::string::npos) << alone.out;
     EXPECT_EQ(alone.out.find(" h "), std::string::npos) << alone.out;
     const Outcome with_training = run({"train", folder_ / "photos", "-o", folder_ / "out", "--steps", "20M"});
-    expect_failure(with_training, 1, "colmap exhaustive_matcher failed");
+    expect_failure(with_training, 1, "colmap matches_importer failed");
     const size_t line = with_training.out.find("searched 3/4 photos, ");
     ASSERT_NE(line, std::string::npos) << with_training.out;
     const std::string text = with_training.out.substr(line, with_training.out.find('\n', line) - line);
@@ -506,7 +520,7 @@ esac
     EXPECT_NE(outcome.out.find("3 of 3 photos have cameras"), std::string::npos) << outcome.out;
     EXPECT_NE(read_file(folder_ / "calls.ffmpeg").find("select='eq(n,1)+eq(n,4)+eq(n,7)'"),
               std::string::npos);
-    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nmapper\n");
+    EXPECT_EQ(calls(), "feature_extractor\nmatches_importer\nmapper\n");
 
     EXPECT_NE(read_file(folder_ / "calls.ffmpeg").find("-format_whitelist"), std::string::npos);
 
@@ -545,7 +559,7 @@ TEST_F(Cameras, PhotosMayComeInAnArchive) {
     expect_success(run_ewa({"eval", folder_ / "run", "--split", "train"}));
     // Nothing is done twice, and a changed archive is noticed.
     expect_success(run({"cameras", folder_ / "holiday.zip", "-o", folder_ / "run/dataset"}));
-    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nmapper\n");
+    EXPECT_EQ(calls(), "feature_extractor\nmatches_importer\nmapper\n");
     zip_folder(folder_ / "photos", folder_ / "holiday.zip");
     expect_failure(run({"cameras", folder_ / "holiday.zip", "-o", folder_ / "run/dataset"}), 2,
                    "the archive has changed since " + folder_ / "run/dataset" + " was made of it");
@@ -609,7 +623,7 @@ TEST_F(Cameras, ResultsBesideThePhotosAreNoPhotos) {
     std::vector<std::string> again = train;
     again.emplace_back("--force");
     expect_success(run(again));
-    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nmapper\n");
+    EXPECT_EQ(calls(), "feature_extractor\nmatches_importer\nmapper\n");
 }
 
 /// A film of 20 real photos, where COLMAP, ffmpeg and the photos are on this machine.

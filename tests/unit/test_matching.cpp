@@ -142,7 +142,7 @@ class MatchingDatabase : public testing::Test {
                                        {.pairs = capture::pairs_of(5, capture::Pairing::all),
                                         .by_look = by_look,
                                         .pass_over_others = true},
-                                       "photos", [](const auto&) { return true; });
+                                       [](const auto&) { return true; });
     }
 
     test::TempFolder folder_;
@@ -201,9 +201,9 @@ TEST_F(MatchingDatabase, HoldsMatchesByTheLowerNumber) {
 
 TEST_F(MatchingDatabase, GoesOnAfterAStop) {
     const capture::Comparison all{.pairs = capture::pairs_of(5, capture::Pairing::all)};
-    EXPECT_THROW(capture::compare_photos(file_, names_, all, "photos",
-                                         [](const auto& now) { return now.what != "matched"; }),
-                 capture::Stopped);
+    EXPECT_THROW(
+        capture::compare_photos(file_, names_, all, [](const auto& now) { return now.what != "matched"; }),
+        capture::Stopped);
     EXPECT_EQ(compare(false)->size(), 10u);
 }
 

@@ -87,7 +87,7 @@ TEST_F(Photos, AreTrainedOnAsTheCommandLineSays) {
 
 TEST_F(Photos, CanBeDroppedAndStopped) {
     const XClient display(display_.name());
-    Session session(shots_, {splats_, "--size", "500x300"}, environment("exhaustive_matcher"));
+    Session session(shots_, {splats_, "--size", "500x300"}, environment("matches_importer"));
     ASSERT_TRUE(session.found());
     const auto window = display.window_titled("ewa");
     ASSERT_TRUE(window && display.drop(*window, uri_of(photos_)));
