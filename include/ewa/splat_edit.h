@@ -22,11 +22,11 @@ void transform_splats(Gaussians& gaussians, const glm::dmat4& matrix);
 /// Replaces the scene by the splats of `indices`, in that order. Each index is < size and may be repeated.
 void select_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices);
 
-/// Sets the SH degree (0..3). Higher coefficients are cut, new ones are zero.
-void set_sh_degree(Gaussians& gaussians, int degree);
-
 /// The same in place, for ascending indices without repetition: it takes no memory for a copy.
 void keep_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices);
+
+/// Sets the SH degree (0..3). Higher coefficients are cut, new ones are zero.
+void set_sh_degree(Gaussians& gaussians, int degree);
 
 /// Merges near splats until `target` of them are left, at least one. A merged splat has the mean, the covariance and the colour of
 /// the light that both take, and as much of that light as its opacity allows. Rounds merge the pairs of the least relative error.

@@ -30,8 +30,8 @@ constexpr int kMostPanoramas = 50;  // 360° photos, all pairs of which are comp
 constexpr int kNext = 2;            // photos that follow, which are compared whatever they look like
 constexpr const char* kMostFeatures = "3000";  // of a view; a 360° photo has six
 constexpr int kRounds = 2;                     // of a rig's bundle adjustment, each with new points
-// COLMAP adjusts all cameras and points after each growth by this ratio, not by a tenth. Whatever is left is undone by the last
-// adjustment: docs/capture.md has the figures. Models of few images count.
+// COLMAP adjusts all cameras and points after each growth to 1.4 times, not to 1.1 times. The last adjustment gives as small
+// errors: docs/capture.md has the figures. Models of few images count.
 constexpr const char* kGlobalRatio = "1.4";
 constexpr const char* kImagesRatio = "Mapper.ba_global_images_ratio";  // COLMAP 3.12 has frames
 constexpr std::array kMapping{"--Mapper.min_model_size",
