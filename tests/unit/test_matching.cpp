@@ -29,7 +29,7 @@ Descriptors random_descriptors(size_t count, std::mt19937& random) {
         std::vector<double> values(kDescriptorSize);
         double squares = 0;
         for (double& value : values) {
-            value = std::pow(std::abs(normal(random)), 3);
+            value = std::pow(normal(random), 2);
             squares += value * value;
         }
         for (const double value : values)
@@ -38,11 +38,17 @@ Descriptors random_descriptors(size_t count, std::mt19937& random) {
     return all;
 }
 
-/// A descriptor that is a little off another one.
+/// A descriptor that is a little off another one, and as long.
 void add_near(Descriptors& to, const Descriptors& from, size_t place, int most, std::mt19937& random) {
     std::uniform_int_distribution<int> noise(-most, most);
-    for (size_t k = 0; k < kDescriptorSize; ++k)
-        to.push_back(std::int16_t(std::clamp(from[place * kDescriptorSize + k] + noise(random), 0, 255)));
+    std::vector<double> values(kDescriptorSize);
+    double squares = 0;
+    for (size_t k = 0; k < kDescriptorSize; ++k) {
+        values[k] = std::max(0, from[place * kDescriptorSize + k] + noise(random));
+        squares += values[k] * values[k];
+    }
+    for (const double value : values)
+        to.push_back(std::int16_t(std::min(255.0, std::round(512 * value / std::sqrt(squares)))));
 }
 
 /// The rules of matches_of in plain loops.
@@ -78,13 +84,40 @@ TEST(Matching, FindsWhatPlainLoopsFind) {
     std::mt19937 random(5);
     const Descriptors first = random_descriptors(61, random);
     Descriptors second = random_descriptors(40, random);
-    for (size_t i = 0; i < 30; ++i) add_near(second, first, 2 * i, int(i), random);
+    for (size_t i = 0; i < 30; ++i) add_near(second, first, 2 * i, 4 * int(i), random);
     add_near(second, first, 0, 5, random);  // twice: the first feature has two that are as near
     const std::vector<FeatureMatch> matches = capture::matches_of(first, second);
     EXPECT_EQ(matches, plain_matches(first, second));
     EXPECT_GT(matches.size(), 15u);
     EXPECT_LT(matches.size(), 30u);
     for (const FeatureMatch& match : matches) EXPECT_EQ(match.second, 40 + match.first / 2);
+}
+
+/// A feature whose nearest is hardly nearer than the next has no match.
+TEST(Matching, TakesNoFeatureThatCouldBeAnother) {
+    std::mt19937 random(8);
+    const Descriptors first = random_descriptors(20, random);
+    Descriptors second;
+    for (size_t i = 0; i < 20; ++i) {
+        add_near(second, first, i, 16, random);
+        if (i < 10) add_near(second, first, i, 16, random);
+    }
+    const std::vector<FeatureMatch> matches = capture::matches_of(first, second);
+    EXPECT_EQ(matches, plain_matches(first, second));
+    ASSERT_EQ(matches.size(), 10u);
+    for (size_t i = 0; i < 10; ++i) EXPECT_EQ(matches[i].first, 10 + i);
+}
+
+/// Of two features with the same nearest, the one that is that one's nearest has the match.
+TEST(Matching, IsMutual) {
+    std::mt19937 random(9);
+    Descriptors first = random_descriptors(20, random), second;
+    for (size_t i = 0; i < 20; ++i) add_near(second, first, i, 4, random);
+    for (size_t i = 0; i < 20; ++i) add_near(first, first, i, 14, random);
+    const std::vector<FeatureMatch> matches = capture::matches_of(first, second);
+    EXPECT_EQ(matches, plain_matches(first, second));
+    EXPECT_GE(matches.size(), 18u);
+    for (const FeatureMatch& match : matches) EXPECT_EQ(match.first, match.second);
 }
 
 TEST(Matching, NeedsFeaturesInBothImages) {
