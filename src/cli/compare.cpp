@@ -20,6 +20,7 @@
 #include "ewa/error.h"
 #include "ewa/image.h"
 #include "io/datasets/dataset_folders.h"
+#include "io/datasets/image_records.h"
 #include "io/meshes/mesh_files.h"
 #include "report/pictures.h"
 #include "scene/dataset_files.h"
@@ -40,7 +41,8 @@ struct CompareArguments {
     std::optional<double> threshold;  // dB: the least PSNR
     std::optional<double> max_error;  // the largest difference of two values, alpha included
     double heat_scale = 0.25;
-    std::optional<double> distance;  // of meshes
+    std::optional<double> distance;  // meshes alone have these two
+    std::string mesh_protocol;
 };
 
 struct Compared {
@@ -264,21 +266,28 @@ int run(const CompareArguments& arguments) {
     return passed ? 0 : kTooFarApart;
 }
 
+bool is_scan(const fs::path& path) {
+    return fs::is_regular_file(path) && io::is_point_cloud(path);
+}
+
 /// Whether both sides are meshes. Throws InputError where one side is, or another option than theirs is given.
 bool compares_meshes(const CLI::App& app, const CompareArguments& arguments) {
-    const bool a = io::is_mesh(arguments.inputs.a), b = io::is_mesh(arguments.inputs.b);
+    const bool a = io::is_mesh(arguments.inputs.a);
+    const bool b = io::is_mesh(arguments.inputs.b) || (a && is_scan(arguments.inputs.b));
     if (a != b)
         throw InputError(core::one_line((a ? arguments.inputs.a : arguments.inputs.b).string()) +
                          " is a mesh, and the other side is none");
     if (!a) {
-        if (arguments.distance) throw InputError("--distance is for two meshes (.gltf, .glb, .ply, .obj)");
+        for (const auto& [option, given] : {std::pair("--distance", arguments.distance.has_value()),
+                                            std::pair("--protocol", !arguments.mesh_protocol.empty())})
+            if (given) throw InputError(std::string(option) + " is for two meshes (.gltf, .glb, .ply, .obj)");
         return false;
     }
     for (const CLI::Option* option : app.get_options())
         if (option->count() > 0 && !option->get_lnames().empty() && option->get_lnames()[0] != "json" &&
-            option->get_lnames()[0] != "distance")
+            option->get_lnames()[0] != "distance" && option->get_lnames()[0] != "protocol")
             throw InputError("--" + option->get_lnames()[0] +
-                             " is for images; meshes have --distance and --json");
+                             " is for images; meshes have --distance, --protocol and --json");
     return true;
 }
 
@@ -316,6 +325,11 @@ Action add_compare(CLI::App& app) {
            "count in the F-score, in the scene's units [0.005 of B's diagonal]")
         ->transform(in_range(1e-12, 1e12))
         ->type_name("D");
+    app.add_option("--protocol", arguments->mesh_protocol,
+                   "Measure meshes about as this benchmark does: dtu (B in mm), or tanks-and-temples:SCENE. "
+                   "B may be a "
+                   "scan, a .ply of points")
+        ->type_name("NAME");
     app.add_option("--heat-scale", arguments->heat_scale, "Error that the heat map shows brightest")
         ->transform(in_range(1e-9, 1e9))
         ->type_name("E")
@@ -338,7 +352,8 @@ Action add_compare(CLI::App& app) {
     return [&app, arguments] {
         CompareInputs& inputs = arguments->inputs;
         if (compares_meshes(app, *arguments)) {
-            compare_meshes({inputs.a, inputs.b, arguments->json, arguments->distance});
+            compare_meshes(
+                {inputs.a, inputs.b, arguments->json, arguments->distance, arguments->mesh_protocol});
             return 0;
         }
         if (!inputs.cameras.empty()) inputs.cameras = dataset_input(inputs.cameras);

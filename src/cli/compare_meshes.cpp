@@ -2,17 +2,22 @@
 #include "cli/compare_meshes.h"
 
 #include <spdlog/fmt/fmt.h>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "cli/output.h"
 #include "core/text.h"
 #include "core/typing.h"
+#include "io/datasets/image_records.h"
 #include "io/meshes/mesh_files.h"
 #include "mesh/distance.h"
 #include "mesh/parts.h"
+#include "mesh/protocol.h"
 
 namespace ewa::cli {
 namespace {
+
+namespace fs = std::filesystem;
 
 constexpr double kUsualDistance = 0.005;  // of the diagonal of B's box
 
@@ -26,29 +31,71 @@ report::Json to_json(const mesh::Topology& topology, size_t triangles) {
             {"watertight", topology.watertight()}};
 }
 
+/// JSON has no NaN.
+report::Json number(double value) {
+    return std::isfinite(value) ? report::Json(value) : report::Json();
+}
+
+std::string counted_mesh(const scene::MeshScene& mesh, const mesh::Topology& topology) {
+    return fmt::format("{} in {}, {}", core::counted(mesh.triangles.size(), "triangle"),
+                       core::counted(topology.parts, "part"), mesh::watertight_text(topology));
+}
+
+void describe_mesh(const char* side, const fs::path& path, const scene::MeshScene& mesh, report::Json& json) {
+    const mesh::Topology topology = mesh::topology_of(mesh::joined(mesh));
+    fmt::print("{}: {}\n", core::one_line(path.string()), counted_mesh(mesh, topology));
+    json[side] = to_json(topology, mesh.triangles.size());
+}
+
+/// B as a scan, as the protocol thins it.
+mesh::Surface scan_of(const fs::path& path, const mesh::Protocol& protocol) {
+    const std::vector<glm::dvec3> points = io::read_points_ply(path).points.positions;
+    return mesh::Surface(protocol.cell > 0 ? mesh::thinned(points, protocol.cell) : points);
+}
+
+mesh::SurfaceComparison measures_of(const MeshComparison& comparison, const mesh::Protocol& protocol,
+                                    const mesh::Surface& a, const mesh::Surface& b) {
+    mesh::SurfaceComparison measures{
+        .threshold = comparison.distance.value_or(protocol.threshold.value_or(kUsualDistance * b.diagonal())),
+        .farthest = protocol.farthest};
+    if (protocol.spacing > 0) {
+        measures.points_a = mesh::points_at(a, protocol.spacing);
+        measures.points_b = b.scan() ? b.size() : mesh::points_at(b, protocol.spacing);
+    }
+    return measures;
+}
+
 }  // namespace
 
 void compare_meshes(const MeshComparison& comparison) {
     check_command_outputs({{"--json", comparison.json}}, {{"A", comparison.a}, {"B", comparison.b}});
-    const scene::MeshScene a = io::read_mesh(comparison.a), b = io::read_mesh(comparison.b);
-    const mesh::Surface of_a(a), of_b(b);
-    const double threshold = comparison.distance.value_or(kUsualDistance * of_b.diagonal());
-    const mesh::SurfaceDifference d = mesh::difference(of_a, of_b, threshold);
-    fmt::print("accuracy {:.4g}  completeness {:.4g}  chamfer {:.4g}  normal error {:.3g}°\n", d.accuracy,
-               d.completeness, d.chamfer(), d.normal_error);
-    fmt::print("within {:.4g}: precision {:.2f} %  recall {:.2f} %  F-score {:.2f} %\n", threshold,
+    const mesh::Protocol protocol =
+        comparison.protocol.empty() ? mesh::Protocol() : mesh::protocol_named(comparison.protocol);
+    const bool scan = !io::is_mesh(comparison.b);
+    const scene::MeshScene a = io::read_mesh(comparison.a);
+    const scene::MeshScene b = scan ? scene::MeshScene() : io::read_mesh(comparison.b);
+    const mesh::Surface of_a(a), of_b = scan ? scan_of(comparison.b, protocol) : mesh::Surface(b);
+    const mesh::SurfaceComparison measures = measures_of(comparison, protocol, of_a, of_b);
+    const mesh::SurfaceDifference d = mesh::difference(of_a, of_b, measures);
+    fmt::print("accuracy {:.4g}  completeness {:.4g}  chamfer {:.4g}{}\n", d.accuracy, d.completeness,
+               d.chamfer(), scan ? "" : fmt::format("  normal error {:.3g}°", d.normal_error));
+    fmt::print("within {:.4g}: precision {:.2f} %  recall {:.2f} %  F-score {:.2f} %\n", d.threshold,
                100 * d.precision, 100 * d.recall, 100 * d.f_score());
-    report::Json json{{"accuracy", d.accuracy}, {"completeness", d.completeness},
-                      {"chamfer", d.chamfer()}, {"normal_error", d.normal_error},
-                      {"threshold", threshold}, {"precision", d.precision},
-                      {"recall", d.recall},     {"f_score", d.f_score()}};
-    for (const auto& [name, path, mesh] :
-         {std::tuple{"a", &comparison.a, &a}, std::tuple{"b", &comparison.b, &b}}) {
-        const mesh::Topology topology = mesh::topology_of(mesh::joined(*mesh));
-        fmt::print("{}: {} in {}, {}\n", core::one_line(path->string()),
-                   core::counted(mesh->triangles.size(), "triangle"), core::counted(topology.parts, "part"),
-                   mesh::watertight_text(topology));
-        json[name] = to_json(topology, mesh->triangles.size());
+    report::Json json{{"accuracy", number(d.accuracy)},
+                      {"completeness", number(d.completeness)},
+                      {"chamfer", number(d.chamfer())},
+                      {"normal_error", number(d.normal_error)},
+                      {"threshold", d.threshold},
+                      {"precision", d.precision},
+                      {"recall", d.recall},
+                      {"f_score", d.f_score()}};
+    if (!comparison.protocol.empty()) json["protocol"] = comparison.protocol;
+    describe_mesh("a", comparison.a, a, json);
+    if (scan) {
+        fmt::print("{}: {}\n", core::one_line(comparison.b.string()), core::counted(of_b.size(), "point"));
+        json["b"] = {{"points", of_b.size()}};
+    } else {
+        describe_mesh("b", comparison.b, b, json);
     }
     if (!comparison.json.empty()) write_json(comparison.json, json);
 }

@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa compare of two meshes.
+// ewa compare of two meshes, or of a mesh and a scan.
 #pragma once
 #include <filesystem>
 #include <optional>
+#include <string>
 
 namespace ewa::cli {
 
 struct MeshComparison {
     std::filesystem::path a, b, json;
-    std::optional<double> distance;  // world units; empty: a part of B's size
+    std::optional<double> distance;  // world units; empty: a part of B's size, or the protocol's
+    std::string protocol;            // as mesh::protocol_named; empty: none
 };
 
-/// Prints how far A is from B, the true surface, and writes it as JSON. Throws InputError.
+/// Prints how far the mesh A is from B, the true surface, which may be a scan, and writes it as JSON. Throws InputError.
 void compare_meshes(const MeshComparison& comparison);
 
 }  // namespace ewa::cli

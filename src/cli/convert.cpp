@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <glm/gtc/matrix_transform.hpp>
 #include <memory>
 #include <set>
 
@@ -37,7 +38,7 @@ struct ConvertArguments {
     fs::path output;                     // -o, which becomes the last of the files
     std::vector<glm::dmat4> placements;  // of the inputs
     std::vector<std::string> transform;
-    std::string crop, decimate, sort;
+    std::string scale_to, crop, decimate, sort;
     Edits edits;
     Cleaning cleaning;
     int spz_version = 3, levels = 0, level = 0;
@@ -235,6 +236,11 @@ int run(const ConvertArguments& arguments) {
     // Report wrong use before the inputs are read: they may be large.
     Edits edits = arguments.edits;
     edits.transform = parse_transform(arguments.transform);
+    if (!arguments.scale_to.empty()) {
+        const double factor = parse_scale_to(arguments.scale_to, edits.transform);
+        edits.transform = glm::scale(glm::dmat4(1.0), glm::dvec3(factor)) * edits.transform;
+        if (!arguments.quiet) fmt::print("--scale-to: times {:.6g}\n", factor);
+    }
     edits.crop = parse_crop(arguments.crop);
     edits.decimation = parse_decimation(arguments.decimate);
     edits.morton = arguments.sort == "morton";
@@ -297,6 +303,11 @@ void add_editing_options(CLI::App& app, ConvertArguments& arguments) {
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
         ->take_all();
+    app.add_option(
+           "--scale-to", arguments.scale_to,
+           "Scale the joined scene until these two points are LENGTH apart; they are its points before "
+           "--transform. ewa-view measures points")
+        ->type_name("x,y,z,X,Y,Z,LENGTH");
     app.add_option("--crop", arguments.crop,
                    "Keep only splats whose centre is in this box; applied after --transform")
         ->type_name("x,y,z,X,Y,Z");

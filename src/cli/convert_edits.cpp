@@ -112,6 +112,18 @@ glm::dmat4 parse_transform(const std::vector<std::string>& steps, const std::str
     return matrix;
 }
 
+double parse_scale_to(const std::string& text, const glm::dmat4& transform) {
+    const std::vector<double> n = parse_numbers("--scale-to", text);
+    if (n.size() != 7)
+        throw InputError("--scale-to: '" + text +
+                         "' is not x,y,z,X,Y,Z,LENGTH: two points, and how far they are apart");
+    const glm::dvec4 between(n[3] - n[0], n[4] - n[1], n[5] - n[2], 0);
+    const double factor = n[6] / glm::length(glm::dvec3(transform * between));
+    if (!(n[6] > 0 && std::isfinite(factor) && factor > 0))
+        throw InputError("--scale-to: '" + text + "' needs two points that differ, and a length above 0");
+    return factor;
+}
+
 PlacedInput parse_input(const std::string& text) {
     std::error_code error;
     if (std::filesystem::exists(text, error)) return {text};

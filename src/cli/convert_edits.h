@@ -32,6 +32,10 @@ struct Edits {
 /// step.
 glm::dmat4 parse_transform(const std::vector<std::string>& steps, const std::string& what = "--transform");
 
+/// Parses --scale-to, "x,y,z,X,Y,Z,LENGTH". Returns the factor by which the scene grows about the world's origin, so that the two points
+/// are LENGTH apart after `transform` and it. Throws InputError.
+double parse_scale_to(const std::string& text, const glm::dmat4& transform = glm::dmat4(1.0));
+
 struct PlacedInput {
     std::filesystem::path file;
     glm::dmat4 transform{1.0};

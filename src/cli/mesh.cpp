@@ -13,6 +13,7 @@
 
 #include "cli/arguments.h"
 #include "cli/command.h"
+#include "cli/convert_edits.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
@@ -40,10 +41,12 @@ namespace fs = std::filesystem;
 
 struct MeshArguments {
     fs::path splats, cameras, output;
+    std::string scale_to;
     double voxel = 0;   // 0: not given
     int triangles = 0;  // 0: not given
     int downscale = 1, max_width = 0;
     std::string depth = "auto";  // or median, mean
+    bool unbounded = false, collision = false;
     DeviceOptions device;
     bool quiet = false;
 };
@@ -51,6 +54,9 @@ struct MeshArguments {
 constexpr int kOwnViews = 64, kOwnViewSide = 512;
 /// A part that is smaller than this was seen within the truncation alone.
 constexpr double kLeastPart = 4 * mesh::kTruncation;  // voxels
+/// A collision mesh: its voxels in usual ones, and its triangles unless --triangles says another number.
+constexpr double kCollisionVoxels = 4;
+constexpr size_t kCollisionTriangles = 10000;
 
 /// Around the scene from all directions, for splats whose cameras are not known.
 std::vector<Camera> own_cameras(const Gaussians& gaussians) {
@@ -151,21 +157,46 @@ uint64_t memory_for_volume() {
     return uint64_t(sysconf(_SC_PHYS_PAGES)) * uint64_t(sysconf(_SC_PAGESIZE)) / 2;
 }
 
-void print(const scene::TriangleMesh& made, double voxel, const MeshArguments& arguments,
-           Progress& progress) {
-    const mesh::Topology topology = mesh::topology_of(made);
-    progress.note(fmt::format("{}: {} in {}, voxels of {:.4g}, {}", core::one_line(arguments.output.string()),
-                              core::counted(made.triangles.size(), "triangle"),
-                              core::counted(topology.parts, "part"), voxel, mesh::watertight_text(topology)));
-    if (arguments.triangles > 0 && made.triangles.size() > size_t(arguments.triangles))
-        progress.note(fmt::format("--triangles {}: with fewer than {}, the surface would tear",
-                                  arguments.triangles, made.triangles.size()));
+mesh::FusionOptions fusion_options(const MeshArguments& arguments) {
+    mesh::FusionOptions options{.voxel = arguments.voxel,
+                                .unbounded = arguments.unbounded,
+                                .closed = arguments.collision,
+                                .least_part = kLeastPart,
+                                .most_triangles = size_t(arguments.triangles),
+                                .most_bytes = memory_for_volume()};
+    if (arguments.collision) {
+        options.coarser = kCollisionVoxels;
+        if (arguments.triangles == 0) options.most_triangles = kCollisionTriangles;
+    }
+    return options;
+}
+
+void enlarge(mesh::Fused& fused, double scale) {
+    if (scale == 1) return;
+    fused.mesh.origin *= scale;
+    for (glm::vec3& p : fused.mesh.positions) p *= float(scale);
+    fused.voxel *= scale;
+    fused.space.radius *= scale;
+}
+
+void print(const mesh::Fused& fused, const MeshArguments& arguments, size_t most, Progress& progress) {
+    const size_t triangles = fused.mesh.triangles.size();
+    const mesh::Topology topology = mesh::topology_of(fused.mesh);
+    std::string voxels = fmt::format("voxels of {:.4g}", fused.voxel);
+    if (arguments.unbounded) voxels += fmt::format(" within {:.4g} of the middle", fused.space.radius);
+    progress.note(fmt::format("{}: {} in {}, {}, {}", core::one_line(arguments.output.string()),
+                              core::counted(triangles, "triangle"), core::counted(topology.parts, "part"),
+                              voxels, mesh::watertight_text(topology)));
+    if (most > 0 && triangles > most)
+        progress.note(
+            fmt::format("--triangles {}: with fewer than {}, the surface would tear", most, triangles));
 }
 
 int make_mesh(const MeshArguments& arguments, const std::optional<live::Run>& run) {
     RenderOptions options;
     const DrawArguments draw;
     const Gaussians gaussians = draw.load(arguments.splats, options);
+    const double scale = arguments.scale_to.empty() ? 1 : parse_scale_to(arguments.scale_to);
     const std::optional<Dataset> dataset = dataset_of_mesh(arguments, run);
     check_output(arguments, dataset);
     const std::vector<Camera> cameras = dataset ? cameras_of(*dataset) : own_cameras(gaussians);
@@ -173,7 +204,8 @@ int make_mesh(const MeshArguments& arguments, const std::optional<live::Run>& ru
 
     Renderer renderer(open_device(arguments.device), gaussians, options);
     const InterruptWatch watch;
-    Progress progress("meshed", int(3 * cameras.size()), "views", arguments.quiet);
+    Progress progress("meshed", int((arguments.collision ? 2 : 3) * cameras.size()), "views",
+                      arguments.quiet);
     const auto done = [&](size_t steps) {
         if (interrupted()) throw Interrupted();
         progress.update(int(steps));
@@ -184,22 +216,23 @@ int make_mesh(const MeshArguments& arguments, const std::optional<live::Run>& ru
         return renderer.render(cameras[i], Drawing::median_depth).median_depth;
     });
     const mesh::DepthOfView depth = [&](size_t i) -> const Image& { return cache.at(i); };
-    mesh::Fused fused =
-        mesh::fuse(cameras, depth, {.voxel = arguments.voxel, .most_bytes = memory_for_volume()}, done);
+    const mesh::FusionOptions fusion = fusion_options(arguments);
+    mesh::Fused fused = mesh::fuse(cameras, depth, fusion, done);
     scene::TriangleMesh& made = fused.mesh;
-    mesh::drop_small_parts(made, kLeastPart * fused.voxel);
     if (made.triangles.empty())
         throw InputError(
             fmt::format("no surface is as large as {:g} voxels of {:.3g}; take a smaller --voxel", kLeastPart,
                         fused.voxel));
-    if (arguments.triangles > 0) mesh::simplify(made, size_t(arguments.triangles));
     mesh::set_normals(made);
-    mesh::set_colors(
-        made, cameras, depth, [&](size_t i) { return renderer.render(cameras[i]).color; },
-        mesh::kTruncation * fused.voxel, [&](size_t views) { done(2 * cameras.size() + views); });
+    if (!arguments.collision)
+        mesh::set_colors(
+            made, cameras, depth, [&](size_t i) { return renderer.render(cameras[i]).color; },
+            [&](const glm::dvec3& at) { return mesh::kTruncation * fused.voxel_at(at); },
+            [&](size_t views) { done(2 * cameras.size() + views); });
+    enlarge(fused, scale);
     make_folder(arguments.output.parent_path());
     mesh::save_mesh(arguments.output, made);
-    print(made, fused.voxel, arguments, progress);
+    print(fused, arguments, fusion.most_triangles, progress);
     return 0;
 }
 
@@ -241,6 +274,15 @@ Action add_mesh(CLI::App& app) {
         ->transform(one_of({"auto", "median", "mean"}))
         ->type_name("auto|median|mean")
         ->capture_default_str();
+    app.add_flag(
+        "--unbounded", arguments->unbounded,
+        "Also mesh the background, with voxels that grow with the distance from what the cameras look at");
+    app.add_flag("--collision", arguments->collision,
+                 "A mesh for physics: closed, coarse, of at most 10,000 triangles, without colours");
+    app.add_option(
+           "--scale-to", arguments->scale_to,
+           "Scale the mesh until these two points of the scene are LENGTH apart. ewa-view measures points")
+        ->type_name("x,y,z,X,Y,Z,LENGTH");
     add_size_options(app, arguments->downscale, arguments->max_width);
     add_device_options(app, arguments->device);
     add_quiet_option(app, arguments->quiet);

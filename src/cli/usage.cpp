@@ -22,17 +22,17 @@ const std::map<std::string, std::string>& subjects() {
         const auto add = [&made](const char* subject, std::initializer_list<const char*> names) {
             for (const char* name : names) made[name] = subject;
         };
-        add("Data", {"cameras",       "frame",    "split",        "transform", "exposures",
-                     "appearance-of", "crop",     "min-opacity",  "max-sh",    "sort",
-                     "splats",        "cases",    "decimate",     "level",     "bake-sky",
-                     "views",         "size",     "look-at",      "up",        "orbit",
-                     "film-seconds",  "matching", "scene-splats", "visible",   "view-time"});
+        add("Data", {"cameras",   "frame",       "split",        "transform", "exposures",    "appearance-of",
+                     "crop",      "min-opacity", "max-sh",       "sort",      "splats",       "cases",
+                     "decimate",  "level",       "bake-sky",     "views",     "size",         "look-at",
+                     "up",        "orbit",       "film-seconds", "matching",  "scene-splats", "visible",
+                     "view-time", "scale-to"});
         add("Quality", {"quality", "antialias", "integrator", "samples", "runs", "training-steps"});
         add("Output",
-            {"output",      "format",   "mode",        "json",      "svg",       "heat-map", "heat-scale",
-             "serve",       "accuracy", "spz-version", "levels",    "check",     "ranks",    "quiet",
-             "verbose",     "results",  "compare",     "threshold", "max-error", "resume",   "force",
-             "allow-empty", "protocol", "voxel",       "triangles", "distance"});
+            {"output",      "format",   "mode",        "json",      "svg",       "heat-map",  "heat-scale",
+             "serve",       "accuracy", "spz-version", "levels",    "check",     "ranks",     "quiet",
+             "verbose",     "results",  "compare",     "threshold", "max-error", "resume",    "force",
+             "allow-empty", "protocol", "voxel",       "triangles", "distance",  "unbounded", "collision"});
         for (const train::RunOption& option : train::run_options())
             if (!option.subject.empty()) made[option.name] = option.subject;
         return made;

@@ -47,7 +47,8 @@ void spread(const scene::TriangleMesh& mesh, std::vector<glm::vec4>& sums) {
 }  // namespace
 
 void set_colors(scene::TriangleMesh& mesh, std::span<const Camera> cameras, const DepthOfView& depth,
-                const std::function<Image(size_t)>& picture, double within,
+                const std::function<Image(size_t)>& picture,
+                const std::function<double(const glm::dvec3&)>& within,
                 const std::function<void(size_t)>& done) {
     constexpr size_t kTogether = 4096;
     std::vector<glm::vec4> sums(mesh.positions.size(), glm::vec4(0));  // weight in w
@@ -63,8 +64,8 @@ void set_colors(scene::TriangleMesh& mesh, std::span<const Camera> cameras, cons
                 const glm::dvec3 p = camera.rotation * world + camera.translation;
                 if (!(p.z > 0)) continue;
                 const glm::vec2 at(pixel_of(camera, p));
-                const double d = double(depth_at(seen, at, float(within)));
-                if (!(d > 0) || std::abs(d - p.z) > within) continue;
+                const double most = within(world), d = double(depth_at(seen, at, float(most)));
+                if (!(d > 0) || std::abs(d - p.z) > most) continue;
                 const double cosine = glm::dot(glm::dvec3(mesh.normals[i]), glm::normalize(eye - world));
                 if (cosine > 0) sums[i] += float(cosine * cosine) * glm::vec4(color_at(colors, at), 1);
             }

@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a pinhole shows points.
+// Depth that pinholes see, and where they show points.
 #pragma once
 #include <cmath>
+#include <functional>
 #include <glm/vec2.hpp>
 
 #include "ewa/camera.h"
+#include "ewa/image.h"
 
 namespace ewa::mesh {
+
+/// The depth of view i: one channel, view z, 0 where no surface is. It is asked for several times.
+using DepthOfView = std::function<const Image&(size_t)>;
 
 inline double focal(const Camera& camera) {
     return std::sqrt(camera.fx * camera.fy);

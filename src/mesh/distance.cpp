@@ -74,6 +74,16 @@ Surface::Surface(const scene::MeshScene& scene) {
     hierarchy_ = pathtracer::build_hierarchy(boxes);
 }
 
+Surface::Surface(const std::vector<glm::dvec3>& points) : scan_(true) {
+    if (points.empty()) throw InputError("the scan has no points");
+    std::vector<pathtracer::FloatBox> boxes;
+    for (const glm::dvec3& p : points) {
+        triangles_.push_back({p, p, p});
+        boxes.push_back(box_of(triangles_.back()));
+    }
+    hierarchy_ = pathtracer::build_hierarchy(boxes);
+}
+
 Surface::Nearest Surface::nearest(const glm::dvec3& point) const {
     double best = std::numeric_limits<double>::infinity();
     size_t found = 0;
@@ -115,10 +125,12 @@ Surface::Nearest Surface::nearest(const glm::dvec3& point) const {
         for (const Open& child : children)
             if (child.squared <= best && std::isfinite(child.squared)) open.push_back(child);
     }
-    return {std::sqrt(best), found, glm::normalize(doubled_area(triangles_[found]))};
+    return {std::sqrt(best), found, scan_ ? glm::dvec3(0) : glm::normalize(doubled_area(triangles_[found]))};
 }
 
 Surface::Point Surface::sample(size_t i, size_t count, uint32_t seed) const {
+    if (scan_)
+        return {triangles_[count == size() ? i : size_t(double(i) / double(count) * double(size()))][0], {}};
     const auto u = core::uniform4({uint32_t(i), uint32_t(uint64_t(i) >> 32), seed, 0});
     const double at = (double(i) + u[0]) / double(count) * area();
     const auto found = std::ranges::lower_bound(areas_, at);
@@ -137,31 +149,53 @@ double Surface::diagonal() const {
     return glm::length(high - low);
 }
 
-SurfaceDifference difference(const Surface& a, const Surface& b, double threshold, size_t points) {
+namespace {
+
+/// What points on one surface have to the other.
+struct OneWay {
+    double mean = 0, within = 0, angle = 0;
+};
+
+OneWay from_to(const Surface& from, const Surface& to, size_t points, uint32_t seed,
+               const SurfaceComparison& comparison) {
     struct Row {
-        double from_a, from_b, angle;
+        double distance, cosine;
     };
     std::vector<Row> rows(points);
     constexpr size_t kTogether = 1024;
     core::on_all_cores((points + kTogether - 1) / kTogether, [&](size_t group) {
         for (size_t i = group * kTogether; i < std::min(points, (group + 1) * kTogether); ++i) {
-            const Surface::Point of_a = a.sample(i, points, 1), of_b = b.sample(i, points, 2);
-            const Surface::Nearest in_b = b.nearest(of_a.position), in_a = a.nearest(of_b.position);
-            const double cosine = std::min(1.0, std::abs(glm::dot(of_a.normal, in_b.normal)));
-            rows[i] = {in_b.distance, in_a.distance, std::acos(cosine)};
+            const Surface::Point point = from.sample(i, points, seed);
+            const Surface::Nearest found = to.nearest(point.position);
+            rows[i] = {found.distance, std::abs(glm::dot(point.normal, found.normal))};
         }
     });
-    SurfaceDifference out;
-    out.threshold = threshold;
-    const double share = 1 / double(points);
+    OneWay out;
+    size_t near = 0;
     for (const Row& row : rows) {
-        out.accuracy += share * row.from_a;
-        out.completeness += share * row.from_b;
-        out.precision += row.from_a <= threshold ? share : 0;
-        out.recall += row.from_b <= threshold ? share : 0;
-        out.normal_error += share * row.angle * 180 / std::numbers::pi;
+        out.within += row.distance <= comparison.threshold ? 1 : 0;
+        out.angle += std::acos(std::min(1.0, row.cosine));
+        if (!(row.distance < comparison.farthest)) continue;
+        out.mean += row.distance;
+        ++near;
     }
+    out.mean /= double(near);
+    out.within /= double(points);
+    out.angle *= 180 / std::numbers::pi / double(points);
     return out;
+}
+
+}  // namespace
+
+SurfaceDifference difference(const Surface& a, const Surface& b, const SurfaceComparison& comparison) {
+    const OneWay of_a = from_to(a, b, comparison.points_a, 1, comparison);
+    const OneWay of_b = from_to(b, a, comparison.points_b, 2, comparison);
+    return {.accuracy = of_a.mean,
+            .completeness = of_b.mean,
+            .threshold = comparison.threshold,
+            .precision = of_a.within,
+            .recall = of_b.within,
+            .normal_error = a.scan() || b.scan() ? std::nan("") : of_a.angle};
 }
 
 scene::TriangleMesh joined(const scene::MeshScene& scene) {

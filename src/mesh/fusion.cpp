@@ -5,15 +5,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <vector>
 
+#include "core/messages.h"
 #include "core/parallel.h"
 #include "ewa/error.h"
-#include "mesh/depth_map.h"
 #include "mesh/meshing.h"
+#include "mesh/middle.h"
+#include "mesh/parts.h"
 #include "scene/depth_map.h"
 
 namespace ewa::mesh {
@@ -44,16 +47,14 @@ void sort_unique(std::vector<uint64_t>& keys) {
 
 /// Where the volume lies in the world.
 struct Lattice {
-    glm::dvec3 origin{0};
+    Space space;
     double voxel = 1;
     double truncation() const { return kTruncation * voxel; }
-    glm::dvec3 index(const glm::dvec3& world) const { return (world - origin) / voxel; }
+    bool contracts() const { return std::isfinite(space.radius); }
+    glm::dvec3 index(const glm::dvec3& world) const { return space.contracted(world) / voxel; }
+    /// How far from the middle a point of contracted space may be. Beyond, less than a voxel is left of the world.
+    double limit() const { return 2 * space.radius - voxel; }
 };
-
-/// A view's depth up to which its pixels are fine enough.
-double depth_limit(const Camera& camera, const Lattice& lattice, double usual) {
-    return kCoarsestPixel * std::max(lattice.voxel, usual) * focal(camera);
-}
 
 [[noreturn]] void fail_too_fine(double voxel, const std::string& why) {
     throw InputError(
@@ -71,29 +72,66 @@ void add_place(std::vector<uint64_t>& keys, const glm::dvec3& index, double voxe
     if (keys.empty() || keys.back() != key) keys.push_back(key);
 }
 
+glm::dvec3 ray_of(const Camera& camera, int x, int y) {
+    return {(x + 0.5 - camera.cx) / camera.fx, (y + 0.5 - camera.cy) / camera.fy, 1};
+}
+
+/// The depth without pixels that are too coarse. finest: the side of a voxel in the middle that is taken as such.
+Image fine_depth(const Camera& camera, const Image& depth, const Lattice& lattice, double finest) {
+    Image fine = depth;
+    const double limit = kCoarsestPixel * finest * focal(camera);
+    const glm::dmat3 to_world = glm::transpose(camera.rotation);
+    core::on_all_cores(size_t(depth.height), [&](size_t y) {
+        for (int x = 0; x < depth.width; ++x) {
+            float& z = *fine.at(x, int(y));
+            double most = limit;
+            if (lattice.contracts() && z > 0)
+                most *= lattice.space.growth(to_world *
+                                             (double(z) * ray_of(camera, x, int(y)) - camera.translation));
+            if (!(z > 0 && double(z) <= most)) z = 0;
+        }
+    });
+    return fine;
+}
+
+/// About how many blocks a view needs: those that its pixels cover, times two in depth.
+double blocks_of_view(const Camera& camera, const Image& depth, const Lattice& lattice) {
+    const double per_depth = 1 / (focal(camera) * lattice.voxel * kBlockSide);
+    double blocks = 0;
+    for (const float z : depth.pixels) {
+        const double side = double(z) * per_depth;
+        blocks += 2 * std::min(1.0, side * side);
+    }
+    return blocks;
+}
+
 /// The blocks within the truncation of what a row of pixels shows, along its rays.
-std::vector<uint64_t> blocks_of_row(const Camera& camera, const Image& depth, int y, const Lattice& lattice,
-                                    double limit) {
+std::vector<uint64_t> blocks_of_row(const Camera& camera, const Image& depth, int y, const Lattice& lattice) {
     std::vector<uint64_t> keys;
     const glm::dmat3 to_world = glm::transpose(camera.rotation);
     const glm::dvec3 eye = camera.position();
     for (int x = 0; x < depth.width; ++x) {
         const double z = double(*depth.at(x, y));
-        if (!(z > 0 && z <= limit)) continue;
+        if (!(z > 0)) continue;
+        const glm::dvec3 ray = to_world * ray_of(camera, x, y), point = eye + z * ray;
         // Points closer to each other than two voxels meet the same blocks.
-        const int step = int(std::clamp(2 * lattice.voxel * focal(camera) / z, 1.0, 8.0));
+        const double side = lattice.voxel * lattice.space.growth(point);
+        const int step = int(std::clamp(2 * side * focal(camera) / z, 1.0, 8.0));
         if (x % step != 0 || y % step != 0) continue;
-        const glm::dvec3 ray =
-            to_world * glm::dvec3((x + 0.5 - camera.cx) / camera.fx, (y + 0.5 - camera.cy) / camera.fy, 1);
-        for (double s = -kTruncation; s <= kTruncation; s += 2) {
-            const glm::dvec3 at = lattice.index(eye + (z + s * lattice.voxel) * ray);
+        const glm::dvec3 at = lattice.index(point);
+        glm::dvec3 along = ray;  // what the ray becomes; a voxel of view z is one along it
+        if (lattice.contracts()) {
+            along = glm::length(ray) * glm::normalize(lattice.space.contracted_direction(point, ray));
+            constexpr double kRoom = 2;  // voxels beyond the truncation
+            if (glm::length(at + kTruncation * along) + kRoom > lattice.limit() / lattice.voxel) continue;
+        }
+        for (double s = -kTruncation; s <= kTruncation; s += 2)
             for (int corner = 0; corner < 8; ++corner) {
                 constexpr double kReach = 1.5;
                 const glm::dvec3 to(corner & 1 ? kReach : -kReach, corner & 2 ? kReach : -kReach,
                                     corner & 4 ? kReach : -kReach);
-                add_place(keys, at + to, lattice.voxel);
+                add_place(keys, at + s * along + to, lattice.voxel);
             }
-        }
     }
     sort_unique(keys);
     return keys;
@@ -102,37 +140,47 @@ std::vector<uint64_t> blocks_of_row(const Camera& camera, const Image& depth, in
 class Fusion {
   public:
     Fusion(std::span<const Camera> cameras, const DepthOfView& depth, const Lattice& lattice, double usual,
-           uint64_t most_bytes, const std::function<void(size_t)>& done)
+           const FusionOptions& options, const std::function<void(size_t)>& done)
         : cameras_(cameras),
           depth_(depth),
           lattice_(lattice),
-          usual_(usual),
-          most_bytes_(most_bytes),
+          finest_(std::max(lattice.voxel, usual)),
+          options_(options),
           done_(done),
           volume_(meshing().make_volume()) {}
 
     Fused run() {
         find_blocks();
         for (size_t i = 0; i < cameras_.size(); ++i) {
-            add_view(cameras_[i], depth_(i));
+            add_view(cameras_[i], fine_depth(cameras_[i], depth_(i), lattice_, finest_));
             if (done_) done_(cameras_.size() + i + 1);
         }
         finish_values();
         Fused out;
-        out.mesh = observed_part(volume_->surface());
+        out.mesh = mesh_of(volume_->surface());
         out.voxel = lattice_.voxel;
+        out.space = lattice_.space;
         out.blocks = blocks_.size();
         return out;
     }
 
   private:
+    void check_room(double blocks) const {
+        const double bytes = blocks * double(kBlockBytes);
+        if (options_.most_bytes > 0 && bytes > double(options_.most_bytes))
+            fail_too_fine(lattice_.voxel, fmt::format("the volume would take {} or more, of at most {}",
+                                                      core::bytes_text(uint64_t(std::min(bytes, 1e18))),
+                                                      core::bytes_text(options_.most_bytes)));
+    }
+
     void find_blocks() {
         for (size_t i = 0; i < cameras_.size(); ++i) {
-            const Image& depth = depth_(i);
-            const double limit = depth_limit(cameras_[i], lattice_, usual_);
+            const Image depth = fine_depth(cameras_[i], depth_(i), lattice_, finest_);
+            // Before its blocks take memory, too.
+            check_room(blocks_of_view(cameras_[i], depth, lattice_));
             std::vector<std::vector<uint64_t>> rows(size_t(depth.height));
             core::on_all_cores(rows.size(), [&](size_t y) {
-                rows[y] = blocks_of_row(cameras_[i], depth, int(y), lattice_, limit);
+                rows[y] = blocks_of_row(cameras_[i], depth, int(y), lattice_);
             });
             std::vector<uint64_t> seen;
             for (const auto& row : rows) seen.insert(seen.end(), row.begin(), row.end());
@@ -140,9 +188,7 @@ class Fusion {
             std::vector<uint64_t> all;
             std::ranges::set_union(keys_, seen, std::back_inserter(all));
             keys_ = std::move(all);
-            if (most_bytes_ > 0 && keys_.size() * kBlockBytes > most_bytes_)
-                fail_too_fine(lattice_.voxel,
-                              fmt::format("the volume would take more than {} MiB", most_bytes_ >> 20));
+            check_room(double(keys_.size()));
             if (done_) done_(i + 1);
         }
         std::vector<glm::ivec3> places;
@@ -161,16 +207,26 @@ class Fusion {
 
     void add_view(const Camera& camera, const Image& depth) {
         constexpr size_t kTogether = 64;
-        const float limit = float(depth_limit(camera, lattice_, usual_));
         core::on_all_cores((blocks_.size() + kTogether - 1) / kTogether, [&](size_t group) {
             const size_t end = std::min(blocks_.size(), (group + 1) * kTogether);
-            for (size_t b = group * kTogether; b < end; ++b) add_view_to(b, camera, depth, limit);
+            for (size_t b = group * kTogether; b < end; ++b)
+                if (contracted(blocks_[b]))
+                    add_view_to_contracted(b, camera, depth);
+                else
+                    add_view_to(b, camera, depth);
         });
     }
 
-    void add_view_to(size_t b, const Camera& camera, const Image& depth, float limit) {
+    bool contracted(const Block& block) const {
+        if (!lattice_.contracts()) return false;
+        const glm::dvec3 corner(block.corner),
+            far = glm::max(glm::abs(corner), glm::abs(corner + double(kBlockSide)));
+        return lattice_.voxel * glm::length(far) > lattice_.space.radius;
+    }
+
+    void add_view_to(size_t b, const Camera& camera, const Image& depth) {
         const glm::dvec3 corner =
-            camera.rotation * (lattice_.origin + lattice_.voxel * glm::dvec3(blocks_[b].corner)) +
+            camera.rotation * (lattice_.space.middle + lattice_.voxel * glm::dvec3(blocks_[b].corner)) +
             camera.translation;
         const glm::dmat3 steps = lattice_.voxel * camera.rotation;
         const glm::dvec3 middle = corner + steps * glm::dvec3(0.5 * (kBlockSide - 1));
@@ -183,16 +239,64 @@ class Fusion {
         const glm::vec3 base(corner);
         const glm::mat3 step(steps);
         const float truncation = float(lattice_.truncation());
-        float* values = blocks_[b].values;
-        uint16_t* counts = &counts_[b * kBlockVoxels];
         for (int v = 0; v < int(kBlockVoxels); ++v) {
-            const glm::vec3 p = base + step * glm::vec3(v >> 6, v >> 3 & 7, v & 7);
+            const glm::vec3 p = base + step * glm::vec3(place_in_block(v));
             if (!(p.z > 0)) continue;
             const float d = depth_at(depth, pixel_of(camera, p), truncation);
-            if (!(d > 0 && d <= limit) || p.z - d > truncation || counts[v] == UINT16_MAX) continue;
-            values[v] += std::min(1.0f, (d - p.z) / truncation);
-            ++counts[v];
+            if (!(d > 0) || p.z - d > truncation) continue;
+            add_value(b, v, std::min(1.0f, (d - p.z) / truncation));
         }
+    }
+
+    /// The voxels of such a block are no cubes in the world. Distances are those in contracted space, in the unit of view z.
+    void add_view_to_contracted(size_t b, const Camera& camera, const Image& depth) {
+        if (!in_view(blocks_[b], camera, depth)) return;
+        const Space& space = lattice_.space;
+        const glm::dvec3 eye = camera.position(), shift = camera.rotation * space.middle + camera.translation;
+        for (int v = 0; v < int(kBlockVoxels); ++v) {
+            const glm::dvec3 at = lattice_.voxel * glm::dvec3(blocks_[b].corner + place_in_block(v));
+            if (!(glm::length(at) < lattice_.limit())) continue;
+            const glm::dvec3 from_middle = space.expanded(at), p = camera.rotation * from_middle + shift;
+            if (!(p.z > 0)) continue;
+            const glm::dvec3 world = space.middle + from_middle;
+            const double d = double(depth_at(depth, glm::vec2(pixel_of(camera, p)),
+                                             float(lattice_.truncation() * space.growth(world))));
+            if (!(d > 0)) continue;
+            const glm::dvec3 seen = space.contracted(eye + d / p.z * (world - eye));
+            const double distance = glm::length(seen - at) * p.z / glm::length(p) / lattice_.truncation();
+            if (p.z > d && distance > 1) continue;
+            add_value(b, v, float(std::min(1.0, p.z > d ? -distance : distance)));
+        }
+    }
+
+    /// Whether the view may show a part of a contracted block. It lies about between its corners.
+    bool in_view(const Block& block, const Camera& camera, const Image& depth) const {
+        glm::dvec2 low(1e300), high(-1e300);
+        int behind = 0;
+        for (int c = 0; c < 8; ++c) {
+            glm::dvec3 at = lattice_.voxel *
+                            glm::dvec3(block.corner + kBlockSide * glm::ivec3(c & 1, c >> 1 & 1, c >> 2));
+            at *= std::min(1.0, lattice_.limit() / glm::length(at));
+            const glm::dvec3 p =
+                camera.rotation * (lattice_.space.middle + lattice_.space.expanded(at)) + camera.translation;
+            behind += !(p.z > 0);
+            const glm::dvec2 pixel = pixel_of(camera, p);
+            low = glm::min(low, pixel);
+            high = glm::max(high, pixel);
+        }
+        if (behind > 0) return behind < 8;
+        const glm::dvec2 reach = 1.0 + 0.25 * (high - low);
+        return low.x - reach.x < depth.width && low.y - reach.y < depth.height && high.x + reach.x > 0 &&
+               high.y + reach.y > 0;
+    }
+
+    static glm::ivec3 place_in_block(int v) { return {v >> 6, v >> 3 & 7, v & 7}; }
+
+    void add_value(size_t b, int v, float value) {
+        uint16_t& count = counts_[b * kBlockVoxels + size_t(v)];
+        if (count == UINT16_MAX) return;
+        blocks_[b].values[v] += value;
+        ++count;
     }
 
     void finish_values() {
@@ -223,6 +327,24 @@ class Fusion {
         return true;
     }
 
+    /// The mesh is changed in contracted space, where all its triangles have about one size.
+    scene::TriangleMesh mesh_of(const IndexedTriangles& surface) const {
+        scene::TriangleMesh mesh = options_.closed ? whole(surface) : observed_part(surface);
+        drop_small_parts(mesh, options_.least_part * lattice_.voxel);
+        if (options_.most_triangles > 0) simplify(mesh, options_.most_triangles);
+        if (lattice_.contracts())
+            for (glm::vec3& p : mesh.positions) p = glm::vec3(lattice_.space.expanded(glm::dvec3(p)));
+        return mesh;
+    }
+
+    scene::TriangleMesh whole(const IndexedTriangles& surface) const {
+        scene::TriangleMesh mesh;
+        mesh.origin = lattice_.space.middle;
+        for (const glm::vec3& p : surface.positions) mesh.positions.push_back(float(lattice_.voxel) * p);
+        mesh.triangles = surface.triangles;
+        return mesh;
+    }
+
     scene::TriangleMesh observed_part(const IndexedTriangles& surface) const {
         std::vector<uint8_t> kept(surface.positions.size());
         constexpr size_t kTogether = 4096;
@@ -230,19 +352,17 @@ class Fusion {
             for (size_t i = group * kTogether; i < std::min(kept.size(), (group + 1) * kTogether); ++i)
                 kept[i] = in_observed_cell(surface.positions[i]);
         });
-        scene::TriangleMesh mesh;
-        mesh.origin = lattice_.origin;
-        for (const glm::vec3& p : surface.positions) mesh.positions.push_back(float(lattice_.voxel) * p);
-        for (const Corners& t : surface.triangles)
-            if (kept[t[0]] && kept[t[1]] && kept[t[2]]) mesh.triangles.push_back(t);
+        scene::TriangleMesh mesh = whole(surface);
+        std::erase_if(mesh.triangles,
+                      [&](const Corners& t) { return !(kept[t[0]] && kept[t[1]] && kept[t[2]]); });
         return mesh;
     }
 
     std::span<const Camera> cameras_;
     const DepthOfView& depth_;
     Lattice lattice_;
-    double usual_;
-    uint64_t most_bytes_;
+    double finest_;
+    const FusionOptions& options_;
     const std::function<void(size_t)>& done_;
     std::unique_ptr<Volume> volume_;
     std::vector<uint64_t> keys_;      // of all blocks, in ascending order
@@ -253,31 +373,18 @@ class Fusion {
 
 }  // namespace
 
-double usual_voxel(std::span<const Camera> cameras, const DepthOfView& depth) {
-    std::vector<float> sides;
-    for (size_t i = 0; i < cameras.size(); ++i) {
-        const Image& image = depth(i);
-        // Every view has the same say, whatever its size.
-        constexpr size_t kSamples = 10000;
-        const size_t step = std::max<size_t>(1, image.pixels.size() / kSamples);
-        for (size_t p = 0; p < image.pixels.size(); p += step)
-            if (image.pixels[p] > 0) sides.push_back(image.pixels[p] / float(focal(cameras[i])));
-    }
-    if (sides.empty()) return 0;
-    const auto middle = sides.begin() + std::ptrdiff_t(sides.size() / 2);
-    std::ranges::nth_element(sides, middle);
-    return kVoxelPixels * double(*middle);
-}
-
 Fused fuse(std::span<const Camera> cameras, const DepthOfView& depth, const FusionOptions& options,
            const std::function<void(size_t)>& done) {
-    const double usual = usual_voxel(cameras, depth);
+    Lattice lattice;
+    if (options.unbounded) lattice.space = space_of_views(cameras, depth);
+    const double usual = usual_voxel(cameras, depth, lattice.space);
     if (!(usual > 0))
         throw InputError("no camera sees a surface: nowhere do the splats take half of the light of a pixel");
-    Lattice lattice;
-    lattice.voxel = options.voxel > 0 ? options.voxel : usual;
-    for (const Camera& camera : cameras) lattice.origin += camera.position() / double(cameras.size());
-    return Fusion(cameras, depth, lattice, usual, options.most_bytes, done).run();
+    lattice.voxel = options.voxel > 0 ? options.voxel : options.coarser * usual;
+    if (!options.unbounded)
+        for (const Camera& camera : cameras)
+            lattice.space.middle += camera.position() / double(cameras.size());
+    return Fusion(cameras, depth, lattice, usual, options, done).run();
 }
 
 }  // namespace ewa::mesh

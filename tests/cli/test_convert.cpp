@@ -112,6 +112,14 @@ TEST(Convert, EditsOnTheWay) {
     EXPECT_EQ(std::vector<float>(moved.means.begin() + 3, moved.means.begin() + 6),
               (std::vector<float>{-4, 2, 16}));
     EXPECT_NEAR(moved.log_scales[0], std::log(2), 1e-6);
+    // The first two splats are sqrt(14) apart; the length is that after the transform, too.
+    for (const Names& options :
+         {Names{"--scale-to", "0,0,0,1,2,3,7.483314773547883"},
+          Names{"--transform", "scale=10", "--scale-to", "0,0,0,1,2,3,7.483314773547883"}}) {
+        const Gaussians scaled = converted(options);
+        for (size_t i = 0; i < 12; ++i) EXPECT_NEAR(scaled.means[i], 2 * g.means[i], 1e-5);
+        EXPECT_NEAR(scaled.log_scales[0], std::log(2), 1e-6);
+    }
     // The same as a matrix.
     const Gaussians matrix = converted({"--transform", "0,-2,0,0,2,0,0,0,0,0,2,10"});
     EXPECT_EQ(matrix.means, moved.means);
@@ -154,6 +162,9 @@ TEST(Convert, WrongUse) {
     refuse({"--transform", "1,2,3"}, "1,2,3");
     refuse({"--transform", "scale=x"}, "--transform");
     refuse({"--transform", "scale=0"}, "flattens");
+    refuse({"--scale-to", "0,0,0,1,1,1"}, "x,y,z,X,Y,Z,LENGTH");
+    refuse({"--scale-to", "0,0,0,0,0,0,1"}, "two points that differ");
+    refuse({"--scale-to", "0,0,0,1,0,0,0"}, "a length above 0");
     refuse({"--crop", "1,2,3"}, "--crop");
     refuse({"--crop", "1,0,0,0,1,1"}, "lower corner");
     refuse({"--min-opacity", "2"}, "min-opacity");

@@ -6,11 +6,13 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <glm/geometric.hpp>
 #include <numbers>
 
 #include "cli/expect.h"
 #include "ewa/image.h"
 #include "ewa/splat_files.h"
+#include "io/meshes/mesh_files.h"
 
 namespace {
 
@@ -112,6 +114,53 @@ TEST(Mesh, OfASplatFileAlone) {
     EXPECT_NE(outcome.out.find("in 1 part, voxels of 0.05, watertight"), std::string::npos) << outcome.out;
 }
 
+TEST(Mesh, ForCollisionIsClosed) {
+    const Prepared folder;
+    const auto told = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> arguments = {"mesh",      folder / "shell.ply", "-o",      folder / "m.ply",
+                                              "--cameras", folder / "data",      "--voxel", "0.08"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        const Outcome outcome = run_ewa(arguments);
+        expect_success(outcome);
+        return outcome.out;
+    };
+    EXPECT_NE(told({}).find("not watertight"), std::string::npos);
+    const std::string closed = told({"--collision"});
+    EXPECT_NE(closed.find("in 1 part, voxels of 0.08, watertight"), std::string::npos) << closed;
+    const std::string ply = read_file(folder / "m.ply");
+    EXPECT_EQ(ply.find("property uchar red"), std::string::npos);
+    EXPECT_LE(header_count(ply, "element face "), 10000u);
+    EXPECT_NE(told({"--collision", "--triangles", "300"}).find("300 triangles"), std::string::npos);
+}
+
+TEST(Mesh, OfABackground) {
+    const Prepared folder;
+    const auto made = [&](const std::string& out, const std::vector<std::string>& more) {
+        std::vector<std::string> arguments = {
+            "mesh", folder / "shell.ply", "-o",           folder / out, "--voxel",
+            "0.08", "--cameras",          folder / "data"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        const Outcome outcome = run_ewa(arguments);
+        expect_success(outcome);
+        return outcome.out;
+    };
+    const std::string told = made("a.ply", {"--unbounded"});
+    EXPECT_NE(told.find(" voxels of 0.08 within "), std::string::npos) << told;
+    made("b.ply", {"--unbounded"});
+    EXPECT_EQ(read_file(folder / "a.ply"), read_file(folder / "b.ply"));
+}
+
+TEST(Mesh, HasTheLengthThatIsKnown) {
+    const Prepared folder;
+    expect_success(mesh(folder, "a.glb", {"--voxel", "0.08"}));
+    expect_success(mesh(folder, "b.glb", {"--voxel", "0.08", "--scale-to", "0,0,1,0,0,-1,20"}));
+    const auto corner = [&](const std::string& name) {
+        return ewa::io::read_mesh(folder / name).triangles.at(7).corners[1];
+    };
+    EXPECT_LT(glm::length(corner("b.glb") - 10.0 * corner("a.glb")), 1e-4);
+    expect_failure(mesh(folder, "c.glb", {"--scale-to", "1,2,3"}), 2, "--scale-to");
+}
+
 /// What shows the back of the shell through its front is nearer to the middle by the mean depth.
 TEST(Mesh, AtTheMeanDepthAfterATrainingWithDepthMaps) {
     const Prepared folder;
@@ -189,6 +238,41 @@ TEST(Mesh, ErrorsAreOneLine) {
     EXPECT_FALSE(std::filesystem::exists(folder / "m.ply"));
     expect_failure(run_ewa({"compare", folder / "shell.ply", folder / "shell.ply", "--distance", "1"}), 2,
                    "--distance");
+}
+
+/// One point of a scan is on the mesh, one half as far again from the middle, and one far away.
+TEST(Mesh, ComparesWithAScan) {
+    const Prepared folder;
+    expect_success(mesh(folder, "m.glb", {"--voxel", "0.08"}));
+    const glm::dvec3 on = ewa::io::read_mesh(folder / "m.glb").triangles.at(0).corners[0];
+    std::string scan =
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\n"
+        "end_header\nnan 0 0\n";
+    for (const double times : {1.0, 1.5, 40.0})
+        for (int k = 0; k < 3; ++k) scan += std::to_string(times * on[k]) + (k < 2 ? " " : "\n");
+    write_file(folder / "scan.ply", scan);
+    const auto compared = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> arguments = {"compare", folder / "m.glb", folder / "scan.ply", "--json",
+                                              folder / "j.json"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        const Outcome outcome = run_ewa(arguments);
+        expect_success(outcome);
+        EXPECT_NE(outcome.out.find("scan.ply: "), std::string::npos);
+        return read_json(folder / "j.json");
+    };
+    auto json = compared({"--protocol", "dtu", "--distance", "0.2"});
+    EXPECT_EQ(json["b"]["points"], 3);
+    EXPECT_EQ(json["protocol"], "dtu");
+    EXPECT_TRUE(json["normal_error"].is_null());
+    EXPECT_NEAR(json["completeness"].get<double>(), 0.25, 0.1);
+    EXPECT_NEAR(json["recall"].get<double>(), 1.0 / 3, 1e-9);
+    EXPECT_NEAR(compared({})["completeness"].get<double>(), 39.5 / 3 * glm::length(on), 0.1);
+    EXPECT_EQ(compared({"--protocol", "tanks-and-temples:Courthouse"})["threshold"], 0.025);
+    expect_failure(
+        run_ewa({"compare", folder / "m.glb", folder / "scan.ply", "--protocol", "tanks-and-temples:Bark"}),
+        2, "Barn, Caterpillar");
+    expect_failure(run_ewa({"compare", folder / "shell.ply", folder / "shell.ply", "--protocol", "dtu"}), 2,
+                   "--protocol is for two meshes");
 }
 
 TEST(Mesh, ComparesWithMeshesOnly) {

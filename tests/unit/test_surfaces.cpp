@@ -15,8 +15,10 @@
 #include "mesh/distance.h"
 #include "mesh/fusion.h"
 #include "mesh/mesh_files.h"
+#include "mesh/middle.h"
 #include "mesh/parts.h"
-#include "scene/framing.h"
+#include "mesh/protocol.h"
+#include "support/sphere_views.h"
 #include "support/temp_folder.h"
 
 namespace {
@@ -27,29 +29,11 @@ using scene::TriangleMesh;
 const glm::dvec3 kMiddle(0.3, -0.2, 0.1);
 constexpr double kRadius = 0.5;
 
-/// Around the sphere, from `from` on Fibonacci's spiral.
 std::vector<Camera> cameras_around(int count) {
-    std::vector<Camera> cameras;
-    for (int i = 0; i < count; ++i) {
-        const double z = 1 - (2 * i + 1.0) / count, turn = i * 2.39996;
-        const glm::dvec3 to(std::sqrt(1 - z * z) * std::cos(turn), std::sqrt(1 - z * z) * std::sin(turn), z);
-        cameras.push_back(scene::look_at(kMiddle + 2.0 * to, kMiddle, {0, 0, 1}, 160, 120));
-    }
-    return cameras;
+    return test::cameras_around(kMiddle, count);
 }
-
-/// View z of the sphere's front.
 Image sphere_depth(const Camera& camera) {
-    Image depth(camera.width, camera.height, 1);
-    const glm::dvec3 middle = camera.rotation * kMiddle + camera.translation;
-    for (int y = 0; y < camera.height; ++y)
-        for (int x = 0; x < camera.width; ++x) {
-            const glm::dvec3 ray((x + 0.5 - camera.cx) / camera.fx, (y + 0.5 - camera.cy) / camera.fy, 1);
-            const double a = glm::dot(ray, ray), b = glm::dot(ray, middle);
-            const double root = b * b - a * (glm::dot(middle, middle) - kRadius * kRadius);
-            if (root > 0) *depth.at(x, y) = float((b - std::sqrt(root)) / a);
-        }
-    return depth;
+    return test::sphere_depth(camera, kMiddle, kRadius);
 }
 
 mesh::Fused fused_sphere(int views, double voxel) {
@@ -119,6 +103,9 @@ TEST(Fusion, RefusesWhatItCannotHold) {
     };
     EXPECT_THROW(fuse(empty, {}), InputError);
     EXPECT_THROW(fuse(depth, {.voxel = 1e-8}), InputError);
+    // Known before the blocks are there.
+    test::expect_error<InputError>([&] { fuse(depth, {.voxel = 1e-5, .most_bytes = 1 << 20}); },
+                                   {"voxels of 1e-05 are too small", "22.1 MB or more, of at most 1.05 MB"});
     EXPECT_THROW(fuse(depth, {.voxel = 0.02, .most_bytes = 100000}), InputError);
 }
 
@@ -149,7 +136,8 @@ TEST(Fusion, ColorsAreThoseOfThePictures) {
         return image;
     };
     mesh::set_colors(
-        m, cameras, [&](size_t i) -> const Image& { return depths[i]; }, picture, 0.05);
+        m, cameras, [&](size_t i) -> const Image& { return depths[i]; }, picture,
+        [](const glm::dvec3&) { return 0.05; });
     ASSERT_EQ(m.colors.size(), m.positions.size());
     size_t wrong = 0;
     for (size_t i = 0; i < m.colors.size(); ++i)
@@ -268,21 +256,57 @@ scene::MeshScene scene_of(const TriangleMesh& m) {
 
 TEST(MeshDistance, OfParallelSquares) {
     const mesh::Surface a(scene_of(square(1, 0))), b(scene_of(square(1, 0.25f)));
-    const mesh::SurfaceDifference d = mesh::difference(a, b, 0.2, 1000);
+    const mesh::SurfaceDifference d = mesh::difference(a, b, {0.2, 1000, 1000});
     EXPECT_NEAR(d.accuracy, 0.25, 1e-6);
     EXPECT_NEAR(d.completeness, 0.25, 1e-6);
     EXPECT_NEAR(d.normal_error, 0, 1e-4);
     EXPECT_EQ(d.f_score(), 0);
-    EXPECT_NEAR(mesh::difference(a, b, 0.3, 1000).f_score(), 1, 1e-9);
+    EXPECT_NEAR(mesh::difference(a, b, {0.3, 1000, 1000}).f_score(), 1, 1e-9);
     // Half of B is there, and all of A is right.
     TriangleMesh two = square(1, 0);
     TriangleMesh far = square(1, 10);
     add(two, far);
-    const mesh::SurfaceDifference half = mesh::difference(a, mesh::Surface(scene_of(two)), 0.01, 1000);
+    const mesh::SurfaceDifference half =
+        mesh::difference(a, mesh::Surface(scene_of(two)), {0.01, 1000, 1000});
     EXPECT_NEAR(half.precision, 1, 1e-9);
     EXPECT_NEAR(half.recall, 0.5, 0.01);
     EXPECT_NEAR(half.completeness, 5, 0.1);
     EXPECT_THROW(mesh::Surface{scene::MeshScene()}, InputError);
+}
+
+TEST(MeshDistance, FromAScan) {
+    // Two points above the square, and one that is far from it.
+    const mesh::Surface a(scene_of(square(1, 0)));
+    const mesh::Surface scan(std::vector<glm::dvec3>{{0.25, 0.5, 0.25}, {0.75, 0.5, 0.25}, {0.5, 0.5, 30}});
+    EXPECT_EQ(scan.size(), 3u);
+    const auto compared = [&](double farthest) {
+        return mesh::difference(a, scan,
+                                {.threshold = 0.3, .points_a = 1000, .points_b = 3, .farthest = farthest});
+    };
+    const mesh::SurfaceDifference all = compared(mesh::kAllDistances), near = compared(20);
+    EXPECT_NEAR(all.completeness, (0.25 + 0.25 + 30) / 3, 1e-9);
+    EXPECT_NEAR(near.completeness, 0.25, 1e-9);
+    EXPECT_NEAR(near.recall, 2.0 / 3, 1e-9);
+    EXPECT_TRUE(std::isnan(near.normal_error));
+    EXPECT_TRUE(std::isnan(compared(0.1).completeness));
+    // From the square to the nearer of two points.
+    EXPECT_NEAR(near.accuracy, 0.38, 0.02);
+}
+
+TEST(MeshDistance, ByTheProtocolsOfBenchmarks) {
+    const mesh::Surface a(scene_of(square(3, 0)));
+    const mesh::Protocol dtu = mesh::protocol_named("dtu");
+    EXPECT_EQ(dtu.farthest, 20);
+    EXPECT_EQ(mesh::points_at(a, dtu.spacing), 225u);
+    const mesh::Protocol truck = mesh::protocol_named("tanks-and-temples:Truck");
+    EXPECT_EQ(truck.threshold, 0.005);
+    EXPECT_EQ(truck.spacing, 0.0025);
+    for (const char* name : {"DTU", "tanks-and-temples", "tanks-and-temples:truck", ""})
+        test::expect_error<InputError>([&] { mesh::protocol_named(name); },
+                                       {"--protocol", "Ignatius, Meetingroom"});
+    test::expect_error<InputError>([&] { mesh::points_at(a, 1e-5); }, {"its unit is another"});
+    EXPECT_EQ(mesh::thinned({{0.125, 0.25, 0.5}, {-0.5, 0, 0}, {0.375, 0.75, 0.5}}, 1),
+              (std::vector<glm::dvec3>{{-0.5, 0, 0}, {0.25, 0.5, 0.5}}));
 }
 
 TEST(MeshDistance, IsThatToTheNearestTriangle) {

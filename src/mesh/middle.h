@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the cameras of a scene look at.
+#pragma once
+#include <span>
+
+#include "ewa/camera.h"
+#include "mesh/depth_map.h"
+#include "mesh/space.h"
+
+namespace ewa::mesh {
+
+/// The side of a usual voxel in pixels. One pixel gives four times as many triangles, which are no nearer to the surface.
+inline constexpr double kVoxelPixels = 2;
+
+/// The space of a scene with a background. The middle is the point that is nearest to the axes of all cameras, by the mean square. Axes
+/// that are almost parallel meet at the median depth. The radius is the median distance of the cameras from there. It is larger
+/// where less than a tenth of the pixels shows surfaces within. Views that show no surface do not matter. cameras: pinholes.
+Space space_of_views(std::span<const Camera> cameras, const DepthOfView& depth);
+
+/// kVoxelPixels times the side of a pixel on the surfaces within the radius, world units: the median over the pixels of all views. 0 if no
+/// view shows a surface. cameras: pinholes.
+double usual_voxel(std::span<const Camera> cameras, const DepthOfView& depth, const Space& space = {});
+
+}  // namespace ewa::mesh
