@@ -123,6 +123,7 @@ void App::handle_key(const KeyPress& press) {
         scale = std::max(kLeastScale, scale / kScaleStep);
     if (key == GLFW_KEY_EQUAL || key == GLFW_KEY_KP_ADD) scale = std::min(kMostScale, scale * kScaleStep);
     if (key == GLFW_KEY_C) toggle(settings.cameras);
+    if (key == GLFW_KEY_M) toggle(settings.measure);
     if (key == GLFW_KEY_V) shown_.change_comparison();
     navigation_.handle_key(press);
 }
@@ -147,11 +148,17 @@ void App::handle_mouse() {
         navigation_.view.zoom(io.MouseWheel);
         navigation_.leave_camera();
     }
-    if (ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left))
-        return shown_.ask_point({x - places.rendering.x, y - places.rendering.y});
-    if (navigation_.pointed_camera && ImGui::IsMouseReleased(ImGuiMouseButton_Left) &&
-        io.MouseDragMaxDistanceSqr[ImGuiMouseButton_Left] < kStillPixels * kStillPixels)
-        navigation_.go_to_camera(*navigation_.pointed_camera);
+    const glm::dvec2 at(x - places.rendering.x, y - places.rendering.y);
+    const bool clicked = ImGui::IsMouseReleased(ImGuiMouseButton_Left) &&
+                         io.MouseDragMaxDistanceSqr[ImGuiMouseButton_Left] < kStillPixels * kStillPixels;
+    if (state_.settings.measure) {
+        const bool inside =
+            at.x >= 0 && at.y >= 0 && at.x < places.rendering.width && at.y < places.rendering.height;
+        if (clicked && inside) shown_.ask_measured(at);
+        return;
+    }
+    if (ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left)) return shown_.ask_point(at);
+    if (navigation_.pointed_camera && clicked) navigation_.go_to_camera(*navigation_.pointed_camera);
 }
 
 void App::panel() {
@@ -193,6 +200,8 @@ void App::draw_overlays() {
     if (settings.cameras && scene.dataset)
         navigation_.pointed_camera = draw_cameras({*scene.dataset, shown_.camera(), places.rendering,
                                                    navigation_.camera_size, navigation_.at_camera});
+    if (!settings.measure) shown_.measurement = {};
+    draw_measurement(shown_.measurement, shown_.camera(), places.rendering);
     if (shown_.comparing()) draw_comparison(settings.comparison, places, settings.wipe);
     const Rectangle area = state_.picture_area();
     const std::optional<Headline> words = session_.headline();

@@ -42,17 +42,18 @@ std::array<float, 3> heat(float share) {
 }
 
 ByteImage picture_of(const Rendering& rendering, Mode mode) {
-    ByteImage picture = empty_picture(rendering.color.width, rendering.color.height);
+    ByteImage picture = empty_picture(rendering.alpha.width, rendering.alpha.height);
     const auto grey = [](float v) { return std::array<float, 3>{v, v, v}; };
-    if (mode == Mode::depth) {
+    if (mode == Mode::depth || mode == Mode::median_depth) {
+        const Image& seen = mode == Mode::depth ? rendering.depth : rendering.median_depth;
         std::vector<float> depths;
-        for (size_t i = 0; i < rendering.depth.pixels.size(); ++i)
-            if (rendering.alpha.pixels[i] >= 0.5f) depths.push_back(rendering.depth.pixels[i]);
+        for (size_t i = 0; i < seen.pixels.size(); ++i)
+            if (rendering.alpha.pixels[i] >= 0.5f && seen.pixels[i] > 0) depths.push_back(seen.pixels[i]);
         picture.dark = scene::quantile(depths, 0.02);
         picture.white = scene::quantile(depths, 0.98);
         const float range = picture.white - picture.dark;
         fill(picture, [&](size_t i) {
-            const float depth = rendering.depth.pixels[i];
+            const float depth = seen.pixels[i];
             if (!(depth > 0)) return grey(0);
             if (!(range > 0)) return grey(1);
             return grey(kDarkestDepth +
@@ -65,6 +66,13 @@ ByteImage picture_of(const Rendering& rendering, Mode mode) {
         picture.white = scene::quantile(counts, 0.99);
         const float scale = picture.white > 0 ? 1.0f / picture.white : 0.0f;
         fill(picture, [&](size_t i) { return heat(rendering.count.pixels[i] * scale); });
+    } else if (mode == Mode::normal) {
+        fill(picture, [n = rendering.normal.pixels.data()](size_t i) {
+            std::array<float, 3> rgb{n[3 * i], n[3 * i + 1], n[3 * i + 2]};
+            if (rgb == std::array<float, 3>{}) return rgb;
+            for (float& v : rgb) v = 0.5f + 0.5f * v;
+            return rgb;
+        });
     } else if (mode == Mode::opacity) {
         fill(picture, [&](size_t i) { return grey(rendering.alpha.pixels[i]); });
     } else {

@@ -9,7 +9,8 @@
 
 namespace ewa::viewer {
 
-enum class Mode { color, depth, opacity, count, ellipsoids };
+enum class Mode { color, depth, opacity, count, ellipsoids, median_depth, normal };
+inline constexpr int kModes = int(Mode::normal) + 1;
 
 /// Width and height in px.
 struct Size {
@@ -20,9 +21,9 @@ struct Size {
 struct ByteImage {
     int width = 0, height = 0;
     std::vector<uint8_t> rgba;
-    /// The value of white: a view z (world units) in depth mode, a number of splats in count mode.
+    /// The value of white: a view z (world units) in modes of depth, a number of splats in count mode.
     float white = 0;
-    /// The view z of kDarkestDepth, in depth mode.
+    /// The view z of kDarkestDepth, in modes of depth.
     float dark = 0;
 };
 
@@ -32,7 +33,7 @@ inline constexpr float kDarkestDepth = 0.1f;
 /// Clamps and rounds as save_image does for a PNG. Depth goes from kDarkestDepth at its 2nd percentile to white
 /// at its 98th. Both are taken over pixels that are at least half opaque, so that a few outliers do not reduce
 /// the contrast. Depth is black where there is no splat. The count goes from black over red and yellow to white
-/// at its 99th percentile.
+/// at its 99th percentile. A normal's -1 to 1 become 0 to 1, and no surface is black.
 ByteImage picture_of(const Rendering& rendering, Mode mode);
 
 /// Converts RGB, or RGBA blended over the background.

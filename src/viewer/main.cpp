@@ -49,11 +49,10 @@ struct Arguments {
     Startup startup;
 };
 
-const std::map<std::string, Mode> kModes = {{"color", Mode::color},
-                                            {"depth", Mode::depth},
-                                            {"alpha", Mode::opacity},
-                                            {"count", Mode::count},
-                                            {"ellipsoids", Mode::ellipsoids}};
+const std::map<std::string, Mode> kModes = {
+    {"color", Mode::color},  {"depth", Mode::depth},           {"alpha", Mode::opacity},
+    {"count", Mode::count},  {"ellipsoids", Mode::ellipsoids}, {"median-depth", Mode::median_depth},
+    {"normal", Mode::normal}};
 const std::map<std::string, Comparison> kComparisons = {{"none", Comparison::none},
                                                         {"beside", Comparison::beside},
                                                         {"wipe", Comparison::wipe},
@@ -272,7 +271,7 @@ void add_options(CLI::App& app, Arguments& arguments) {
     option("--cameras", arguments.cameras, "DATASET", "Dataset whose cameras to show and to look through");
     option("--frame", arguments.frame, "I|NAME",
            "The camera to start from: its index in name order, or its name (0)");
-    option("--mode", startup.settings.look.mode, "color|depth|alpha|count|ellipsoids",
+    option("--mode", startup.settings.look.mode, "color|depth|alpha|count|ellipsoids|median-depth|normal",
            "What to show; count is the splats per pixel")
         ->transform(one_of(kModes));
     option("--compare", startup.settings.comparison, "none|beside|wipe|difference",

@@ -67,7 +67,7 @@ void Navigation::handle_number(size_t number, const KeyPress& press) {
         if (const auto saved = find(number); saved != views.end()) return go_to(*saved);
         const std::string name = std::to_string(number);
         state_.say("there is no view " + name + "; Ctrl + " + name + " saves one");
-    } else if (number <= 5) {
+    } else if (number <= size_t(kModes)) {
         state_.settings.look.mode = Mode(number - 1);
     }
 }

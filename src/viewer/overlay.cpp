@@ -109,7 +109,7 @@ float centered_text(ImDrawList& list, ImFont* font, float size, ImU32 color, con
 }  // namespace
 
 void draw_help(bool& open) {
-    static const std::array<std::array<const char*, 2>, 28> rows{
+    static const std::array<std::array<const char*, 2>, 29> rows{
         {{"left drag", "orbit the scene"},
          {"Ctrl + left drag", "look around"},
          {"right or middle drag", "move sideways"},
@@ -123,9 +123,10 @@ void draw_help(bool& open) {
          {"R", "return to the first view"},
          {"F", "show the whole scene from the front"},
          {"", ""},
-         {"1 2 3 4 5", "colour, depth, opacity, splats per pixel, ellipsoids"},
+         {"1 to 7", "colour, depth, opacity, splats per pixel, ellipsoids, median depth, normals"},
          {"- +", "make splats smaller, larger"},
          {"C", "show cameras; a click goes to one"},
+         {"M", "measure: click two points"},
          {"left right", "go to the previous, next camera"},
          {"G", "go to the nearest camera"},
          {"V", "compare with the image: beside, wipe, difference"},
@@ -186,6 +187,27 @@ std::optional<int> draw_cameras(const CamerasShown& cameras) {
               cameras.dataset.frames[size_t(*pointed)].name.c_str());
     }
     return pointed;
+}
+
+void draw_measurement(const Measurement& measurement, const Camera& view, const Rectangle& place) {
+    ImDrawList& list = *ImGui::GetBackgroundDrawList();
+    list.PushClipRect(gui_point(place.x, place.y), gui_point(place.x + place.width, place.y + place.height));
+    const auto on_screen = [&](const glm::dvec2& pixel) {
+        return gui_point(pixel.x + place.x, pixel.y + place.y);
+    };
+    constexpr float kMark = 5;
+    if (measurement.complete())
+        if (const auto line = projected(Segment{measurement.points[0], measurement.points[1]}, view)) {
+            const ImVec2 a = on_screen((*line)[0]), b = on_screen((*line)[1]);
+            list.AddLine(a, b, kPointedColor, 2);
+            label(list, {(a.x + b.x) / 2 + 2 * kMark, (a.y + b.y) / 2}, measurement.label().c_str());
+        }
+    for (const glm::dvec3& point : measurement.points)
+        if (const auto pixel = projected(point, view)) {
+            list.AddCircle(on_screen(*pixel), kMark + 1, kShadowColor, 0, 3);
+            list.AddCircle(on_screen(*pixel), kMark, kPointedColor, 0, 2);
+        }
+    list.PopClipRect();
 }
 
 void draw_comparison(Comparison comparison, const Arrangement& arrangement, float wipe) {

@@ -9,6 +9,7 @@
 #include "ewa/dataset.h"
 #include "viewer/file_dialog.h"
 #include "viewer/layout.h"
+#include "viewer/measurement.h"
 
 namespace ewa::viewer {
 
@@ -24,6 +25,9 @@ struct CamerasShown {
 
 /// Draws the frustum of each camera. Returns the one under the pointer, which also shows its name.
 std::optional<int> draw_cameras(const CamerasShown& cameras);
+
+/// Marks the points that are measured, with their distance. view: of the size of `place`.
+void draw_measurement(const Measurement& measurement, const Camera& view, const Rectangle& place);
 
 /// Labels both images. A wipe also has a border, at the share `wipe` of the image's width.
 void draw_comparison(Comparison comparison, const Arrangement& arrangement, float wipe);

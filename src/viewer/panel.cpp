@@ -56,7 +56,7 @@ void edit_background(const PanelFacts& facts, Look& look) {
         ImGui::TextUnformatted("background: the run's sky");
     else if (look.mode == Mode::color || look.mode == Mode::ellipsoids)
         ImGui::ColorEdit3("background", look.background.data(), ImGuiColorEditFlags_NoInputs);
-    else if (look.mode == Mode::depth && shown)
+    else if ((look.mode == Mode::depth || look.mode == Mode::median_depth) && shown)
         text_row("dark %.4g to white %.4g", double(facts.picture->picture.dark),
                  double(facts.picture->picture.white));
     else if (look.mode == Mode::count && shown)
@@ -67,7 +67,8 @@ void edit_background(const PanelFacts& facts, Look& look) {
 
 void edit_look(const PanelFacts& facts, Look& look) {
     int mode = int(look.mode);
-    if (ImGui::Combo("mode", &mode, "colour\0depth\0opacity\0splats per pixel\0ellipsoids\0"))
+    if (ImGui::Combo("mode", &mode,
+                     "colour\0depth\0opacity\0splats per pixel\0ellipsoids\0median depth\0normals\0"))
         look.mode = Mode(mode);
     edit_background(facts, look);
     ImGui::SliderFloat("splat scale", &look.splat_scale, 0.05f, 2.0f, "%.2f", ImGuiSliderFlags_AlwaysClamp);
@@ -201,6 +202,7 @@ void draw_rows(const PanelFacts& facts, PanelSettings& settings, PanelActions& a
     ImGui::Checkbox("turntable", &settings.turntable);
     ImGui::SameLine();
     ImGui::Checkbox("parallel rays", &settings.parallel);
+    ImGui::Checkbox("measure: click two points", &settings.measure);
     const bool trainable = facts.scene.dataset && !facts.scene.path.empty() && facts.scene.points;
     if ((facts.run || trainable) && ImGui::CollapsingHeader("Training", ImGuiTreeNodeFlags_DefaultOpen))
         draw_training(facts, settings, actions);

@@ -42,6 +42,7 @@ struct PanelSettings {
     float gain = 4;     // factor of the difference image
     bool cameras = false, turntable = false;
     bool parallel = false;   // the picture has parallel rays
+    bool measure = false;    // clicks choose points, whose distance is shown
     float film_seconds = 2;  // from one view to the next
     float text_scale = 1;    // times the size that the monitor asks for
     int train_steps = 0;     // of a training that the window starts

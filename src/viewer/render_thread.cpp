@@ -17,7 +17,8 @@ constexpr int kProbeSide = 256;  // px of the depth image that a point is read f
 
 RenderOptions options_of(const Look& look) {
     RenderOptions options{look.background, look.kernel, look.sh_degree};
-    options.points = look.points;
+    // Spheres have no surfaces of splats.
+    options.points = look.points && look.mode != Mode::median_depth && look.mode != Mode::normal;
     options.nearest = look.nearest;
     options.sky = look.sky;
     return options;
@@ -27,6 +28,8 @@ RenderOptions options_of(const Look& look) {
 Drawing drawing_for(Mode mode) {
     if (mode == Mode::depth) return Drawing::depth;
     if (mode == Mode::count) return Drawing::count;
+    if (mode == Mode::median_depth) return Drawing::median_depth;
+    if (mode == Mode::normal) return Drawing::normal;
     return mode == Mode::ellipsoids ? Drawing::ellipsoids : Drawing::color;
 }
 
@@ -37,6 +40,8 @@ void save(const std::filesystem::path& file, const Rendering& rendering, const B
     if (exr && mode == Mode::depth) return save_image(file, rendering.depth);
     if (exr && mode == Mode::count) return save_image(file, rendering.count);
     if (exr && mode == Mode::opacity) return save_image(file, rendering.alpha);
+    if (exr && mode == Mode::median_depth) return save_image(file, rendering.median_depth);
+    if (exr && mode == Mode::normal) return save_image(file, rendering.normal);
     if (exr) return save_image(file, with_alpha(rendering.color, rendering.alpha));
     Image image(picture.width, picture.height, 3);
     for (size_t i = 0; i < image.pixels.size(); ++i)
@@ -65,9 +70,9 @@ void RenderThread::ask(const RenderRequest& request) {
     wake_.notify_one();
 }
 
-uint64_t RenderThread::ask_point(const Camera& camera, const glm::dvec2& pixel) {
+uint64_t RenderThread::ask_point(const Camera& camera, const glm::dvec2& pixel, bool exact) {
     const std::lock_guard lock(mutex_);
-    next_.probe = Probe{camera, pixel, ++probes_};
+    next_.probe = Probe{camera, pixel, exact, ++probes_};
     wake_.notify_one();
     return probes_;
 }
@@ -197,15 +202,15 @@ std::shared_ptr<const RenderedFrame> RenderThread::draw(const RenderRequest& req
 
 std::optional<glm::dvec3> RenderThread::point_at(const Probe& probe) {
     const Camera& full = probe.camera;
-    const int divisor = std::max(1, std::min(full.width, full.height) / kProbeSide);
+    const int divisor = probe.exact ? 1 : std::max(1, std::min(full.width, full.height) / kProbeSide);
     const Camera camera = downscale(full, divisor);
-    DrawOptions options{{}, Drawing::depth, 1};
+    DrawOptions options{{}, Drawing::median_depth, 1};
     if (densities_are_up_) options.render.kernel = Footprint::density;
-    const Rendering rendering = renderer_->render(camera, options);
+    const Image depth = renderer_->render(camera, options).median_depth;
     const int x = std::clamp(int(probe.pixel.x * camera.width / full.width), 0, camera.width - 1);
     const int y = std::clamp(int(probe.pixel.y * camera.height / full.height), 0, camera.height - 1);
-    if (!(*rendering.alpha.at(x, y) >= 0.5f)) return std::nullopt;
-    return world_point(camera, x + 0.5, y + 0.5, *rendering.depth.at(x, y));
+    if (!(*depth.at(x, y) > 0)) return std::nullopt;
+    return world_point(camera, x + 0.5, y + 0.5, *depth.at(x, y));
 }
 
 /// Reports the exception that is being handled.

@@ -66,9 +66,9 @@ class RenderThread {
     uint64_t set_scene(std::shared_ptr<const Gaussians> gaussians);
     /// Replaces a waiting request that has no file. The frame that is being rendered is finished first.
     void ask(const RenderRequest& request);
-    /// Asks for the point at a pixel. News::point has it once News::points is the returned number. Only the
-    /// last of several waiting requests is answered.
-    uint64_t ask_point(const Camera& camera, const glm::dvec2& pixel);
+    /// Asks for the point on the surface at a pixel, by its median depth. News::point has it once News::points is the returned
+    /// number. Only the last of several waiting requests is answered. exact: at full resolution, which takes a frame's time.
+    uint64_t ask_point(const Camera& camera, const glm::dvec2& pixel, bool exact = false);
 
     /// Asks for the colours of a camera at its own size. News::full has them once its number is the returned one. Only
     /// the last of several waiting requests is answered.
@@ -89,6 +89,7 @@ class RenderThread {
     struct Probe {
         Camera camera;
         glm::dvec2 pixel{0};
+        bool exact = false;
         uint64_t number = 0;
     };
     struct Full {

@@ -130,8 +130,8 @@ uint64_t Renders::write(const Camera& camera, const Look& look, const std::files
     return asked_.serial;
 }
 
-void Renders::ask_point(const Camera& camera, const glm::dvec2& pixel) {
-    points_asked_ = thread_.ask_point(camera, pixel);
+void Renders::ask_point(const Camera& camera, const glm::dvec2& pixel, bool exact) {
+    points_asked_ = thread_.ask_point(camera, pixel, exact);
 }
 
 Renders::News Renders::take() {

@@ -84,7 +84,7 @@ class Renders {
     /// Renders the view and writes it to a file. Returns the serial of the request.
     uint64_t write(const Camera& camera, const Look& look, const std::filesystem::path& file);
     /// Asks for the point under a pixel; News::point has the answer.
-    void ask_point(const Camera& camera, const glm::dvec2& pixel);
+    void ask_point(const Camera& camera, const glm::dvec2& pixel, bool exact);
 
     /// Asks for the colours of a camera at its own size, as RenderThread::ask_full().
     uint64_t ask_full(const Camera& camera, const Look& look) { return thread_.ask_full(camera, look); }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "viewer/shown.h"
 
+#include <cstdio>
 #include <exception>
 
 #include "scene/framing.h"
@@ -29,6 +30,7 @@ Shown::Shown(ViewState& state, Navigation& navigation)
 void Shown::enter_scene() {
     renders.set_scene(state_.scene.gaussians);
     images_.forget_scene();
+    measurement = {};
     quality_.forget();
 }
 
@@ -40,19 +42,38 @@ void Shown::take_renders() {
         navigation_.film.reset();
         if (state_.message.note != reason(news.failure)) state_.say(reason(news.failure));
     }
-    if (news.point_answered) {
-        if (news.point) {
-            navigation_.view.focus(*news.point);
-            navigation_.leave_camera();
-        } else {
-            state_.say("no splat is opaque enough here to look at");
-        }
-        state_.redraw(Loop::kRedraws);
-    }
+    if (news.point_answered) take_point(news.point);
     for (const auto& file : news.written)
         if (!navigation_.film) state_.say("wrote " + std::filesystem::absolute(file).string());
     quality_.take(news.full);
     if (news.frame) state_.redraw();
+}
+
+void Shown::take_point(const std::optional<glm::dvec3>& point) {
+    state_.redraw(Loop::kRedraws);
+    if (!point) {
+        state_.say(measuring_ ? "no splat is opaque enough here to measure"
+                              : "no splat is opaque enough here to look at");
+    } else if (measuring_) {
+        measurement.add(*point);
+        if (!measurement.complete()) return;
+        state_.say(measurement.text());
+        std::puts(measurement.text().c_str());  // to be copied
+        std::fflush(stdout);
+    } else {
+        navigation_.view.focus(*point);
+        navigation_.leave_camera();
+    }
+}
+
+void Shown::ask_point(const glm::dvec2& pixel) {
+    measuring_ = false;
+    renders.ask_point(camera(), pixel, false);
+}
+
+void Shown::ask_measured(const glm::dvec2& pixel) {
+    measuring_ = true;
+    renders.ask_point(camera(), pixel, true);
 }
 
 void Shown::take_comparison(Presenter& presenter) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "viewer/comparison.h"
+#include "viewer/measurement.h"
 #include "viewer/navigation.h"
 #include "viewer/renders.h"
 #include "viewer/screen.h"
@@ -25,7 +26,9 @@ class Shown {
     void take_comparison(Presenter& presenter);
     /// Asks for the view, unless the window is minimised, or a film has cameras of its own.
     void ask();
-    void ask_point(const glm::dvec2& pixel) { renders.ask_point(camera(), pixel); }
+    void ask_point(const glm::dvec2& pixel);
+    /// The point becomes one of `measurement`.
+    void ask_measured(const glm::dvec2& pixel);
     /// Writes the render alone, in floating point.
     void write_exr();
 
@@ -55,8 +58,10 @@ class Shown {
     const std::optional<double>& psnr();  // for the panel, dB
 
     Renders renders;
+    Measurement measurement;
 
   private:
+    void take_point(const std::optional<glm::dvec3>& point);
     std::optional<Camera> requested_camera() const;
     std::optional<ComparisonRequest> comparison_wanted() const;
     bool full_colours() const;  // the last frame shows them, as asked
@@ -65,6 +70,7 @@ class Shown {
     Navigation& navigation_;
     std::shared_ptr<const ByteImage> picture_;  // the presenter's: a render or a difference
     bool difference_ = false;
+    bool measuring_ = false;      // the point that is asked for is to be measured
     std::optional<double> psnr_;  // in the panel
     ImageComparison images_;
     ViewQuality quality_;

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The window under real key and mouse events.
+#include <cstdio>
 #include <fstream>
+#include <glm/geometric.hpp>
 #include <random>
 
+#include "ewa/dataset.h"
+#include "scene/frustum.h"
 #include "viewer/font.h"
 #include "viewer/session.h"
 
@@ -200,6 +204,52 @@ TEST_F(Input, TheMouseTurnsMovesAndZooms) {
     session.send("key r");
     EXPECT_EQ(largest_difference(screenshot(session), first), 0) << "back to the start";
     expect_silent(session.quit());
+}
+
+/// Two clicks measure what lies under them.
+TEST_F(Input, MeasuresTheDistanceOfTwoPoints) {
+    expect_silent(run_ewa({"render", splats_, "--cameras", cameras_, "--frames", "1", "-o", folder_ / "depth",
+                           "--mode", "median-depth", "--format", "exr", "--quiet"}));
+    const Image depth = load_image(folder_ / "depth/1.exr");
+    const Camera camera = load_dataset(cameras_, {}).frames[1].camera;
+    std::vector<glm::ivec2> clicks;
+    for (const int y : {8, 24})
+        for (int x = 4; x < 44 && clicks.size() < size_t(1 + y / 24); ++x)
+            if (*depth.at(x, y) > 0) clicks.push_back({x, y});
+    ASSERT_EQ(clicks.size(), 2u);
+    std::vector<glm::dvec3> points;
+    for (const glm::ivec2& at : clicks)
+        points.push_back(world_point(camera, at.x + 0.5, at.y + 0.5, *depth.at(at.x, at.y)));
+
+    const XClient display(display_.name());
+    Session session(shots_, {splats_, "--cameras", cameras_, "--frame", "1", "--size", "48x32"});
+    ASSERT_TRUE(session.found());
+    const Image before = screenshot(session);
+    session.send("key F1 key F1 key m");  // no hint
+    for (const glm::ivec2& at : clicks)
+        act(session, {"mousemove " + std::to_string(at.x) + " " + std::to_string(at.y), "click 1"});
+    EXPECT_EQ(largest_difference(screenshot(session), before), 0) << "the view stays";
+    soon([&] { return !read_file(shots_ + "/out.txt").empty(); });
+    const std::string said = read_file(shots_ + "/out.txt");
+    double n[7] = {};
+    ASSERT_EQ(std::sscanf(said.c_str(), "distance %lf of the points %lf,%lf,%lf,%lf,%lf,%lf", &n[0], &n[1],
+                          &n[2], &n[3], &n[4], &n[5], &n[6]),
+              7)
+        << said;
+    for (int k = 0; k < 3; ++k) {
+        EXPECT_NEAR(n[1 + k], points[0][k], 1e-4);
+        EXPECT_NEAR(n[4 + k], points[1][k], 1e-4);
+    }
+    EXPECT_NEAR(n[0], glm::length(points[1] - points[0]), 1e-4);
+    // A mark on the display, which goes with the mode.
+    const auto window = display.window_titled("ewa");
+    ASSERT_TRUE(window);
+    EXPECT_GT(largest_difference(display.pixels_at_rest(*window), before), 0.1f);
+    session.send("key m");
+    soon([&] { return largest_difference(display.pixels(*window), before) <= kRounding; });
+    EXPECT_LE(largest_difference(display.pixels(*window), before), kRounding);
+    const Outcome outcome = session.quit();
+    expect_success(outcome);
 }
 
 /// Parallel rays show near and far splats at one scale, and the key goes back.

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "viewer/byte_image.h"
+#include "viewer/measurement.h"
 #include "viewer/renders.h"
 #include "viewer/view_camera.h"
 
@@ -253,6 +254,35 @@ TEST(Picture, CountsAreHeat) {
     EXPECT_EQ(count.rgba, (std::vector<uint8_t>{0, 0, 0, 255, 255, 255, 255, 255}));
     EXPECT_EQ(heat(1 / 3.0f)[0], 1.0f);
     EXPECT_EQ(heat(1 / 3.0f)[1], 0.0f);
+}
+
+TEST(Picture, SurfacesHaveNoColours) {
+    Rendering rendering;
+    rendering.alpha = Image(3, 1, 1);
+    rendering.alpha.pixels = {1.0f, 1.0f, 0.6f};
+    rendering.median_depth = Image(3, 1, 1);
+    rendering.median_depth.pixels = {4.0f, 2.0f, 0.0f};
+    const ByteImage depth = picture_of(rendering, Mode::median_depth);
+    EXPECT_EQ(depth.white, 2.0f);
+    EXPECT_EQ(depth.rgba[4], 255);
+    EXPECT_EQ(depth.rgba[8], 0) << "no splat takes half of the light";
+    rendering.normal = Image(3, 1, 3);
+    rendering.normal.pixels = {1, 0, 0, 0, -1, 0, 0, 0, 0};
+    EXPECT_EQ(picture_of(rendering, Mode::normal).rgba,
+              (std::vector<uint8_t>{255, 128, 128, 255, 128, 0, 128, 255, 0, 0, 0, 255}));
+}
+
+TEST(Measurement, IsOfTheLastTwoPoints) {
+    Measurement measurement;
+    measurement.add({1, 2, 3});
+    EXPECT_FALSE(measurement.complete());
+    measurement.add({1, 5, 7});
+    EXPECT_EQ(measurement.distance(), 5);
+    EXPECT_EQ(measurement.label(), "5");
+    EXPECT_EQ(measurement.text(), "distance 5 of the points 1,2,3,1,5,7");
+    measurement.add({0, 0, 0});
+    EXPECT_FALSE(measurement.complete());
+    EXPECT_EQ(measurement.points.size(), 1u);
 }
 
 TEST(Picture, EmptyDepthIsBlack) {

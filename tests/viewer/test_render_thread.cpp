@@ -65,6 +65,19 @@ TEST(RenderThread, DrawsTheSceneItWasGivenLast) {
     EXPECT_EQ(thread.ask_point(request(0).camera, {1, 1}), 2u);
     ASSERT_TRUE(soon([&] { return thread.take_news().points == 2; }));
     EXPECT_FALSE(thread.take_news().point) << "there is nothing in the corner";
+    // Of a large image, a point is exact or that of a smaller one.
+    Camera large = request(0).camera;
+    for (int* side : {&large.width, &large.height}) *side *= 30;
+    for (double* length : {&large.fx, &large.fy, &large.cx, &large.cy}) *length *= 30;
+    double x[2];
+    for (const bool exact : {false, true}) {
+        const uint64_t number = thread.ask_point(large, {600.2, 450.2}, exact);
+        ASSERT_TRUE(soon([&] { return thread.take_news().points == number; }));
+        ASSERT_TRUE(thread.take_news().point);
+        x[exact] = thread.take_news().point->x;
+    }
+    EXPECT_NEAR(x[1], 4 * 0.5 / 1200, 1e-6);
+    EXPECT_GT(x[0], 2 * x[1]);
 }
 
 TEST(RenderThread, FitsOpacitiesToTheKernel) {

@@ -35,7 +35,7 @@ TEST_F(Window, ShowsWhatRenderWritesWithItsOptions) {
 
 TEST_F(Window, EveryModeShowsSomethingElse) {
     std::vector<Image> pictures;
-    for (const char* mode : {"color", "depth", "alpha", "count", "ellipsoids"}) {
+    for (const char* mode : {"color", "depth", "alpha", "count", "ellipsoids", "median-depth", "normal"}) {
         pictures.push_back(shown({"--mode", mode}));
         EXPECT_GT(range_of(pictures.back()), 0.3f) << mode;
         for (size_t i = 0; i + 1 < pictures.size(); ++i)

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// The distance of two points on the surfaces, which clicks choose. Independent of the window.
+#pragma once
+#include <spdlog/fmt/fmt.h>
+
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+#include <string>
+#include <vector>
+
+namespace ewa::viewer {
+
+struct Measurement {
+    std::vector<glm::dvec3> points;  // world; at most two
+
+    /// A third point is the first of the next distance.
+    void add(const glm::dvec3& point) {
+        if (points.size() == 2) points.clear();
+        points.push_back(point);
+    }
+    bool complete() const { return points.size() == 2; }
+    double distance() const { return glm::length(points[1] - points[0]); }
+    std::string label() const { return fmt::format("{:.4g}", distance()); }
+    /// With the numbers that --scale-to of `ewa convert` takes. complete().
+    std::string text() const {
+        const glm::dvec3 &a = points[0], &b = points[1];
+        return fmt::format("distance {:.6g} of the points {:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g}",
+                           distance(), a.x, a.y, a.z, b.x, b.y, b.z);
+    }
+};
+
+}  // namespace ewa::viewer
