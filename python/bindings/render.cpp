@@ -25,13 +25,15 @@ namespace {
 
 /// The renders of one call. Arrays that were not asked for are None.
 struct Renders {
-    nb::object color, alpha, depth, count;
+    nb::object color, alpha, depth, count, median_depth, normal;
 };
 
 std::string renders_text(const Renders& renders) {
     std::string text = "Renders(";
-    for (const auto& [name, array] : {std::pair("color", &renders.color), std::pair("alpha", &renders.alpha),
-                                      std::pair("depth", &renders.depth), std::pair("count", &renders.count)})
+    for (const auto& [name, array] :
+         {std::pair("color", &renders.color), std::pair("alpha", &renders.alpha),
+          std::pair("depth", &renders.depth), std::pair("count", &renders.count),
+          std::pair("median_depth", &renders.median_depth), std::pair("normal", &renders.normal)})
         if (!array->is_none())
             text.append(text.back() == '(' ? "" : ", ")
                 .append(name)
@@ -97,11 +99,24 @@ class Planes {
 };
 
 Drawing drawing_of(const std::string& mode) {
-    static const core::Words<Drawing> modes{{"color", Drawing::color},
-                                            {"depth", Drawing::depth},
-                                            {"count", Drawing::count},
-                                            {"ellipsoids", Drawing::ellipsoids}};
+    static const core::Words<Drawing> modes{
+        {"color", Drawing::color},   {"depth", Drawing::depth}, {"median-depth", Drawing::median_depth},
+        {"normal", Drawing::normal}, {"count", Drawing::count}, {"ellipsoids", Drawing::ellipsoids}};
     return of_argument("mode", [&] { return core::value_of(modes, mode); });
+}
+
+/// The array that a mode adds to those of the colours; null: none.
+nb::object Renders::*array_of(Drawing drawing) {
+    if (drawing == Drawing::depth) return &Renders::depth;
+    if (drawing == Drawing::count) return &Renders::count;
+    if (drawing == Drawing::median_depth) return &Renders::median_depth;
+    return drawing == Drawing::normal ? &Renders::normal : nullptr;
+}
+
+const Image& image_of(const Rendering& rendering, Drawing drawing) {
+    if (drawing == Drawing::depth) return rendering.depth;
+    if (drawing == Drawing::count) return rendering.count;
+    return drawing == Drawing::median_depth ? rendering.median_depth : rendering.normal;
 }
 
 /// ewa.Renderer: a scene on the device.
@@ -133,12 +148,16 @@ class SceneRenderer {
         const size_t count = cameras.all.size();
         Planes color(count, width, height, 3), alpha(count, width, height, 1);
         std::optional<Planes> more;
-        if (options.drawing == Drawing::depth || options.drawing == Drawing::count)
-            more.emplace(count, width, height, 1);
+        nb::object Renders::*const added = array_of(options.drawing);
+        if (added) more.emplace(count, width, height, options.drawing == Drawing::normal ? 3 : 1);
         draw(cameras.all, options, color, alpha, more ? &*more : nullptr).warn_of(splats_);
-        Renders renders{color.array(cameras.batch), alpha.array(cameras.batch), nb::none(), nb::none()};
-        if (more)
-            (options.drawing == Drawing::depth ? renders.depth : renders.count) = more->array(cameras.batch);
+        Renders renders{color.array(cameras.batch),
+                        alpha.array(cameras.batch),
+                        nb::none(),
+                        nb::none(),
+                        nb::none(),
+                        nb::none()};
+        if (more) renders.*added = more->array(cameras.batch);
         return renders;
     }
 
@@ -147,11 +166,18 @@ class SceneRenderer {
                 Planes* more) {
         Doubts doubts;
         const DeviceWork work;
+        // A render of surfaces has no colours.
+        const bool surface = options.drawing == Drawing::median_depth || options.drawing == Drawing::normal;
+        DrawOptions first = options;
+        if (surface) first.drawing = Drawing::color;
         for (size_t i = 0; i < cameras.size(); ++i) {
-            const Rendering rendering = renderer_->render(cameras[i], options);
+            const Rendering rendering = renderer_->render(cameras[i], first);
             color.set(i, rendering.color);
             alpha.set(i, rendering.alpha);
-            if (more) more->set(i, options.drawing == Drawing::depth ? rendering.depth : rendering.count);
+            if (surface)
+                more->set(i, image_of(renderer_->render(cameras[i], options), options.drawing));
+            else if (more)
+                more->set(i, image_of(rendering, options.drawing));
             doubts.skipped = std::max(doubts.skipped, renderer_->skipped_nonfinite());
             const bool seen = std::ranges::any_of(rendering.alpha.pixels, [](float a) { return a > 0; });
             if (splats_ > 0 && !seen && !doubts.unseen) doubts.unseen = i;
@@ -180,15 +206,15 @@ Renders render(const Splats& splats, nb::handle viewmats, nb::handle intrinsics,
 #define EWA_CAMERA_TYPES                                                                                \
     "viewmats: numpy.typing.ArrayLike, Ks: numpy.typing.ArrayLike | None, width: int, height: int, *, " \
     "background: numpy.typing.ArrayLike | str = (0, 0, 0), "                                            \
-    "mode: typing.Literal['color', 'depth', 'count', 'ellipsoids'] = 'color', " EWA_LENS_TYPES          \
-    ", " EWA_READOUT_TYPES
+    "mode: typing.Literal['color', 'depth', 'median-depth', 'normal', 'count', 'ellipsoids'] = "        \
+    "'color', " EWA_LENS_TYPES ", " EWA_READOUT_TYPES
 #define EWA_SCENE_TYPES EWA_LOOK_TYPES ", sh_degree: int = 3"
 
 constexpr const char* kRenderHelp =
     "Renders through cameras of the OpenCV convention. viewmats [C, 4, 4] map the world to the camera, Ks "
     "[C, 3, 3] are in "
     "pixels, with pixel centres at +0.5. One matrix [4, 4] gives arrays without the first dimension. mode "
-    "\"depth\" and \"count\" "
+    "\"depth\", \"median-depth\", \"normal\" and \"count\" "
     "add these arrays. camera_model is the lens of all cameras. distortion has OpenCV's terms: k1 k2 p1 p2 "
     "k3 k4 k5 k6 s1 s2 s3 "
     "s4 for \"opencv\", k1 k2 k3 k4 for \"fisheye\", or the first of these. An equirectangular image shows "
@@ -219,18 +245,30 @@ void bind_render(nb::module_& module) {
         .def_ro("count", &Renders::count,
                 nb::for_getter(nb::sig("def count(self) -> numpy.typing.NDArray[numpy.float32] | None")),
                 "[C, H, W, 1], the number of splats blended. For mode \"count\".")
+        .def_ro(
+            "median_depth", &Renders::median_depth,
+            nb::for_getter(nb::sig("def median_depth(self) -> numpy.typing.NDArray[numpy.float32] | None")),
+            "[C, H, W, 1], the depth of the surface along the view's axis in world units, 0 where no splat "
+            "takes half of the light. For mode \"median-depth\".")
+        .def_ro("normal", &Renders::normal,
+                nb::for_getter(nb::sig("def normal(self) -> numpy.typing.NDArray[numpy.float32] | None")),
+                "[C, H, W, 3], the normals of the surfaces in world axes towards the eye, of length 1; 0 "
+                "where no "
+                "splat is. For mode \"normal\".")
         .def("__repr__", renders_text)
         .def("_repr_png_", renders_png, nb::sig("def _repr_png_(self) -> bytes"),
              "The colours side by side, at most eight renders, for notebooks.")
         .def(
             "__getstate__",
-            [](const Renders& r) { return nb::make_tuple(r.color, r.alpha, r.depth, r.count); },
+            [](const Renders& r) {
+                return nb::make_tuple(r.color, r.alpha, r.depth, r.count, r.median_depth, r.normal);
+            },
             nb::sig("def __getstate__(self) -> tuple[object, ...]"))
         .def(
             "__setstate__",
             [](Renders& r, const nb::tuple& state) {
-                if (state.size() != 4) throw nb::value_error("no state of Renders");
-                new (&r) Renders{state[0], state[1], state[2], state[3]};
+                if (state.size() != 6) throw nb::value_error("no state of Renders");
+                new (&r) Renders{state[0], state[1], state[2], state[3], state[4], state[5]};
             },
             nb::sig("def __setstate__(self, state: tuple[object, ...], /) -> None"));
     nb::class_<SceneRenderer>(

@@ -37,6 +37,34 @@ def test_one_splat_has_its_closed_form():
     assert renders.color[0, 0] == pytest.approx([0, 0, 1]) and renders.alpha[0, 0, 0] == 0 and renders.depth[0, 0, 0] == 0
 
 
+def test_a_flat_splat_is_a_surface():
+    viewmat, _, width, height = camera()
+    k = np.array([[60, 0, 32.5], [0, 60, 24.5], [0, 0, 1.0]])
+    # Flat across its z axis, which is turned by 30 degrees about x.
+    half = np.radians(15)
+    splat = ewa.Splats(
+        means=[[0, 0, 0]],
+        quats=[[np.cos(half), np.sin(half), 0, 0]],
+        log_scales=[[0, 0, -7]],
+        opacity_logits=[4],
+        sh=[[[1, 1, 1]]],
+    )
+    views = np.stack([viewmat, viewmat])
+    renders = ewa.render(splat, views, k, width, height, mode="normal")
+    assert renders.normal.shape == (2, 48, 64, 3) and renders.median_depth is None
+    z_axis = np.array([0, -np.sin(2 * half), np.cos(2 * half)])
+    toward_eye = z_axis * -np.sign((viewmat[:3, :3] @ z_axis) @ viewmat[:3, 3])
+    assert renders.normal[1, 24, 32] == pytest.approx(toward_eye, abs=1e-3)
+    depth = ewa.render(splat, viewmat, k, width, height, mode="median-depth").median_depth
+    assert depth.shape == (48, 64, 1)
+    assert depth[24, 32, 0] == pytest.approx(viewmat[2, 3], abs=1e-3)
+    plain = ewa.render(splat, viewmat, k, width, height)
+    assert np.array_equal(renders.color[0], plain.color) and np.array_equal(renders.alpha[0], plain.alpha)
+    assert plain.normal is None
+    with pytest.raises(ewa.InputError, match="integrator splat"):
+        ewa.render(splat, viewmat, k, width, height, mode="normal", integrator="ray")
+
+
 def test_a_batch_holds_the_single_renders():
     splats = make_splats()
     viewmats = np.stack([camera(d)[0] for d in (3, 4, 5)]).astype(np.float32)
