@@ -11,7 +11,7 @@
 namespace ewa::mesh {
 namespace {
 
-constexpr double kParallel = 1e-3;    // weight of the point at the median depth against an axis
+constexpr double kParallel = 1e-3;    // determinant of the mean projection across the axes: about 2 degrees
 constexpr double kLeastInside = 0.1;  // of the pixels
 
 /// Calls add(camera, point in the world, view z) for pixels of all views. Every view has the same say, whatever its size.
@@ -44,8 +44,8 @@ glm::dvec3 focus_of(std::span<const Camera> cameras, double median_depth) {
         sum += from_axis * camera.position();
         ahead += camera.position() + median_depth * axis;
     }
-    across += kParallel * double(cameras.size()) * glm::dmat3(1);
-    return glm::inverse(across) * (sum + kParallel * ahead);
+    const double share = 1 / double(cameras.size());
+    return glm::determinant(share * across) < kParallel ? share * ahead : glm::inverse(across) * sum;
 }
 
 }  // namespace
