@@ -202,13 +202,13 @@ void draw_rows(const PanelFacts& facts, PanelSettings& settings, PanelActions& a
     ImGui::Checkbox("turntable", &settings.turntable);
     ImGui::SameLine();
     ImGui::Checkbox("parallel rays", &settings.parallel);
-    ImGui::Checkbox("measure: click two points", &settings.measure);
     const bool trainable = facts.scene.dataset && !facts.scene.path.empty() && facts.scene.points;
     if ((facts.run || trainable) && ImGui::CollapsingHeader("Training", ImGuiTreeNodeFlags_DefaultOpen))
         draw_training(facts, settings, actions);
     if (facts.scene.dataset && ImGui::CollapsingHeader("Cameras", ImGuiTreeNodeFlags_DefaultOpen))
         edit_cameras(facts, settings, actions);
     if (ImGui::CollapsingHeader("Views and film")) edit_views(facts, settings, actions);
+    ImGui::Checkbox("measure: click two points", &settings.measure);
     show_details(facts);
     if (ImGui::CollapsingHeader("Window")) choose_text(settings);
     ImGui::PopItemWidth();
