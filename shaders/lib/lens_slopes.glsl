@@ -3,7 +3,11 @@
 #ifndef EWA_LIB_LENS_SLOPES
 #define EWA_LIB_LENS_SLOPES
 
+#ifdef EWA_PINHOLE
+const uint LENSES = LENSES_PINHOLE;
+#else
 layout(constant_id = SPEC_LENSES) const uint LENSES = 0u;
+#endif
 
 // The radial factor and its first and second derivative by w.
 vec3 brown_radial(float w) {

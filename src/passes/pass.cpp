@@ -52,11 +52,18 @@ const gpu::Pipeline& PassCache::pipeline(std::string_view shader, uint32_t group
                                     shared::SPEC_LENSES, shared::SPEC_WRAP})
         if (std::ranges::find(variant, optional, &gpu::SpecConstant::id) == variant.end())
             constants.push_back({optional, 0});
-    const gpu::Pipeline& made = device_.pipelines().get(
-        device_, std::string(shader), shader_code(shader, config_.texel_buffers), constants);
+    const bool pinhole =
+        std::ranges::find(constants, gpu::SpecConstant{shared::SPEC_LENSES, shared::LENSES_PINHOLE}) !=
+        constants.end();
+    std::span<const uint32_t> code =
+        pinhole ? pinhole_code(shader, config_.texel_buffers) : std::span<const uint32_t>();
+    const bool without_lenses = !code.empty();
+    if (!without_lenses) code = shader_code(shader, config_.texel_buffers);
+    const gpu::Pipeline& made = device_.pipelines().get(device_, std::string(shader), code, constants);
     const std::vector<uint32_t>& declared = made.reflection().constants;
     for (const gpu::SpecConstant& constant : variant)
-        if (!std::binary_search(declared.begin(), declared.end(), constant.id))
+        if (!std::binary_search(declared.begin(), declared.end(), constant.id) &&
+            !(without_lenses && constant.id == shared::SPEC_LENSES))
             throw std::logic_error("shader " + std::string(shader) + " has no specialisation constant " +
                                    std::to_string(constant.id));
     pipelines_.emplace(std::pair(shader, variant), &made);

@@ -37,6 +37,11 @@ std::span<const std::uint32_t> ewa::passes::shader_code(std::string_view name, b
     return found->second;
 }
 
+// A mutant is one of the whole module.
+std::span<const std::uint32_t> ewa::passes::pinhole_code(std::string_view, bool) {
+    return {};
+}
+
 std::vector<std::string_view> ewa::passes::shader_names() {
     std::vector<std::string_view> names;
     for (const auto& [name, words] : modules())
