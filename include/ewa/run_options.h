@@ -38,7 +38,8 @@ struct RunOptions {
     std::filesystem::path output;   // the run's folder; empty: see output_folder
     TrainOptions train{.strategy = Strategy::automatic,
                        .sh_degree = kAutomaticShDegree,
-                       .appearance = AppearanceModel::automatic};
+                       .appearance = AppearanceModel::automatic,
+                       .halvings = kAutomaticHalvings};
     std::string init =
         "sfm";  // first splats: "sfm" (the dataset's points), "random", or a file of splats or points
     std::filesystem::path

@@ -26,6 +26,10 @@ Strategy strategy_for(int steps);
 /// TrainOptions::sh_degree: 3, or 0 if the dataset says that no colour depends on the view.
 inline constexpr int kAutomaticShDegree = -1;
 
+/// Half the width and height at first, in short runs of adc with many training images, for their first hundred steps
+/// (docs/training.md#resolution). It replaces a resolution_every that is the default.
+inline constexpr int kAutomaticHalvings = -1;
+
 /// TrainOptions::max_splats: splat_cap() of ewa/training_needs.h chooses it.
 inline constexpr uint32_t kAutomaticMaxSplats = 0;
 
@@ -98,8 +102,8 @@ struct TrainOptions {
     int refine_start = 500, refine_stop = 15000, refine_every = 100;
     int opacity_reset_every = 3000;  // 0: never
     int sh_degree_every = 1000;      // the SH degree rises by one this often
-    int halvings = 0;                // the images' sides are halved this often at the start
-    int resolution_every = 3000;     // the sides are doubled again this often
+    int halvings = 0;  // the images' sides are halved this often at the start; or kAutomaticHalvings
+    int resolution_every = 3000;  // the sides are doubled again this often
     /// For a run that continues one of another number of steps: the SH degree and resolution that it reached stay.
     int least_sh_degree = 0, most_halvings = 64;
     uint32_t least_max_splats =

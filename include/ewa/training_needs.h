@@ -13,8 +13,8 @@
 
 namespace ewa {
 
-/// The options with concrete values for Strategy::automatic, kAutomaticShDegree and AppearanceModel::automatic. The last one
-/// reads up to 64 images of the training frames. Throws InputError (an image that cannot be read).
+/// The options with concrete values for Strategy::automatic, kAutomaticShDegree, kAutomaticHalvings and
+/// AppearanceModel::automatic. The last one reads up to 64 images of the training frames. Throws InputError (an image that cannot be read).
 TrainOptions resolve(TrainOptions options, const Dataset& dataset, const std::vector<int>& train_frames);
 
 /// The largest number of splats of a training, and why it is that.

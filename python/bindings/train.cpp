@@ -46,6 +46,7 @@ struct TrainerStart {
     bool own_start = false;  // the first splats are an argument
 
     void resolve_options() {
+        if (own_start && run.train.halvings == kAutomaticHalvings) run.train.halvings = 0;  // finished splats
         run.train = resolve(run.train, *dataset, frames);
         run.train.render.sh_degree = run.train.sh_degree;
     }

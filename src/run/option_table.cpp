@@ -79,6 +79,24 @@ RunOption sh_degree_option() {
     return option;
 }
 
+RunOption resolution_schedule_option() {
+    const Member<int> member = [](RunOptions& o) -> int& { return o.train.halvings; };
+    RunOption option =
+        member_option("resolution-schedule", "auto|N",
+                      "Start with the images' sides halved N times. Each tenth of the run doubles them. "
+                      "auto: once, for the first "
+                      "100 steps of adc's runs of at most 1,000 steps",
+                      kDecides, member, [](const std::string& text) {
+                          return text == "auto" ? kAutomaticHalvings : parse_within(text, 0, 6);
+                      });
+    option.before = "0";
+    option.get = [](const RunOptions& options) {
+        const int halvings = options.train.halvings;
+        return halvings == kAutomaticHalvings ? Json("auto") : Json(halvings);
+    };
+    return option;
+}
+
 RunOption max_splats_option() {
     constexpr uint32_t kMost = 1000000000;
     const Member<uint32_t> member = [](RunOptions& o) -> uint32_t& { return o.train.max_splats; };
@@ -309,11 +327,7 @@ std::vector<Row> rows() {
         {"Quality", "refine_poses", refine_poses_option()},
         {"Quality", "refine_focal", refine_focal_option()},
         {"Quality", "", rolling_shutter_option()},
-        {"Quality", "halvings",
-         number<int>(
-             "resolution-schedule", "N",
-             "Start with the images' sides halved N times. Each tenth of the run doubles them", kDecides,
-             [](RunOptions& o) -> int& { return o.train.halvings; }, 0, 6)},
+        {"Quality", "halvings", resolution_schedule_option()},
         {"Data", "",
          words(
              "init", "sfm|random|FILE",

@@ -131,6 +131,11 @@ int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, 
     take("steps", before);
     if (asked.strategy == Strategy::automatic) take("strategy", options);
     if (asked.appearance == AppearanceModel::automatic) take("appearance", options);
+    if (asked.halvings == kAutomaticHalvings) {
+        options.train.resolution_every = asked.resolution_every;
+        take("resolution-schedule", options);
+        take("resolution-every", options);
+    }
     options.train.measure_exposures = false;
     const int step = earlier.state.report.step;
     if (options.train.steps < step)

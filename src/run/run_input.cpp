@@ -399,6 +399,7 @@ RunInput load_run(const RunOptions& options) {
             fmt::format("appearance {}: {}{}", learned ? "ppisp" : "none", choice.reason,
                         learned ? "; --metrics cc_psnr compares held-out images without it" : ""));
     }
+    if (train.halvings == kAutomaticHalvings && options.init != "sfm") train.halvings = 0;  // finished splats
     train = resolve(train, input.dataset, input.split.train);
     train.render.sh_degree = train.sh_degree;
     input.options.output = output_folder(options);

@@ -35,6 +35,10 @@ constexpr double kLastFading = 0.1;
 // PPISP and bilateral grids: steps of a full run in which their rates rise, and the rates' first and last factor.
 constexpr double kPpispWarmUp = 500, kGridWarmUp = 1000, kLastAppearanceRate = 0.01;
 constexpr size_t kMostPhotosOfRate = 400;
+// With kAutomaticHalvings: how long the images of a run have half their sides, and the longest such run.
+constexpr int kCoarseSteps = 100, kLongestCoarseRun = 1000;
+constexpr double kMostCoarse = 0.4;   // of the steps
+constexpr int kMostTileRows = 16;     // px, of any device's tiles
 constexpr double kPruneShare = 0.75;  // of the steps: 0.55 gave no better images (docs/training.md)
 
 double decayed(double first, double last, double share) {
@@ -232,12 +236,38 @@ Schedule schedule_for(const TrainOptions& options, size_t photos) {
 
 namespace ewa {
 
+namespace {
+
+/// The few splats of the beginning cannot show what an image of half the size lacks. So that they are few, the image has no fewer
+/// pixels than there are points. Each band needs a row of tiles, also in the smaller image.
+bool starts_coarse(const TrainOptions& options, const Dataset& dataset,
+                   const std::vector<int>& train_frames) {
+    if (options.steps > train::kLongestCoarseRun || options.strategy != Strategy::adc ||
+        options.render.points || train_frames.size() <= size_t(options.few_photos) ||
+        dataset.points.positions.empty())
+        return false;
+    return std::ranges::all_of(train_frames, [&](int frame) {
+        const Camera& camera = dataset.frames[size_t(frame)].camera;
+        const int width = camera.width / 2, height = camera.height / 2;
+        return int64_t(width) * height >= int64_t(dataset.points.positions.size()) &&
+               height >= train::kMostTileRows * options.bands;
+    });
+}
+
+}  // namespace
+
 TrainOptions resolve(TrainOptions options, const Dataset& dataset, const std::vector<int>& train_frames) {
     const bool adc_asked_for = options.absolute_gradients || options.revised_opacity || options.render.points;
     if (options.strategy == Strategy::automatic)
         options.strategy = adc_asked_for ? Strategy::adc : strategy_for(options.steps);
     if (options.sh_degree == kAutomaticShDegree)
         options.sh_degree = dataset.color_depends_on_view ? kMaxShDegree : 0;
+    if (options.halvings == kAutomaticHalvings) {
+        options.halvings = starts_coarse(options, dataset, train_frames) ? 1 : 0;
+        if (options.halvings > 0 && options.resolution_every == TrainOptions().resolution_every)
+            options.resolution_every = int(
+                std::min(train::kMostCoarse, double(train::kCoarseSteps) / options.steps) * train::kFullRun);
+    }
     if (options.appearance == AppearanceModel::automatic)
         options.appearance = train::choose_appearance(options, dataset, train_frames).model;
     return options;

@@ -235,6 +235,37 @@ TEST(Run, IsNotReplacedUnlessAskedTo) {
     EXPECT_NE(file_bytes(folder / "o/splats.ply"), splats);
 }
 
+/// 280 steps start with images of half the size for 100 of them. 560 steps would do so for a smaller share.
+TEST(Run, WithMoreStepsKeepsTheSizesOfImagesThatItHadChosen) {
+    TempFolder folder;
+    RunOptions options = small_run(folder / "o");
+    options.train.strategy = Strategy::adc;
+    options.train.exposure = false;
+    options.train.few_photos = 1;
+    options.train.steps = 280;
+    options.eval_every = 0;
+    Recorder at_60(60);
+    EXPECT_TRUE(run_training(options, at_60).summary.interrupted);
+    const auto asked = json_of(folder / "o/config.json");
+    EXPECT_EQ(asked["resolution-schedule"], 1);
+    EXPECT_EQ(asked["resolution-every"], 10714);
+    options.resume = true;
+    options.train.steps = 560;
+    Recorder at_70(70);
+    run_training(options, at_70);
+    const auto kept = json_of(folder / "o/config.json");
+    EXPECT_EQ(kept["steps"], 560);
+    EXPECT_EQ(kept["resolution-schedule"], 1);
+    EXPECT_EQ(kept["resolution-every"], 10714);
+
+    options.force = true;
+    options.resume = false;
+    options.train.halvings = 0;
+    Recorder at_1(1);
+    run_training(options, at_1);
+    EXPECT_EQ(json_of(folder / "o/config.json")["resolution-schedule"], 0);
+}
+
 TEST(Run, RefusesOptionsThatExcludeEachOther) {
     TempFolder folder;
     RunOptions options = small_run(folder / "o");

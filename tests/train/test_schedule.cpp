@@ -8,6 +8,7 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <numeric>
 #include <set>
 #include <string>
 
@@ -276,6 +277,59 @@ TEST(Schedule, TheResolutionDoublesEachTenthOfTheRun) {
     options.steps = 3;  // a step at each
     EXPECT_EQ(schedule_for(options).halvings_at(1), 2);
     EXPECT_EQ(schedule_for(options).halvings_at(3), 0);
+}
+
+/// 17 images of 100x80, which have 2000 pixels once their sides are halved.
+Dataset dataset_of_points(size_t points) {
+    Dataset dataset;
+    dataset.frames.resize(17);
+    for (Frame& frame : dataset.frames) frame.camera.width = 100, frame.camera.height = 80;
+    dataset.points.positions.resize(points);
+    return dataset;
+}
+
+TEST(Schedule, ShortRunsOfAdcStartWithImagesOfHalfTheirSize) {
+    const Dataset dataset = dataset_of_points(2000);
+    std::vector<int> frames(17);
+    std::iota(frames.begin(), frames.end(), 0);
+    TrainOptions options;
+    options.halvings = kAutomaticHalvings;
+    options.strategy = Strategy::adc;
+    EXPECT_EQ(schedule_for(options).halvings_at(1), 0) << "before resolve";
+    const auto coarse = [&](int steps) {
+        options.steps = steps;
+        const Schedule s = schedule_for(resolve(options, dataset, frames));
+        int step = 1;
+        while (s.halvings_at(step) > 0) ++step;
+        return step - 1;
+    };
+    EXPECT_EQ(coarse(100), 40);
+    EXPECT_EQ(coarse(250), 100);
+    EXPECT_EQ(coarse(500), 100);
+    EXPECT_EQ(coarse(1000), 100);
+    EXPECT_EQ(coarse(1001), 0);
+
+    options.resolution_every = 6000;
+    EXPECT_EQ(coarse(500), 100) << "as asked for: a fifth";
+    options.resolution_every = 9000;
+    EXPECT_EQ(coarse(500), 150) << "as asked for";
+    options.resolution_every = TrainOptions().resolution_every;
+    options.steps = 500;
+    const auto halvings = [&](const TrainOptions& asked, const Dataset& of, const std::vector<int>& train) {
+        return resolve(asked, of, train).halvings;
+    };
+    EXPECT_EQ(halvings(options, dataset, frames), 1);
+    EXPECT_EQ(halvings(options, dataset_of_points(2001), frames), 0) << "more points than pixels";
+    EXPECT_EQ(halvings(options, dataset_of_points(0), frames), 0) << "no points";
+    EXPECT_EQ(halvings(options, dataset, std::vector<int>(frames.begin(), frames.end() - 1)), 0)
+        << "few photos";
+    options.strategy = Strategy::none;
+    EXPECT_EQ(halvings(options, dataset, frames), 0);
+    options.strategy = Strategy::mcmc;
+    EXPECT_EQ(halvings(options, dataset, frames), 0);
+    options.strategy = Strategy::adc;
+    options.halvings = 0;
+    EXPECT_EQ(halvings(options, dataset, frames), 0) << "as asked for";
 }
 
 /// A run of 1000 steps that goes on to 30000: neither its SH degree nor its resolution falls back.
