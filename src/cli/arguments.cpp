@@ -82,8 +82,8 @@ core::PixelSize size_of(const std::string& text) {
     const auto size = core::parse_size(text, kLargestSide);
     if (!size || uint64_t(size->width) * uint64_t(size->height) > kMostPixels)
         throw InputError(fmt::format(
-            "--size: '{}' is not a size such as 1280x720, of at most {} a side and {} million pixels", text,
-            kLargestSide, kMostPixels / 1'000'000));
+            "--size: '{}' is not a size such as 1280x720 or 4k, of at most {} a side and {} million pixels",
+            text, kLargestSide, kMostPixels / 1'000'000));
     return *size;
 }
 

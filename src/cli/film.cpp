@@ -8,10 +8,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <string>
+#include <string_view>
 
 #include "core/atomic_file.h"
 #include "core/process.h"
@@ -37,34 +39,60 @@ std::string last_line(const fs::path& log) {
 constexpr const char* kFilter =
     "crop=trunc(iw/2)*2:trunc(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv,format=yuv420p";
 
-std::vector<std::string> arguments_of(const fs::path& program, const fs::path& made, int width, int height) {
-    return {program.string(),
-            "-hide_banner",
-            "-loglevel",
-            "error",
-            "-y",
-            "-f",
-            "rawvideo",
-            "-pixel_format",
-            "rgba",
-            "-video_size",
-            fmt::format("{}x{}", width, height),
-            "-framerate",
-            std::to_string(kFilmRate),
-            "-i",
-            "pipe:0",
-            "-an",
-            "-vf",
-            kFilter,
-            "-colorspace",
-            "bt709",
-            "-color_primaries",
-            "bt709",
-            "-color_trc",
-            "bt709",
-            "-color_range",
-            "tv",
-            made.string()};
+/// Encoders of each codec, the best of those that need no special hardware first, with what makes them usable.
+struct Encoder {
+    std::string_view codec, name;
+    std::vector<std::string> options = {};
+};
+const std::vector<Encoder>& encoders() {
+    static const std::vector<Encoder> list = {
+        {"h264", "libx264"},
+        {"h264", "libopenh264"},
+        {"hevc",
+         "libx265",
+         {"-tag:v", "hvc1", "-x265-params", "log-level=error"}},  // the tag: for Apple's players
+        {"av1", "libsvtav1", {"-preset", "8", "-crf", "30"}},
+        {"av1", "libaom-av1", {"-cpu-used", "6", "-row-mt", "1", "-crf", "30"}},
+        {"av1", "librav1e", {"-speed", "8", "-qp", "80"}},
+        {"vp9", "libvpx-vp9", {"-row-mt", "1", "-crf", "31", "-b:v", "0"}}};
+    return list;
+}
+
+std::vector<std::string> arguments_of(const fs::path& program, const std::string& encoder,
+                                      const fs::path& made, int width, int height) {
+    std::vector<std::string> arguments = {program.string(),
+                                          "-hide_banner",
+                                          "-loglevel",
+                                          "error",
+                                          "-y",
+                                          "-f",
+                                          "rawvideo",
+                                          "-pixel_format",
+                                          "rgba",
+                                          "-video_size",
+                                          fmt::format("{}x{}", width, height),
+                                          "-framerate",
+                                          std::to_string(kFilmRate),
+                                          "-i",
+                                          "pipe:0",
+                                          "-an",
+                                          "-vf",
+                                          kFilter,
+                                          "-colorspace",
+                                          "bt709",
+                                          "-color_primaries",
+                                          "bt709",
+                                          "-color_trc",
+                                          "bt709",
+                                          "-color_range",
+                                          "tv"};
+    if (const auto known = std::ranges::find(encoders(), encoder, &Encoder::name);
+        known != encoders().end()) {
+        arguments.insert(arguments.end(), {"-c:v", encoder});
+        arguments.insert(arguments.end(), known->options.begin(), known->options.end());
+    }
+    arguments.push_back(made.string());
+    return arguments;
 }
 
 }  // namespace
@@ -82,7 +110,27 @@ fs::path find_ffmpeg() {
         "as -o, its frames are written as PNG files");
 }
 
-Film::Film(const fs::path& file, int width, int height)
+std::string find_encoder(const std::string& codec) {
+    if (codec.empty()) return {};
+    std::string listed;
+    core::run_program({.command = {find_ffmpeg().string(), "-hide_banner", "-loglevel", "error", "-encoders"},
+                       .environment = {},
+                       .log = {}},
+                      [&](std::string_view text) {
+                          listed += text;
+                          return true;
+                      });
+    std::string wanted;
+    for (const Encoder& encoder : encoders()) {
+        if (encoder.codec != codec) continue;
+        if (listed.find(" " + std::string(encoder.name) + " ") != std::string::npos)
+            return std::string(encoder.name);
+        wanted.append(wanted.empty() ? "" : ", ").append(encoder.name);
+    }
+    throw RunError("--codec " + codec + ": this ffmpeg has no encoder for it, such as " + wanted);
+}
+
+Film::Film(const fs::path& file, int width, int height, const std::string& encoder)
     : file_(file), folder_("ewa-film-"), made_(folder_.path() / ("film" + file.extension().string())) {
     if (width < 2 || height < 2) throw InputError("a film needs at least 2x2 pixels");
     const fs::path program = find_ffmpeg();
@@ -93,7 +141,7 @@ Film::Film(const fs::path& file, int width, int height)
     input_ = ends[0];
     const int log = open((folder_.path() / "log").c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
     try {
-        process_ = core::start_program(arguments_of(program, made_, width, height), {},
+        process_ = core::start_program(arguments_of(program, encoder, made_, width, height), {},
                                        {.input = ends[1], .output = -1, .errors = log});
     } catch (...) {
         for (const int descriptor : {ends[0], ends[1], log}) close(descriptor);

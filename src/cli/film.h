@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "core/folders.h"
@@ -19,14 +20,18 @@ bool is_film_name(const std::filesystem::path& path);
 /// The program ffmpeg in $PATH. Throws RunError that says what to install, and that a folder of PNGs needs none.
 std::filesystem::path find_ffmpeg();
 
+/// ffmpeg's encoder for h264, hevc, av1 or vp9. Empty: for an empty codec, of which ffmpeg chooses one by the file's name. Throws RunError if
+/// ffmpeg has none.
+std::string find_encoder(const std::string& codec);
+
 /// A film that is being written. ffmpeg runs as a process of its own, without a shell, and gets the frames on its
 /// standard input. It writes into a temporary folder; finish() moves the film to its place. The destructor ends an
 /// unfinished one and leaves nothing.
 class Film {
   public:
     /// file: its name decides the format. width, height: of each frame, px. An odd last row or column is cut, since
-    /// films have none. Throws RunError.
-    Film(const std::filesystem::path& file, int width, int height);
+    /// films have none. encoder: of find_encoder. Throws RunError.
+    Film(const std::filesystem::path& file, int width, int height, const std::string& encoder = {});
     ~Film();
     Film(const Film&) = delete;
     Film& operator=(const Film&) = delete;

@@ -14,6 +14,8 @@
 #include "cli/film.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
+#include "cli/render_output.h"
+#include "cli/render_picture.h"
 #include "cli/render_views.h"
 #include "cli/run_inputs.h"
 #include "core/text.h"
@@ -36,71 +38,68 @@ namespace fs = std::filesystem;
 
 struct RenderArguments {
     fs::path splats, cameras, output = "out/render";
-    std::string frames = "all", format = "png", mode = "color", lens = "auto";
+    std::string frames = "all", format = "png", mode = "color", lens = "auto", codec;
     LensUse lens_use = LensUse::automatic;  // of a dataset's cameras
     AppearanceArguments appearance;
     int test_every = 8, downscale = 1, max_width = 0;
     ViewsArguments views;
+    PictureArguments picture;
     DrawArguments draw;
     DeviceOptions device;
-    bool quiet = false;
+    bool contact_sheet = false, quiet = false;
     // The run that SPLATS names; empty: none.
     std::optional<live::Run> run;
     bool cameras_of_run = false;
 };
 
-/// Divides by the largest value and returns it: the value of white in a PNG.
-float normalize(Image& image) {
-    float largest = 0;
-    for (const float v : image.pixels) largest = std::max(largest, v);
-    if (largest > 0)
-        for (float& v : image.pixels) v /= largest;
-    return largest;
-}
-
-/// From -1 to 1 to what a file of 8 bits holds; no surface is black.
-void encode_normals(Image& normals) {
-    for (size_t i = 0; i < normals.pixels.size(); i += 3) {
-        float* n = &normals.pixels[i];
-        if (n[0] == 0 && n[1] == 0 && n[2] == 0) continue;
-        for (int c = 0; c < 3; ++c) n[c] = 0.5f + 0.5f * n[c];
+/// The scene, and the options to draw it with.
+Gaussians load_scene(const RenderArguments& arguments, RenderOptions& options) {
+    Gaussians gaussians = arguments.draw.load(arguments.splats, options);
+    if (arguments.picture.transparent) {
+        options.background = {0, 0, 0};
+        options.sky.reset();
     }
-}
-
-/// What to draw for --mode; opacity comes with colours.
-Drawing drawing_of(const RenderArguments& arguments) {
-    if (arguments.mode == "depth") return Drawing::depth;
-    if (arguments.mode == "median-depth") return Drawing::median_depth;
-    if (arguments.mode == "normal") return Drawing::normal;
-    return Drawing::color;
-}
-
-/// The image to save. remark: a fact that the file itself does not hold.
-Image chosen_image(Rendering&& rendering, const RenderArguments& arguments, std::string& remark) {
-    const bool exr = arguments.format == "exr";
-    if (arguments.mode == "alpha") return std::move(rendering.alpha);
-    if (arguments.mode == "color")
-        return exr ? with_alpha(rendering.color, rendering.alpha) : std::move(rendering.color);
-    if (arguments.mode == "normal") {
-        if (!exr) encode_normals(rendering.normal);
-        return std::move(rendering.normal);
-    }
-    Image& depth = arguments.mode == "depth" ? rendering.depth : rendering.median_depth;
-    if (!exr) remark = fmt::format("white is depth {:.6g}", normalize(depth));
-    return std::move(depth);
-}
-
-/// Saves what the camera shows.
-void save_view(const fs::path& file, const Camera& camera, const Image& image) {
-    if (scene::shows_all_around(camera))
-        save_panorama(file, image);
-    else
-        save_image(file, image);
+    return gaussians;
 }
 
 void note_skipped(Progress& progress, uint32_t skipped) {
     if (skipped > 0)
         progress.note("skipped " + core::counted(skipped, "splat") + " with a value that is not finite");
+}
+
+/// Renders the cameras into the files. appearances: of each, or none. path: whether the cameras are moments of one motion. Returns the exit status.
+int write_images(const RenderArguments& arguments, Renderer& renderer, std::vector<Camera> cameras,
+                 const std::vector<fs::path>& files, const std::vector<Appearance>& appearances, bool path,
+                 Progress& progress) {
+    std::optional<ContactSheet> sheet;
+    if (arguments.contact_sheet) {
+        std::ranges::transform(cameras, cameras.begin(), thumbnail_of);
+        sheet.emplace(cameras);
+    }
+    RenderOutput output({arguments.mode, arguments.format, arguments.picture.transparent}, files, progress,
+                        std::move(sheet));
+    PictureTaker taker(arguments.picture, renderer, drawing_of(arguments.mode), path);
+    for (size_t i = 0; i < cameras.size(); ++i) {
+        if (interrupted()) return kInterruptedStatus;
+        std::vector<Rendering> eyes = taker.take(cameras, i);
+        if (!appearances.empty() && arguments.mode == "color")
+            for (Rendering& eye : eyes) eye.color = with_appearance(std::move(eye.color), appearances[i]);
+        const bool panorama = eyes.size() == 1 && scene::shows_all_around(cameras[i]);
+        output.add(i, joined_eyes(std::move(eyes), arguments.picture.stereo), panorama);
+        if (cameras.size() > 1) progress.update(int(i) + 1);
+    }
+    output.finish();
+    note_skipped(progress, taker.skipped());
+    if (arguments.contact_sheet)
+        progress.note(
+            fmt::format("{}: {}", arguments.output.string(), core::counted(cameras.size(), "view")));
+    else if (files[0] == arguments.output)
+        progress.note(
+            fmt::format("{}: {}x{}", arguments.output.string(), cameras[0].width, cameras[0].height));
+    else
+        progress.note(fmt::format("{} {} in {}", core::counted(cameras.size(), "image"),
+                                  core::is_or_are(cameras.size()), arguments.output.string()));
+    return 0;
 }
 
 /// The file of each frame's render, in the output folder or as the one image that --output names.
@@ -112,10 +111,10 @@ std::vector<fs::path> files_of_frames(const RenderArguments& arguments, const Da
             "--output " + core::one_line(arguments.output.string()) +
             ": a film goes round the scene or along --views; the cameras of a dataset make images in a "
             "folder");
-    if (output == ViewsOutput::image && frames.size() > 1)
+    if (output == ViewsOutput::image && frames.size() > 1 && !arguments.contact_sheet)
         throw InputError(
-            fmt::format("--output {}: one image, and there are {} frames; choose one with --frames, or "
-                        "name a folder",
+            fmt::format("--output {}: one image, and there are {} frames; choose one with --frames, name a "
+                        "folder, or make a --contact-sheet",
                         core::one_line(arguments.output.string()), frames.size()));
     if (output == ViewsOutput::image) return {arguments.output};
     const std::vector<fs::path> names = report::picture_names(dataset.frames);
@@ -160,7 +159,7 @@ Camera of_frame(const LensArgument& lens, const Camera& frame, const Dataset& da
 
 int render_dataset_views(RenderArguments arguments) {
     RenderOptions options = arguments.draw.options();
-    const Gaussians gaussians = arguments.draw.load(arguments.splats, options);
+    const Gaussians gaussians = load_scene(arguments, options);
     Dataset dataset = load_cameras_as_trained(
         arguments.cameras,
         {.downscale = arguments.downscale, .max_width = arguments.max_width, .lens = arguments.lens_use});
@@ -168,6 +167,7 @@ int render_dataset_views(RenderArguments arguments) {
     if (!refined.empty()) io::use_refined_cameras(dataset, refined);
     const std::vector<int> frames = select_frames(dataset, arguments.frames, arguments.test_every);
     const std::vector<fs::path> files = files_of_frames(arguments, dataset, frames);
+    check_picture(arguments.picture, arguments.mode, false, core::lower(files[0].extension().string()));
     arguments.format = core::lower(files[0].extension().string()).substr(1);
     check_renders(arguments, files, &dataset);
     const std::vector<Appearance> appearances = appearances_of(
@@ -177,28 +177,12 @@ int render_dataset_views(RenderArguments arguments) {
         for (Frame& frame : dataset.frames)
             frame.camera = of_frame(*arguments.views.lens, frame.camera, dataset, gaussians);
 
+    std::vector<Camera> cameras;
+    for (const int frame : frames) cameras.push_back(dataset.frames[size_t(frame)].camera);
     Renderer renderer(open_device(arguments.device), gaussians, options);
     const InterruptWatch watch;
     Progress progress("rendered", static_cast<int>(frames.size()), "frames", arguments.quiet);
-    uint32_t skipped = 0;
-    for (size_t i = 0; i < frames.size(); ++i) {
-        if (interrupted()) return kInterruptedStatus;
-        const Frame& frame = dataset.frames[frames[i]];
-        Rendering rendering = renderer.render(frame.camera, drawing_of(arguments));
-        if (!appearances.empty() && arguments.mode == "color")
-            rendering.color = with_appearance(std::move(rendering.color), appearances[i]);
-        skipped = std::max(skipped, renderer.skipped_nonfinite());
-
-        std::string remark;
-        make_folder(files[i].parent_path());
-        save_view(files[i], frame.camera, chosen_image(std::move(rendering), arguments, remark));
-        if (!remark.empty()) progress.note(files[i].string() + ": " + remark);
-        progress.update(static_cast<int>(i) + 1);
-    }
-    note_skipped(progress, skipped);
-    progress.note(fmt::format("{} {} in {}", core::counted(frames.size(), "image"),
-                              core::is_or_are(frames.size()), arguments.output.string()));
-    return 0;
+    return write_images(arguments, renderer, std::move(cameras), files, appearances, false, progress);
 }
 
 /// The dataset of the run, if it can be read. Else the scene is framed as one of which nothing is known.
@@ -218,41 +202,23 @@ scene::FramingHints hints_of(const std::optional<Dataset>& dataset) {
 
 /// The film of these views. Returns the exit status.
 int write_film(const RenderArguments& arguments, Renderer& renderer, const RenderOptions& options,
-               const std::vector<Camera>& cameras, Progress& progress) {
-    Film film(arguments.output, cameras[0].width, cameras[0].height);
+               const std::vector<Camera>& cameras, const std::string& encoder, Progress& progress) {
+    const PictureArguments& picture = arguments.picture;
+    Film film(arguments.output, cameras[0].width * (picture.stereo == "side-by-side" ? 2 : 1),
+              cameras[0].height * (picture.stereo == "top-bottom" ? 2 : 1), encoder);
+    PictureTaker taker(picture, renderer, Drawing::color, true);
     for (size_t i = 0; i < cameras.size(); ++i) {
         if (interrupted()) return kInterruptedStatus;
-        film.add(renderer.render_bytes(cameras[i], {.render = options}));
+        if (picture.several())
+            film.add(screen_bytes(joined_eyes(taker.take(cameras, i), picture.stereo).color));
+        else
+            film.add(renderer.render_bytes(cameras[i], {.render = options}));
         progress.update(int(i) + 1);
     }
     film.finish();
     note_skipped(progress, renderer.skipped_nonfinite());
     progress.note(fmt::format("{}: {} frames, {:.1f} s", arguments.output.string(), cameras.size(),
                               double(cameras.size()) / kFilmRate));
-    return 0;
-}
-
-int write_views(const RenderArguments& arguments, Renderer& renderer, const std::vector<Camera>& cameras,
-                const std::vector<fs::path>& files, Progress& progress) {
-    const bool one_image = files[0] == arguments.output;
-    uint32_t skipped = 0;
-    make_folder(files[0].parent_path());
-    for (size_t i = 0; i < cameras.size(); ++i) {
-        if (interrupted()) return kInterruptedStatus;
-        Rendering rendering = renderer.render(cameras[i], drawing_of(arguments));
-        skipped = std::max(skipped, renderer.skipped_nonfinite());
-        std::string remark;
-        save_view(files[i], cameras[i], chosen_image(std::move(rendering), arguments, remark));
-        if (!remark.empty()) progress.note(files[i].string() + ": " + remark);
-        if (cameras.size() > 1) progress.update(int(i) + 1);
-    }
-    note_skipped(progress, skipped);
-    if (one_image)
-        progress.note(
-            fmt::format("{}: {}x{}", arguments.output.string(), cameras[0].width, cameras[0].height));
-    else
-        progress.note(fmt::format("{} {} in {}", core::counted(cameras.size(), "image"),
-                                  core::is_or_are(cameras.size()), arguments.output.string()));
     return 0;
 }
 
@@ -264,19 +230,25 @@ int render_free_views(RenderArguments arguments) {
     check_views(arguments.views);
     if (film && arguments.mode != "color")
         throw InputError("a film has --mode color; a folder can have any mode");
+    const bool path = film || arguments.views.orbit > 1 || arguments.views.film_seconds > 0;
+    check_picture(arguments.picture, arguments.mode, path,
+                  output == ViewsOutput::folder ? "." + arguments.format
+                                                : core::lower(arguments.output.extension().string()));
+    const std::string encoder = film ? find_encoder(arguments.codec) : std::string();
     if (film) find_ffmpeg();
     if (one_image) arguments.format = core::lower(arguments.output.extension().string()).substr(1);
     const std::optional<Dataset> dataset = dataset_of_run(arguments);
     const Dataset* const known = dataset ? &*dataset : nullptr;
     std::vector<fs::path> files{arguments.output};
     if (output != ViewsOutput::folder) check_renders(arguments, files, known);
-    const Gaussians gaussians = arguments.draw.load(arguments.splats, options);
+    const Gaussians gaussians = load_scene(arguments, options);
     if (dataset && !dataset->frames.empty()) {
         glm::dvec3 sum(0);
         for (const Frame& frame : dataset->frames) sum += frame.camera.position();
         arguments.views.inside = sum / double(dataset->frames.size());
     }
-    const std::vector<Camera> cameras = views_of(arguments.views, gaussians, hints_of(dataset), output);
+    const std::vector<Camera> cameras = views_of(arguments.views, gaussians, hints_of(dataset),
+                                                 arguments.contact_sheet ? ViewsOutput::folder : output);
     if (output == ViewsOutput::folder) {
         files.clear();
         for (size_t i = 0; i < cameras.size(); ++i)
@@ -288,8 +260,8 @@ int render_free_views(RenderArguments arguments) {
     Renderer renderer(open_device(arguments.device), gaussians, options);
     const InterruptWatch watch;
     Progress progress("rendered", int(cameras.size()), "views", arguments.quiet);
-    if (film) return write_film(arguments, renderer, options, cameras, progress);
-    return write_views(arguments, renderer, cameras, files, progress);
+    if (film) return write_film(arguments, renderer, options, cameras, encoder, progress);
+    return write_images(arguments, renderer, cameras, files, {}, path, progress);
 }
 
 /// Completes the arguments by the run that SPLATS may name, and chooses whose cameras are used.
@@ -301,6 +273,10 @@ int run(CLI::App& app, RenderArguments& arguments) {
     if (arguments.lens == "native" || arguments.lens == "undistort") of_frames = "--lens " + arguments.lens;
     if (arguments.mode == "depth" && arguments.draw.integrator == "march")
         throw InputError("--mode depth: the integrator march draws no depth; the others do");
+    if (arguments.contact_sheet && views_output(arguments.output) != ViewsOutput::image)
+        throw InputError("--contact-sheet: all views go into one image; name a .png, .jpg or .exr with -o");
+    if (!arguments.codec.empty() && views_output(arguments.output) != ViewsOutput::film)
+        throw InputError("--codec: only a film has one, such as -o film.mp4");
     SplatInput input = splat_input(arguments.splats);
     arguments.splats = input.file;
     if (input.run) use_options_of(*input.run, app);
@@ -354,6 +330,14 @@ Action add_render(CLI::App& app) {
                    "surface) or normal (of the surface, in world axes; from -1..1 to 0..1 in a png)")
         ->transform(one_of({"color", "depth", "alpha", "median-depth", "normal"}))
         ->capture_default_str();
+    app.add_flag("--contact-sheet", arguments->contact_sheet, "All views, small, in one image");
+    app.add_option(
+           "--codec", arguments->codec,
+           "How a film is packed, if ffmpeg can: h264, hevc, av1 or vp9 [ffmpeg's choice for the name: "
+           "h264 in .mp4]")
+        ->transform(one_of({"h264", "hevc", "av1", "vp9"}))
+        ->type_name("CODEC");
+    add_picture_options(app, arguments->picture);
     add_draw_options(app, arguments->draw);
     app.add_option(
            "--lens", arguments->lens,

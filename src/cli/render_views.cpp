@@ -99,7 +99,8 @@ void add_views_options(CLI::App& app, ViewsArguments& arguments, CLI::Option* ca
         return app.add_option(name, value, help)->type_name(type)->excludes(cameras);
     };
     option("--size", arguments.size, "WxH",
-           "Size of the renders in px [1280x720, or that of the saved view]");
+           "Size of the renders in px, or of a screen: 720p, 1080p, 1440p, 4k, 8k [1280x720, or that of the "
+           "saved view]");
     CLI::Option* orbit = option("--orbit", arguments.orbit, "N",
                                 "N views round the scene; a film shows 30 a second [240 for a film]")
                              ->transform(in_range(1, kMostFrames));
@@ -174,9 +175,11 @@ namespace {
 std::vector<Camera> framed_views(const ViewsArguments& arguments, const Gaussians& gaussians,
                                  const scene::FramingHints& hints, int count) {
     const bool all_around = arguments.lens && arguments.lens->lens.lens == Lens::equirectangular;
-    const core::PixelSize size = !arguments.size.empty() ? size_of(arguments.size)
-                                 : all_around            ? kPanoramaSize
-                                                         : kUsualSize;
+    core::PixelSize size = !arguments.size.empty() ? size_of(arguments.size)
+                           : all_around            ? kPanoramaSize
+                                                   : kUsualSize;
+    // A size of screens names the width of a panorama.
+    if (all_around && arguments.size.find('x') == std::string::npos) size.height = size.width / 2;
     scene::FramingHints known = hints;
     if (const auto up = parse_up(arguments.up)) known.up = up;
     known.all_round = count > 1;

@@ -26,13 +26,16 @@ const std::map<std::string, std::string>& subjects() {
                      "crop",      "min-opacity", "max-sh",       "sort",      "splats",       "cases",
                      "decimate",  "level",       "bake-sky",     "views",     "size",         "look-at",
                      "up",        "orbit",       "film-seconds", "matching",  "scene-splats", "visible",
-                     "view-time", "scale-to"});
-        add("Quality", {"quality", "antialias", "integrator", "samples", "runs", "training-steps"});
-        add("Output",
-            {"output",      "format",   "mode",        "json",      "svg",       "heat-map",  "heat-scale",
-             "serve",       "accuracy", "spz-version", "levels",    "check",     "ranks",     "quiet",
-             "verbose",     "results",  "compare",     "threshold", "max-error", "resume",    "force",
-             "allow-empty", "protocol", "voxel",       "triangles", "distance",  "unbounded", "collision"});
+                     "view-time", "aperture",    "focus",        "shutter",   "stereo",       "eye-distance",
+                     "geo",       "scale-to"});
+        add("Quality",
+            {"quality", "antialias", "integrator", "samples", "runs", "training-steps", "blur-samples"});
+        add("Output", {"output",     "format",    "mode",        "json",        "svg",           "heat-map",
+                       "heat-scale", "serve",     "accuracy",    "spz-version", "levels",        "check",
+                       "ranks",      "quiet",     "verbose",     "results",     "compare",       "threshold",
+                       "max-error",  "resume",    "force",       "allow-empty", "protocol",      "voxel",
+                       "triangles",  "distance",  "transparent", "codec",       "contact-sheet", "gltf-spz",
+                       "unbundled",  "unbounded", "collision"});
         for (const train::RunOption& option : train::run_options())
             if (!option.subject.empty()) made[option.name] = option.subject;
         return made;

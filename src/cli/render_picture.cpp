@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/render_picture.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "cli/arguments.h"
+#include "ewa/error.h"
+#include "scene/camera.h"
+#include "scene/color.h"
+#include "scene/native_lens.h"
+#include "scene/picture_views.h"
+
+namespace ewa::cli {
+namespace {
+
+/// From eye to eye, as a part of the distance of focus: what stereo photography holds comfortable.
+constexpr double kEyesPerFocus = 1.0 / 30;
+constexpr int kEyeColumns = 16;  // of a 360° image that share an eye
+
+void add_image(Image& sum, const Image& image, bool linear) {
+    if (sum.pixels.empty()) sum = Image(image.width, image.height, image.channels);
+    for (size_t i = 0; i < image.pixels.size(); ++i) {
+        const float v = image.pixels[i];
+        sum.pixels[i] += linear ? float(scene::linear_of_srgb(std::max(v, 0.0f))) : v;
+    }
+}
+
+void divide(Image& sum, int count, bool linear) {
+    for (float& v : sum.pixels)
+        v = linear ? float(scene::srgb_of_linear(double(v) / count)) : v / float(count);
+}
+
+/// The images that a rendering may have.
+std::vector<Image*> images_of(Rendering& rendering) {
+    return {&rendering.color, &rendering.alpha, &rendering.depth, &rendering.median_depth, &rendering.normal};
+}
+
+Image beside(const Image& left, const Image& right) {
+    Image both(2 * left.width, left.height, left.channels);
+    const size_t row = size_t(left.width) * size_t(left.channels);
+    for (int y = 0; y < left.height; ++y) {
+        std::copy_n(left.at(0, y), row, both.at(0, y));
+        std::copy_n(right.at(0, y), row, both.at(left.width, y));
+    }
+    return both;
+}
+
+Image below(Image top, const Image& bottom) {
+    top.pixels.insert(top.pixels.end(), bottom.pixels.begin(), bottom.pixels.end());
+    top.height *= 2;
+    return top;
+}
+
+void paste_columns(const Image& part, int first, int width, Image& whole) {
+    if (part.pixels.empty()) return;
+    if (whole.pixels.empty()) whole = Image(width, part.height, part.channels);
+    for (int y = 0; y < part.height; ++y)
+        std::copy_n(part.at(0, y), size_t(part.width) * size_t(part.channels), whole.at(first, y));
+}
+
+}  // namespace
+
+void add_picture_options(CLI::App& app, PictureArguments& arguments) {
+    app.add_option("--aperture", arguments.aperture,
+                   "Depth of field: diameter of the lens (world units). What is out of focus becomes blurred")
+        ->transform(in_range(1e-9, 1e9))
+        ->type_name("D");
+    app.add_option("--focus", arguments.focus,
+                   "Distance along the view that is sharp, and at the screen's depth with --stereo (world "
+                   "units) [that of what the middle of the image shows]")
+        ->transform(in_range(1e-9, 1e9))
+        ->type_name("D");
+    app.add_option("--shutter", arguments.shutter,
+                   "Motion blur of films, orbits and paths: the share of a frame's time that the shutter is "
+                   "open; 0.5 is usual")
+        ->transform(in_range(0.01, 1.0))
+        ->type_name("0..1");
+    app.add_option("--blur-samples", arguments.blur_samples,
+                   "Renders that --aperture and --shutter average for an image")
+        ->transform(in_range(2, 4096))
+        ->type_name("N")
+        ->capture_default_str();
+    app.add_option("--stereo", arguments.stereo,
+                   "Two eyes in one image, the left eye first: side-by-side or top-bottom. A 360° image of "
+                   "each eye with --lens equirect")
+        ->transform(one_of({"side-by-side", "top-bottom"}))
+        ->type_name("LAYOUT");
+    app.add_option("--eye-distance", arguments.eye_distance,
+                   "With --stereo: from eye to eye (world units) [a thirtieth of --focus]")
+        ->transform(in_range(1e-9, 1e9))
+        ->needs("--stereo")
+        ->type_name("D");
+    app.add_flag("--transparent", arguments.transparent,
+                 "No background: a png has alpha, and an exr colour over black");
+}
+
+void check_picture(const PictureArguments& arguments, const std::string& mode, bool path,
+                   const std::string& extension) {
+    const bool color = mode == "color" || mode == "alpha";
+    if (arguments.blurs() && !color)
+        throw InputError("--aperture and --shutter average colours: --mode color or alpha");
+    if (arguments.shutter > 0 && !path)
+        throw InputError("--shutter: there is no motion; it needs a film, --orbit or --film-seconds");
+    if (arguments.focus > 0 && arguments.aperture == 0 && arguments.stereo.empty())
+        throw InputError("--focus needs --aperture or --stereo");
+    if (!arguments.transparent) return;
+    if (mode != "color") throw InputError("--transparent needs --mode color");
+    if (extension != ".png" && extension != ".exr")
+        throw InputError("--transparent: " + extension + " has no alpha; a .png and an .exr have");
+}
+
+Rendering PictureTaker::render(const Camera& camera) {
+    Rendering rendering = renderer_.render(camera, drawing_);
+    skipped_ = std::max(skipped_, renderer_.skipped_nonfinite());
+    return rendering;
+}
+
+double PictureTaker::focus_of(const Camera& camera) {
+    if (arguments_.focus > 0) return arguments_.focus;
+    if (path_ && found_ > 0) return found_;
+    // The middle pixel of a small image of a tenth of the view.
+    constexpr int kSide = 33;
+    constexpr double kShown = 0.1;
+    const double scale = kSide / (kShown * std::min(camera.width, camera.height));
+    Camera middle = camera;
+    middle.width = middle.height = kSide;
+    middle.fx *= scale;
+    middle.fy *= scale;
+    middle.cx = 0.5 * kSide + scale * (camera.cx - 0.5 * camera.width);
+    middle.cy = 0.5 * kSide + scale * (camera.cy - 0.5 * camera.height);
+    const Rendering seen = renderer_.render(middle, DrawOptions{.render = {}, .drawing = Drawing::depth});
+    constexpr float kThere = 0.1f;
+    found_ = *seen.alpha.at(kSide / 2, kSide / 2) > kThere ? *seen.depth.at(kSide / 2, kSide / 2) : 0;
+    if (!(found_ > 0)) throw InputError("--focus is needed: the middle of the image shows no splat");
+    return found_;
+}
+
+Rendering PictureTaker::averaged(const std::vector<Camera>& views, size_t i, double eye, double focus) {
+    const int count = arguments_.blurs() ? arguments_.blur_samples : 1;
+    if (count == 1) return render(eye == 0 ? views[i] : scene::moved_eye(views[i], {eye, 0}, focus));
+    // Light adds up in a camera, so colours are averaged in linear light. Programs that put a transparent image over another one
+    // blend stored values, as splats are blended.
+    const bool linear = !arguments_.transparent;
+    Rendering sum;
+    for (int k = 0; k < count; ++k) {
+        Camera camera = arguments_.shutter > 0
+                            ? along_path(views, double(i) + arguments_.shutter * scene::even_share(k))
+                            : views[i];
+        const glm::dvec2 place = 0.5 * arguments_.aperture * scene::disc_point(k, count);
+        if (arguments_.aperture > 0 || eye != 0)
+            camera = scene::moved_eye(camera, place + glm::dvec2(eye, 0), focus);
+        const Rendering one = render(camera);
+        add_image(sum.color, one.color, linear);
+        add_image(sum.alpha, one.alpha, false);
+    }
+    divide(sum.color, count, linear);
+    divide(sum.alpha, count, false);
+    return sum;
+}
+
+Rendering PictureTaker::all_around(const Camera& camera, double eye) {
+    Rendering whole;
+    for (const scene::EyeColumns& piece : scene::eye_columns(camera, eye, kEyeColumns)) {
+        Rendering part = render(piece.camera);
+        const std::vector<Image*> from = images_of(part), to = images_of(whole);
+        for (size_t k = 0; k < from.size(); ++k) paste_columns(*from[k], piece.first, camera.width, *to[k]);
+    }
+    return whole;
+}
+
+std::vector<Rendering> PictureTaker::take(const std::vector<Camera>& views, size_t i) {
+    const Camera& camera = views[i];
+    const bool stereo = !arguments_.stereo.empty(), around = scene::shows_all_around(camera);
+    if ((arguments_.aperture > 0 && !scene::has_movable_eye(camera)) ||
+        (stereo && !around && !scene::has_movable_eye(camera)) || (around && arguments_.blurs()))
+        throw InputError(around ? "--aperture and --shutter: a 360° image has neither"
+                                : "--aperture and --stereo need a pinhole: --lens undistort");
+    double focus = 1, half = 0.5 * arguments_.eye_distance;
+    if (arguments_.aperture > 0 || (stereo && !around)) focus = focus_of(camera);
+    if (stereo && half == 0) {
+        if (around) throw InputError("--eye-distance is needed: a 360° image has no distance of focus");
+        half = 0.5 * kEyesPerFocus * focus;
+    }
+    std::vector<Rendering> eyes;
+    for (const double eye : stereo ? std::vector{-half, half} : std::vector{0.0})
+        eyes.push_back(around && stereo ? all_around(camera, eye) : averaged(views, i, eye, focus));
+    return eyes;
+}
+
+Rendering joined_eyes(std::vector<Rendering> eyes, const std::string& stereo) {
+    Rendering& first = eyes[0];
+    if (eyes.size() == 1) return std::move(first);
+    const std::vector<Image*> left = images_of(first), right = images_of(eyes[1]);
+    for (size_t k = 0; k < left.size(); ++k)
+        *left[k] =
+            stereo == "side-by-side" ? beside(*left[k], *right[k]) : below(std::move(*left[k]), *right[k]);
+    return std::move(first);
+}
+
+Image transparent_image(const Rendering& rendering) {
+    Image color = rendering.color;
+    for (size_t i = 0; i < rendering.alpha.pixels.size(); ++i)
+        if (const float alpha = rendering.alpha.pixels[i]; alpha > 0)
+            for (size_t c = 0; c < 3; ++c) color.pixels[3 * i + c] /= alpha;
+    return with_alpha(color, rendering.alpha);
+}
+
+std::vector<uint8_t> screen_bytes(const Image& color) {
+    std::vector<uint8_t> bytes;
+    bytes.reserve(color.pixels.size() / 3 * 4);
+    for (size_t i = 0; i < color.pixels.size(); ++i) {
+        bytes.push_back(uint8_t(std::lround(255 * std::clamp(color.pixels[i], 0.0f, 1.0f))));
+        if (i % 3 == 2) bytes.push_back(255);
+    }
+    return bytes;
+}
+
+}  // namespace ewa::cli

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pictures of ewa render that consist of several renders: depth of field, motion blur, and two eyes. Also transparent ones.
+#pragma once
+#include <CLI/CLI.hpp>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "ewa/camera.h"
+#include "ewa/renderer.h"
+
+namespace ewa::cli {
+
+struct PictureArguments {
+    double aperture = 0, focus = 0, eye_distance = 0;  // world units; 0: not given
+    double shutter = 0;                                // share of a frame's time; 0: no motion blur
+    int blur_samples = 32;
+    std::string stereo;  // side-by-side, top-bottom; empty: one eye
+    bool transparent = false;
+
+    bool blurs() const { return aperture > 0 || shutter > 0; }
+    bool several() const { return blurs() || !stereo.empty(); }  // renders for a picture
+};
+
+/// --aperture, --focus, --shutter, --blur-samples, --stereo, --eye-distance and --transparent.
+void add_picture_options(CLI::App& app, PictureArguments& arguments);
+
+/// Throws InputError for options that exclude each other. mode: of --mode. path: whether the views are moments of one motion. extension: of
+/// the images in lower case, with its dot.
+void check_picture(const PictureArguments& arguments, const std::string& mode, bool path,
+                   const std::string& extension);
+
+/// Takes pictures of views. It keeps the distance of focus that it has found for the first of a path.
+class PictureTaker {
+  public:
+    /// path: whether the views are moments of one motion.
+    PictureTaker(const PictureArguments& arguments, Renderer& renderer, Drawing drawing, bool path)
+        : arguments_(arguments), renderer_(renderer), drawing_(drawing), path_(path) {}
+
+    /// What each eye sees in view i: one or two images. With a shutter, while the camera moves to the next view.
+    /// Throws InputError where the options do not go with the lens of a camera, or nothing is in focus.
+    std::vector<Rendering> take(const std::vector<Camera>& views, size_t i);
+
+    uint32_t skipped() const { return skipped_; }  // the most splats of a render that were not finite
+
+  private:
+    Rendering render(const Camera& camera);
+    Rendering averaged(const std::vector<Camera>& views, size_t i, double eye, double focus);
+    Rendering all_around(const Camera& camera, double eye);
+    double focus_of(const Camera& camera);
+
+    const PictureArguments& arguments_;
+    Renderer& renderer_;
+    Drawing drawing_;
+    bool path_;
+    double found_ = 0;  // distance of focus
+    uint32_t skipped_ = 0;
+};
+
+/// Both eyes in one image, as --stereo names it. One eye stays as it is.
+Rendering joined_eyes(std::vector<Rendering> eyes, const std::string& stereo);
+
+/// RGBA whose colour is not multiplied by alpha, from a render over black.
+Image transparent_image(const Rendering& rendering);
+
+/// The colour as 8-bit RGBA, rounded and clamped as save_image does it.
+std::vector<uint8_t> screen_bytes(const Image& color);
+
+}  // namespace ewa::cli

@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pictures of ewa render of several renders: depth of field, motion blur, two eyes, contact sheets; transparent ones; codecs.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "cli/expect.h"
+#include "ewa/image.h"
+#include "ewa/splat_files.h"
+
+namespace {
+
+using namespace ewa;
+using namespace ewa::test;
+using Names = std::vector<std::string>;
+
+struct Spot {
+    glm::dvec2 middle{0};  // px
+    double spread = 0;     // mean squared distance from it, px^2
+};
+
+/// The light of the first channel between two columns and two rows.
+Spot spot_of(const Image& image, int left, int right, int top = 0, int bottom = -1) {
+    if (bottom < 0) bottom = image.height;
+    double sum = 0, squares = 0;
+    glm::dvec2 places(0);
+    for (int y = top; y < bottom; ++y)
+        for (int x = left; x < right; ++x) {
+            const glm::dvec2 p(x + 0.5 - left, y + 0.5 - top);
+            const double v = *image.at(x, y);
+            sum += v;
+            places += v * p;
+            squares += v * glm::dot(p, p);
+        }
+    const glm::dvec2 middle = places / sum;
+    return {middle, squares / sum - glm::dot(middle, middle)};
+}
+
+class Pictures : public testing::Test {
+  protected:
+    void place(const std::vector<glm::vec3>& means) {
+        Gaussians g;
+        g.resize(means.size());
+        for (size_t i = 0; i < means.size(); ++i) {
+            for (size_t k = 0; k < 3; ++k) {
+                g.means[3 * i + k] = means[i][int(k)];
+                g.log_scales[3 * i + k] = -3.2f;
+                g.sh[3 * i + k] = 1;
+            }
+            g.quaternions[4 * i] = 1;
+        }
+        save_splats(splats, g);
+    }
+    /// From the origin along z.
+    Outcome render(const std::string& name, const Names& more) {
+        Names arguments{"render", splats, "-o", folder / name, "--quiet"};
+        if (std::ranges::find(more, "--orbit") == more.end())
+            arguments.insert(arguments.end(), {"--look-at", "0,0,0,0,0,1", "--up=-y"});
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run_ewa(arguments);
+    }
+    Image image(const std::string& name, const Names& more) {
+        expect_success(render(name, more));
+        return load_image(folder / name);
+    }
+
+    Folder folder;
+    const std::string splats = folder / "s.ply";
+};
+
+const double kFocal = 60 / std::tan(25 * M_PI / 180);  // px, of a view 120 px high
+
+TEST_F(Pictures, OutOfFocusIsADiscOfLight) {
+    place({{-0.5f, 0, 3}, {1, 0, 6}});
+    const Names size{"--size", "160x120", "--mode", "alpha"};
+    const auto with = [&](Names more) {
+        more.insert(more.end(), size.begin(), size.end());
+        return more;
+    };
+    const Image sharp = image("sharp.exr", size);
+    const Image blurred =
+        image("blurred.exr", with({"--aperture", "0.4", "--focus", "3", "--blur-samples", "64"}));
+    const Spot near = spot_of(blurred, 0, 80), far = spot_of(blurred, 80, 160);
+    EXPECT_NEAR(near.spread, spot_of(sharp, 0, 80).spread, 0.1) << "in focus";
+    const double radius = 0.2 * kFocal * (1 / 3.0 - 1 / 6.0);
+    EXPECT_NEAR(far.spread - spot_of(sharp, 80, 160).spread, radius * radius / 2, 0.6);
+    EXPECT_LT(glm::distance(far.middle, spot_of(sharp, 80, 160).middle), 0.3);
+
+    // Without --focus, what the middle shows is sharp.
+    place({{0, 0, 3}, {2, 0, 6}});
+    const Image found = image("found.exr", with({"--aperture", "0.4"}));
+    EXPECT_NEAR(spot_of(found, 40, 100).spread, spot_of(image("s.exr", with({})), 40, 100).spread, 0.1);
+    place({{-0.5f, 0, 3}});
+    expect_failure(render("x.exr", with({"--aperture", "0.4"})), 2, "--focus is needed");
+}
+
+TEST_F(Pictures, MotionBlurIsTheMeanOverTheShutter) {
+    place({{-0.5f, 0, 0}, {1, 0, 0.4f}, {0, 0.4f, -0.7f}});
+    const Names size{"--size", "90x60", "--format", "exr", "--mode", "alpha"};
+    const auto orbit = [&](const std::string& name, Names more) {
+        more.insert(more.end(), size.begin(), size.end());
+        expect_success(render(name, more));
+        return [this, name](const std::string& file) { return load_image(folder / (name + "/" + file)); };
+    };
+    const auto fine = orbit("fine", {"--orbit", "64"});
+    const auto blurred = orbit("blurred", {"--orbit", "16", "--shutter", "1", "--blur-samples", "4"});
+    const Image got = blurred("00003.exr");
+    double error = 0, moved = 0;
+    for (size_t i = 0; i < got.pixels.size(); ++i) {
+        double mean = 0;
+        for (const char* name : {"00012.exr", "00013.exr", "00014.exr", "00015.exr"})
+            mean += 0.25 * fine(name).pixels[i];
+        error = std::max(error, std::abs(mean - got.pixels[i]));
+        moved = std::max(moved, std::abs(mean - fine("00012.exr").pixels[i]));
+        if (i == got.pixels.size() / 2) break;  // half of the image tells
+    }
+    EXPECT_LT(error, 0.02);
+    EXPECT_GT(moved, 0.1);
+}
+
+TEST_F(Pictures, TwoEyesSeeDepth) {
+    place({{-0.5f, 0, 3}, {0.4f, 0, 2}});
+    const Image both = image("both.exr", {"--size", "160x120", "--mode", "alpha", "--stereo", "side-by-side",
+                                          "--focus", "3", "--eye-distance", "0.2"});
+    ASSERT_EQ(both.width, 320);
+    const auto shift = [&](int from, int to) {
+        return spot_of(both, from, to).middle.x - spot_of(both, 160 + from, 160 + to).middle.x;
+    };
+    EXPECT_NEAR(shift(0, 75), 0, 0.05) << "at the screen";
+    EXPECT_NEAR(shift(75, 160), 0.2 * kFocal * (1 / 2.0 - 1 / 3.0), 0.1) << "before it";
+    const Image below = image("below.exr", {"--size", "160x120", "--mode", "alpha", "--stereo", "top-bottom",
+                                            "--focus", "3", "--eye-distance", "0.2"});
+    ASSERT_EQ(below.height, 240);
+    EXPECT_NEAR(spot_of(below, 75, 160, 0, 120).middle.x, spot_of(both, 75, 160).middle.x, 1e-4);
+    EXPECT_NEAR(spot_of(below, 75, 160, 120).middle.x, spot_of(both, 235, 320).middle.x, 1e-4);
+}
+
+TEST_F(Pictures, EyesAllAroundAreApartInEachDirection) {
+    place({{0, 0, 2}, {2, 0, 0}});
+    const Image both = image("all.exr", {"--lens", "equirect", "--size", "400x200", "--mode", "alpha",
+                                         "--stereo", "top-bottom", "--eye-distance", "0.2"});
+    ASSERT_EQ(both.height, 400);
+    const double expected = 2 * std::asin(0.1 / 2) / (2 * M_PI) * 400;
+    for (const int middle : {200, 300}) {
+        const double left = spot_of(both, middle - 40, middle + 40, 0, 200).middle.x,
+                     right = spot_of(both, middle - 40, middle + 40, 200, 400).middle.x;
+        EXPECT_NEAR(left - right, expected, 0.15) << middle;
+        EXPECT_NEAR(left + right, 80, 0.3) << middle;
+    }
+    expect_failure(render("x.exr", {"--lens", "equirect", "--stereo", "top-bottom"}), 2,
+                   "--eye-distance is needed");
+}
+
+TEST_F(Pictures, ATransparentImageGoesOverAnyBackground) {
+    place({{-0.5f, 0, 3}, {1, 0, 6}});
+    const Names size{"--size", "80x60"};
+    const Image clear = image("clear.png", {"--size", "80x60", "--transparent"});
+    ASSERT_EQ(clear.channels, 4);
+    const Image over = over_background(clear, {0.2f, 0.6f, 0.4f});
+    const Image rendered = image("rendered.png", {"--size", "80x60", "--background", "0.2,0.6,0.4"});
+    EXPECT_LE(compare_images(over, rendered).max_error, 2.0 / 255);
+    EXPECT_GT(compare_images(over, image("black.png", size)).max_error, 0.1);
+    expect_failure(render("x.jpg", {"--transparent"}), 2, "has no alpha");
+    expect_failure(render("x.png", {"--transparent", "--mode", "depth"}), 2, "--mode color");
+}
+
+TEST_F(Pictures, AContactSheetHasAllViews) {
+    make_splats(splats, 400);
+    const Image sheet = image("sheet.png", {"--orbit", "6", "--size", "640x480", "--contact-sheet"});
+    ASSERT_EQ(sheet.width, 8 + 3 * 328);
+    ASSERT_EQ(sheet.height, 8 + 2 * 248);
+    for (int view = 0; view < 6; ++view) {
+        float most = 0;
+        for (int y = 0; y < 240; ++y)
+            for (int x = 0; x < 320; ++x)
+                most = std::max(most, *sheet.at(8 + view % 3 * 328 + x, 8 + view / 3 * 248 + y));
+        EXPECT_GT(most, 0.3f) << view;
+    }
+    EXPECT_NEAR(*sheet.at(2, 2), 0.12f, 0.01f);
+    const std::string data = folder / "data";
+    make_dataset(data);
+    expect_success(run_ewa(
+        {"render", splats, "--cameras", data, "--contact-sheet", "--quiet", "-o", folder / "frames.jpg"}));
+    EXPECT_GT(load_image(folder / "frames.jpg").width, 60);
+    expect_failure(render("d", {"--orbit", "6", "--contact-sheet"}), 2, "one image");
+}
+
+TEST_F(Pictures, SizesOfScreensHaveNames) {
+    place({{0, 0, 3}});
+    EXPECT_EQ(image("p.png", {"--size", "720p"}).height, 720);
+    EXPECT_EQ(image("q.png", {"--size", "720p", "--lens", "equirect"}).height, 640);
+    expect_failure(render("x.png", {"--size", "5k"}), 2, "--size");
+}
+
+TEST_F(Pictures, TheCodecIsOneThatFfmpegHas) {
+    place({{0, 0, 3}});
+    std::filesystem::create_directories(folder / "bin");
+    write_file(folder / "bin/ffmpeg",
+               "#!/bin/sh\nPATH=/usr/bin:/bin\ncase \"$*\" in\n*-encoders*) echo ' V....D librav1e  AV1'; "
+               "echo ' V....D libx264  H.264';;\n*) printf '%s\\n' \"$@\" > " +
+                   (folder / "arguments") + "\nfor last; do :; done\ncat > \"$last\";;\nesac\n");
+    chmod((folder / "bin/ffmpeg").c_str(), 0755);
+    const auto film = [&](const Names& more) {
+        Names arguments{"render", splats, "-o", folder / "f.mp4", "--orbit", "2", "--size", "8x6"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run_ewa(arguments, {.environment = {{"PATH", folder / "bin"}}});
+    };
+    expect_success(film({"--codec", "av1"}));
+    EXPECT_NE(read_file(folder / "arguments").find("\n-c:v\nlibrav1e\n"), std::string::npos);
+    expect_failure(film({"--codec", "vp9"}), 1, "libvpx-vp9");
+    expect_success(film({}));
+    EXPECT_EQ(read_file(folder / "arguments").find("-c:v"), std::string::npos);
+    // Both eyes are in each frame.
+    expect_success(
+        film({"--stereo", "side-by-side", "--focus", "2", "--shutter", "0.5", "--blur-samples", "2"}));
+    EXPECT_NE(read_file(folder / "arguments").find("\n16x6\n"), std::string::npos);
+    EXPECT_EQ(read_file(folder / "f.mp4").size(), size_t(2) * 16 * 6 * 4);
+}
+
+TEST_F(Pictures, WrongUse) {
+    place({{0, 0, 3}});
+    const std::pair<Names, const char*> cases[] = {
+        {{"--shutter", "0.5"}, "there is no motion"},
+        {{"--focus", "2"}, "--focus needs"},
+        {{"--eye-distance", "2"}, "--stereo"},
+        {{"--aperture", "1", "--mode", "depth"}, "average colours"},
+        {{"--aperture", "1", "--lens", "equirect"}, "360"},
+        {{"--aperture", "1", "--lens", "fisheye:180"}, "pinhole"},
+        {{"--stereo", "side-by-side", "--lens", "fisheye:180", "--focus", "1"}, "pinhole"},
+        {{"--stereo", "both"}, "--stereo"},
+        {{"--codec", "av1"}, "only a film"}};
+    for (const auto& [arguments, text] : cases) expect_failure(render("x.png", arguments), 2, text);
+    EXPECT_FALSE(std::filesystem::exists(folder / "x.png"));
+}
+
+}  // namespace
