@@ -71,6 +71,11 @@ bool begins_as_record3d(std::string_view head) {
            (holds(text, "\"poses\"") || holds(text, "\"perFrameIntrinsicCoeffs\""));
 }
 
+bool begins_as_inria(std::string_view head) {
+    const std::string_view text = core::trim(head);
+    return !text.empty() && text.front() == '[' && holds(text, "\"img_name\"") && holds(text, "\"rotation\"");
+}
+
 bool begins_as_open_mvg(std::string_view head) {
     return holds(head, "\"sfm_data_version\"");
 }
@@ -167,7 +172,8 @@ const std::vector<CameraImporter>& camera_importers() {
          is_json,
          begins_as_polycam,
          import_polycam},
-        {"Record3D", {""}, "metadata", is_record3d_metadata, begins_as_record3d, import_record3d}};
+        {"Record3D", {""}, "metadata", is_record3d_metadata, begins_as_record3d, import_record3d},
+        {"INRIA's cameras.json", {""}, "cameras", is_json, begins_as_inria, import_inria}};
     return importers;
 }
 

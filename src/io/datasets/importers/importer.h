@@ -35,7 +35,7 @@ inline constexpr size_t kHeadBytes = size_t(1) << 16;
 
 /// The programs, for messages.
 inline constexpr std::string_view kImportedFrom =
-    "OpenSfM, OpenDroneMap, OpenMVG, Metashape, RealityScan, Polycam or Record3D";
+    "OpenSfM, OpenDroneMap, OpenMVG, Metashape, RealityScan, Polycam, Record3D or INRIA's trainer";
 
 /// In the order in which they are tried.
 const std::vector<CameraImporter>& camera_importers();
@@ -74,5 +74,6 @@ ImageRecords import_reality_scan_xmp(const ImportSource& source);
 ImageRecords import_reality_scan_csv(const ImportSource& source);
 ImageRecords import_polycam(const ImportSource& source);
 ImageRecords import_record3d(const ImportSource& source);
+ImageRecords import_inria(const ImportSource& source);
 
 }  // namespace ewa::io

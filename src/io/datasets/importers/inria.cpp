@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// cameras.json of INRIA's trainer, beside its cfg_args: a list of
+//   img_name        without extension
+//   width, height   px, of the training images
+//   position        of the camera, world
+//   rotation        three rows: camera to world, in OpenCV's axes
+//   fx, fy          px; the principal point is the middle of the image
+// `ewa train --inria` writes it too.
+#include <nlohmann/json.hpp>
+
+#include "core/json.h"
+#include "core/text.h"
+#include "ewa/error.h"
+#include "io/datasets/importers/image_finder.h"
+#include "io/datasets/importers/importer.h"
+#include "io/datasets/importers/json_field.h"
+#include "io/datasets/rotation.h"
+
+namespace ewa::io {
+
+ImageRecords import_inria(const ImportSource& source) {
+    const std::string name = core::one_line(source.file.string());
+    const auto document = core::read_json_file<nlohmann::json>(source.file);
+    if (!document.is_array()) throw InputError(name + ": is not a list of cameras");
+    const ImageFinder images(source.dataset, {"images", "input"});
+    ImageRecords records;
+    records.program = "INRIA's trainer, or another one in its layout";
+    records.files = {source.file};
+    records.folder = images.folder();
+    for (size_t i = 0; i < document.size(); ++i) {
+        const std::string where = name + ": camera " + std::to_string(i);
+        const JsonField field(document[i], where);
+        ImageRecord record;
+        const auto found = images.find(field.text("img_name"), where);
+        record.name = found.name;
+        record.path = found.path;
+        Camera& camera = record.camera;
+        camera.width = field.side("width");
+        camera.height = field.side("height");
+        camera.fx = field.number("fx");
+        camera.fy = field.number("fy");
+        camera.cx = 0.5 * camera.width;
+        camera.cy = 0.5 * camera.height;
+        const std::vector<double> rows = field.numbers("rotation", 9), p = field.numbers("position", 3);
+        const glm::dmat3 axes(rows[0], rows[3], rows[6], rows[1], rows[4], rows[7], rows[2], rows[5],
+                              rows[8]);
+        const std::string fault = rotation_fault(axes);
+        if (!fault.empty()) field.fail("\"rotation\": " + fault);
+        set_pose(camera, nearest_rotation(axes), {p[0], p[1], p[2]});
+        finish_record(record, where);
+        records.images.push_back(std::move(record));
+    }
+    add_points_beside(source.dataset, source.with_points, records);
+    return records;
+}
+
+}  // namespace ewa::io
