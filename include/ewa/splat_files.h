@@ -13,6 +13,9 @@ namespace ewa {
 /// The name in messages, e.g. "SPZ".
 std::string_view name_of(SplatFormat format);
 
+/// Programs that open the format, for people: "SuperSplat, Spark".
+std::string_view readers_of(SplatFormat format);
+
 /// The format of an extension, in upper or lower case: .ply .compressed.ply .splat .ksplat .spz .glb .gltf
 /// .sog .usda .usdz, or of the names meta.json and lod-meta.json. Throws InputError for any other.
 SplatFormat format_of_name(const std::filesystem::path& path);
@@ -33,6 +36,9 @@ SplatScene read_splats(const std::filesystem::path& path);
 /// Reads a level of a lod-meta.json; read_splats reads level 0. Throws InputError as read_splats does, and for a level that the
 /// file lacks.
 SplatScene read_splat_level(const std::filesystem::path& path, size_t level);
+
+/// The number of splats of each level of a lod-meta.json, the finest first. Throws InputError.
+std::vector<size_t> level_counts(const std::filesystem::path& path);
 
 /// Reads the splats alone. Skipped contents are warnings on standard error.
 Gaussians load_splats(const std::filesystem::path& path);

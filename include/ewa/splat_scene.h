@@ -40,8 +40,9 @@ struct SplatScene {
 struct SaveOptions {
     std::vector<std::string> comments = {};  // one line each; kept by the formats that can store them
     bool antialiased = false;
-    int spz_version = 3;  // 3 or 4
-    int levels = 0;       // of a lod-meta.json; 0: until one has a million splats
+    int spz_version = 3;    // of an .spz: 2, 3 or 4
+    bool gltf_spz = false;  // a glTF holds an SPZ of version 2, by KHR_gaussian_splatting_compression_spz_2
+    int levels = 0;         // of a lod-meta.json; 0: until one has a million splats
     std::function<void(uint64_t, uint64_t)> progress = {};  // splats written, all splats
 };
 

@@ -13,7 +13,9 @@
 #include "cli/command.h"
 #include "cli/convert_clean.h"
 #include "cli/convert_edits.h"
+#include "cli/convert_files.h"
 #include "cli/convert_page.h"
+#include "cli/convert_tiles.h"
 #include "cli/orbit_check.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
@@ -38,10 +40,11 @@ struct ConvertArguments {
     fs::path output;                     // -o, which becomes the last of the files
     std::vector<glm::dmat4> placements;  // of the inputs
     std::vector<std::string> transform;
-    std::string scale_to, crop, decimate, sort;
+    std::string scale_to, crop, decimate, sort, geo;
     Edits edits;
     Cleaning cleaning;
     int spz_version = 3, levels = 0, level = 0;
+    bool gltf_spz = false, unbundled = false;
     fs::path json;
     bool bake_sky = false, check = false, allow_empty = false, quiet = false;
     std::optional<live::Run> run;  // that the only input is of
@@ -132,30 +135,6 @@ Json check(const ConvertArguments& arguments, const Work& work) {
     return json;
 }
 
-/// The files that hold the values of an existing .gltf, meta.json or lod-meta.json; empty for other formats.
-std::vector<fs::path> values_of(const fs::path& path) {
-    const std::string name = core::lower(path.filename().string());
-    if (name.ends_with(".gltf")) return io::gltf_values(path);
-    if (name == "lod-meta.json") return io::level_files(path);
-    return name == "meta.json" ? io::sog_images(path) : std::vector<fs::path>();
-}
-
-uint64_t bytes_of(const std::vector<fs::path>& files) {
-    uint64_t sum = 0;
-    for (const fs::path& file : files) sum += fs::file_size(file);
-    return sum;
-}
-
-/// Throws if an input is a chunk in one of the folders N_M that a lod-meta.json writes.
-void check_chunks(const fs::path& out, const fs::path& input) {
-    const fs::path folder = fs::weakly_canonical(input).parent_path();
-    const std::string name = folder.filename().string();
-    if (name.find('_') != std::string::npos && name.find_first_not_of("0123456789_") == std::string::npos &&
-        folder.parent_path() == fs::weakly_canonical(out).parent_path())
-        throw InputError(core::one_line(out.string()) + ": would replace chunks, of which an input, " +
-                         core::one_line(input.string()) + ", is one; write to another folder");
-}
-
 /// Throws if an output is another file of this command, or cannot be written.
 void check_files(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
@@ -163,12 +142,15 @@ void check_files(const ConvertArguments& arguments) {
         outputs = {{"OUT", out}, {"--json", arguments.json}, {"--dry-run", arguments.cleaning.picture}};
     for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
         inputs.push_back({"an input", arguments.files[i]});
-        if (core::lower(out.filename().string()) == "lod-meta.json") check_chunks(out, arguments.files[i]);
+        if (names_tileset(out) || arguments.unbundled ||
+            core::lower(out.filename().string()) == "lod-meta.json")
+            check_not_a_part(out, arguments.files[i]);
         for (const fs::path& values : values_of(arguments.files[i]))
             inputs.push_back({"values of an input", values});
     }
+    if (arguments.unbundled) outputs.push_back({"the levels of OUT", out.parent_path() / "lod-meta.json"});
     check_command_outputs(outputs, inputs);
-    if (names_page(out)) return;
+    if (names_page(out) || names_tileset(out)) return;
     const SplatFormat format = format_of_name(out);
     io::ValueFiles beside;
     if (format == SplatFormat::gltf) beside = io::gltf_value_files(out);
@@ -191,7 +173,7 @@ Json output_json(const ConvertArguments& arguments, const SceneSize& size) {
     const fs::path& out = arguments.files.back();
     const std::vector<fs::path> values = values_of(out);
     Json json = {{"file", out.string()},
-                 {"format", names_page(out) ? "page" : name_of(format_of_name(out))},
+                 {"format", format_text(out)},
                  {"splats", size.splats},
                  {"sh_degree", size.sh_degree},
                  {"bytes", fs::file_size(out)}};
@@ -224,15 +206,24 @@ bool clean_scene(const ConvertArguments& arguments, Work& work, bool in_place) {
 
 int run(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
-    const bool page = names_page(out);
+    const bool page = names_page(out), tiles = names_tileset(out);
     if (page && arguments.check)
         throw InputError("--check: ewa does not read a page; check a .sog, which it holds");
-    const SplatFormat format = page ? SplatFormat::sog : format_to_write(out);
+    if (tiles && arguments.check)
+        throw InputError("--check: ewa reads no tileset; check a .glb with --gltf-spz, which its tiles are");
+    const std::optional<glm::dmat4> earth = parse_geo(arguments.geo);
+    if (earth && !tiles) throw InputError("--geo: only a tileset.json is on a globe");
+    const SplatFormat format = page ? SplatFormat::sog : tiles ? SplatFormat::glb : format_to_write(out);
     const bool levels = format == SplatFormat::sog_levels;
     if (levels && arguments.check)
         throw InputError(
             "--check: its splats are in another order; check a .sog, which level 0 holds in chunks");
-    if (!levels && arguments.levels > 0) throw InputError("--levels: only a lod-meta.json has levels");
+    if (arguments.unbundled && !page) throw InputError("--unbundled: only a page has its scene inside");
+    if (!levels && !tiles && !arguments.unbundled && arguments.levels > 0)
+        throw InputError(
+            "--levels: only a lod-meta.json, a tileset.json and an --unbundled page have levels");
+    if (arguments.gltf_spz && format != SplatFormat::glb && format != SplatFormat::gltf)
+        throw InputError("--gltf-spz: only a .glb or .gltf can hold an SPZ");
     // Report wrong use before the inputs are read: they may be large.
     Edits edits = arguments.edits;
     edits.transform = parse_transform(arguments.transform);
@@ -265,17 +256,20 @@ int run(const ConvertArguments& arguments) {
     Progress progress("written", static_cast<int>(std::min<size_t>(count, 1u << 30)), "splats",
                       arguments.quiet || count < kShowFrom);
     work.save.spz_version = arguments.spz_version;
+    work.save.gltf_spz = arguments.gltf_spz;
     work.save.levels = arguments.levels;
     work.save.progress = [&](uint64_t done, uint64_t) { progress.update(static_cast<int>(done)); };
     const std::vector<std::string> quantised =
-        page     ? write_page(out, work.gaussians, work.save, in_place ? arguments.run : std::nullopt)
+        page ? write_page(out, std::move(work.gaussians), work.save, in_place ? arguments.run : std::nullopt,
+                          arguments.unbundled)
+        : tiles  ? write_tiles(out, std::move(work.gaussians), work.save, earth)
         : levels ? save_levels(out, std::move(work.gaussians), work.save)
                  : save_splats(out, work.gaussians, work.save);
     std::vector<std::string> remarks = work.lost;
     remarks.insert(remarks.end(), quantised.begin(), quantised.end());
 
     if (!arguments.quiet) {
-        fmt::print("{}\n", described(out, page ? "page" : name_of(format), "", size));
+        fmt::print("{}\n", described(out, format_text(out), "", size));
         const std::vector<fs::path> values = values_of(out);
         if (!values.empty())
             fmt::print("{}{}: the values of this {}, {}\n", core::one_line(values[0].string()),
@@ -336,7 +330,8 @@ Action add_convert(CLI::App& app) {
                    ".compressed.ply .splat .spz .sog meta.json lod-meta.json .glb .gltf .usda .usdz, inputs "
                    "also .ksplat, "
                    "and an output "
-                   "also .html, a page that shows the scene in a browser. An input may be the folder of a "
+                   "also .html, a page that shows the scene in a browser, and tileset.json, 3D Tiles. An "
+                   "input may be the folder of a "
                    "training run. IN:STEP, as in b.ply:move=1,0,0, moves one input alone; more steps follow "
                    "after more colons")
         ->required()
@@ -351,16 +346,29 @@ Action add_convert(CLI::App& app) {
         ->transform(one_of({"3", "4"}))
         ->type_name("3|4")
         ->capture_default_str();
-    app.add_option(
-           "--levels", arguments->levels,
-           "Levels of a lod-meta.json, each with half of the splats of the one before [until one has at "
-           "most a million]")
+    app.add_flag("--gltf-spz", arguments->gltf_spz,
+                 "Pack the splats of a .glb or .gltf as SPZ (KHR_gaussian_splatting_compression_spz_2)");
+    app.add_option("--levels", arguments->levels,
+                   "Levels of a lod-meta.json, tileset.json or --unbundled page, each with half of the "
+                   "splats of the one "
+                   "before [until one "
+                   "has at most a million, or a tile 100,000]")
         ->transform(in_range(1, 32))
         ->type_name("N");
     app.add_option("--level", arguments->level,
                    "Level of the inputs to read, each a lod-meta.json. 0: the finest")
         ->transform(in_range(0, 31))
         ->type_name("N");
+    app.add_flag(
+        "--unbundled", arguments->unbundled,
+        "Write the scene of a page beside it, as a lod-meta.json, of which a web server gives the browser "
+        "what a view needs");
+    app.add_option(
+           "--geo", arguments->geo,
+           "Where a tileset.json puts the scene, in degrees (WGS 84) and metres: x points east, z to the "
+           "heading, which is north without it, and y down. Or ecef: the scene's coordinates are those of "
+           "the earth")
+        ->type_name("LAT,LON,HEIGHT[,HEADING]|ecef");
     app.add_flag("--bake-sky", arguments->bake_sky,
                  "Add opaque splats far away in place of the sky of the run: for viewers that have none");
     app.add_flag("--allow-empty", arguments->allow_empty, "Write the output even if no splat is left");

@@ -14,6 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kLevels = "lod-meta.json";
 constexpr int kStartWidth = 1280, kStartHeight = 720;
 
 /// The cameras of the run's dataset, in the order of their names. Empty, with a remark, where they cannot be read.
@@ -33,8 +34,8 @@ bool names_page(const fs::path& path) {
     return extension == ".html" || extension == ".htm";
 }
 
-std::vector<std::string> write_page(const fs::path& path, const Gaussians& gaussians,
-                                    const SaveOptions& options, const std::optional<live::Run>& run) {
+std::vector<std::string> write_page(const fs::path& path, Gaussians gaussians, const SaveOptions& options,
+                                    const std::optional<live::Run>& run, bool unbundled) {
     std::vector<std::string> remarks;
     report::ScenePage page;
     page.title = path.stem().string();
@@ -54,7 +55,13 @@ std::vector<std::string> write_page(const fs::path& path, const Gaussians& gauss
     page.start = page.views.empty() ? framing.camera : page.views.front().camera;
     page.target = framing.target;
     page.up = framing.up;
-    page.sog = sog_bytes(path, gaussians, options, remarks);
+    if (unbundled) {
+        page.levels = kLevels;
+        for (std::string& remark : save_levels(path.parent_path() / kLevels, std::move(gaussians), options))
+            remarks.push_back(std::move(remark));
+    } else {
+        page.sog = sog_bytes(path, gaussians, options, remarks);
+    }
     file.write(report::scene_page_html(page));
     file.commit();
     return remarks;

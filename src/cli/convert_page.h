@@ -14,9 +14,11 @@ namespace ewa::cli {
 /// Whether the name is that of a page: .html or .htm.
 bool names_page(const std::filesystem::path& path);
 
-/// Writes the page. run: its dataset's cameras become the views of the page, and its background is the page's; empty: none.
-/// Returns a line for each thing that the page does not have. Throws InputError, RunError.
-std::vector<std::string> write_page(const std::filesystem::path& path, const Gaussians& gaussians,
-                                    const SaveOptions& options, const std::optional<live::Run>& run);
+/// Writes the page with the scene inside, or unbundled with a lod-meta.json of options.levels beside it. run: its dataset's cameras become the
+/// views of the page, and its background is the page's; empty: none. Returns a line for each thing that the page does not have. Throws
+/// InputError, RunError.
+std::vector<std::string> write_page(const std::filesystem::path& path, Gaussians gaussians,
+                                    const SaveOptions& options, const std::optional<live::Run>& run,
+                                    bool unbundled);
 
 }  // namespace ewa::cli

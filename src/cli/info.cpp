@@ -75,6 +75,7 @@ void print_file(const fs::path& path, const SplatScene& scene) {
     fmt::print("{}\nformat          {}{}, {}\n", core::one_line(path.string()), name_of(scene.format),
                scene.variant.empty() ? "" : " (" + scene.variant + ")",
                core::bytes_text(fs::file_size(path)));
+    fmt::print("opens in        {}\n", readers_of(scene.format));
     if (scene.antialiased) fmt::print("anti-aliased    yes: drawn as with --antialias\n");
     if (scene.gaussians.density)
         fmt::print("kernel          density; opacities in the file are fitted to 3DGS's kernel\n");
@@ -131,6 +132,7 @@ void info_splats(const fs::path& path, const live::Run* run, const InfoArguments
         Json out = {{"kind", "splats"},
                     {"format", name_of(scene.format)},
                     {"variant", scene.variant},
+                    {"readers", readers_of(scene.format)},
                     {"bytes", fs::file_size(path)},
                     {"antialiased", scene.antialiased},
                     {"density", gaussians.density},

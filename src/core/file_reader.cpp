@@ -29,8 +29,11 @@ FileReader::FileReader(const std::filesystem::path& path) : name_(one_line(path.
     buffer_.resize(static_cast<size_t>(std::min<uint64_t>(size_, kBufferBytes)));
 }
 
+FileReader::FileReader(std::string name, std::vector<std::byte> bytes)
+    : name_(std::move(name)), size_(bytes.size()), buffer_(std::move(bytes)), end_(buffer_.size()) {}
+
 FileReader::~FileReader() {
-    close(descriptor_);
+    if (descriptor_ >= 0) close(descriptor_);
 }
 
 void FileReader::fail(std::string_view text) const {
@@ -80,10 +83,14 @@ void FileReader::go_to(uint64_t offset, std::string_view what) {
     if (offset > size_)
         fail("the file ends before " + std::string(what) + ", which is said to be at byte " +
              std::to_string(offset) + " of " + std::to_string(size_));
+    offset_ = offset;
+    if (descriptor_ < 0) {  // all bytes are in the buffer
+        begin_ = static_cast<size_t>(offset);
+        return;
+    }
     if (lseek(descriptor_, static_cast<off_t>(offset), SEEK_SET) < 0)
         fail(std::string("cannot be read: ") + std::strerror(errno));
     begin_ = end_ = 0;
-    offset_ = offset;
 }
 
 std::string FileReader::read_zero_terminated(size_t limit, std::string_view what) {

@@ -19,6 +19,8 @@ class FileReader {
   public:
     /// Throws InputError if the file does not exist, is not a regular file or cannot be opened.
     explicit FileReader(const std::filesystem::path& path);
+    /// Reads bytes in memory as if they were a file. name: what errors begin with.
+    FileReader(std::string name, std::vector<std::byte> bytes);
     ~FileReader();
     FileReader(const FileReader&) = delete;
     FileReader& operator=(const FileReader&) = delete;

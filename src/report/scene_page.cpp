@@ -17,6 +17,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr int kBudget = 1'000'000;  // splats on the screen, of a page with levels
+
 Json numbers(const glm::dvec3& v) {
     return {v.x, v.y, v.z};
 }
@@ -38,6 +40,10 @@ std::string settings_text(const ScenePage& page) {
                      {"target", numbers(page.target)},
                      {"start", view_json(page.start)},
                      {"cameras", Json::array()}};
+    if (!page.levels.empty()) {
+        settings["levels"] = page.levels;
+        settings["budget"] = kBudget;
+    }
     for (const PageView& view : page.views) {
         Json json = view_json(view.camera);
         json["name"] = view.name;
@@ -62,6 +68,7 @@ std::string scene_page_html(const ScenePage& page) {
         html += text;
         rest.remove_prefix(at + mark.size());
     };
+    fill("@CONNECT@", page.levels.empty() ? "" : "; connect-src 'self'");
     const std::string title = escape_html(page.title);
     fill("@TITLE@", title);
     fill("@TITLE@", title);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One HTML file that shows a scene of splats in a browser, without a network. Its program is in web/.
+// An HTML file that shows a scene of splats in a browser: one inside it without a network, or levels of detail beside it from a web server.
+// Its program is in web/.
 #pragma once
 #include <array>
 #include <string>
@@ -18,7 +19,8 @@ struct PageView {
 
 struct ScenePage {
     std::string title;
-    std::string sog;                     // a .sog file of version 2 with stored entries
+    std::string sog;          // a .sog file of version 2 with stored entries; empty with `levels`
+    std::string levels = {};  // name of the lod-meta.json beside the page; empty: the scene is in the page
     std::array<float, 3> background{};   // RGB, 0..1
     Camera start;                        // the first view
     glm::dvec3 up{0, -1, 0}, target{0};  // world: unit length; the point that the views turn about

@@ -346,6 +346,64 @@ TEST(GltfSplats, ClaimsAreBounded) {
     instanced.refused({"more than 4096 primitives"});
 }
 
+/// The same splats from a .glb with an SPZ as from the .spz of the same version.
+TEST(GltfSplats, SpzInside) {
+    const TempFolder folder;
+    const Gaussians g = storable_splats(3, 60, 3);
+    SaveOptions options;
+    options.gltf_spz = options.antialiased = true;
+    options.spz_version = 2;
+    save_splats(folder / "a.glb", g, options);
+    save_splats(folder / "a.spz", g, options);
+    const SplatScene inside = read_splats(folder / "a.glb"), alone = read_splats(folder / "a.spz");
+    EXPECT_TRUE(inside.antialiased);
+    EXPECT_EQ(inside.gaussians.means, alone.gaussians.means);
+    EXPECT_EQ(inside.gaussians.log_scales, alone.gaussians.log_scales);
+    EXPECT_EQ(inside.gaussians.sh, alone.gaussians.sh);
+    EXPECT_EQ(inside.gaussians.quaternions, alone.gaussians.quaternions);
+    EXPECT_LT(largest_differences(g, inside.gaussians).rotation, 0.1);
+
+    save_splats(folder / "b.gltf", g, options);
+    json top = json::parse(test::file_bytes(folder / "b.gltf"));
+    json& primitive = top["meshes"][0]["primitives"][0];
+    json& extension = primitive["extensions"]["KHR_gaussian_splatting"];
+    json& nested = extension["extensions"]["KHR_gaussian_splatting_compression_spz_2"];
+    const json names = {"KHR_gaussian_splatting", "KHR_gaussian_splatting_compression_spz_2"};
+    EXPECT_EQ(top["extensionsUsed"], names);
+    EXPECT_EQ(top["extensionsRequired"], names);
+    for (const json& accessor : top["accessors"]) EXPECT_FALSE(accessor.contains("bufferView"));
+    // The values of SPZ's library for glTF: x and z are those of the .spz, negated.
+    const json& bounds = top["accessors"][primitive["attributes"]["POSITION"].get<int>()];
+    float left = 10;
+    for (size_t i = 0; i < g.size(); ++i) left = std::min(left, -g.means[3 * i]);
+    EXPECT_FLOAT_EQ(bounds["min"][0], left);
+    const auto read = [&] { return read_splats(folder.write("b.gltf", top.dump())).gaussians; };
+    EXPECT_EQ(read().means, alone.gaussians.means);
+    // Cesium's older profile has no such turn.
+    json older = top;
+    older["meshes"][0]["primitives"][0]["extensions"]["KHR_gaussian_splatting"] = {
+        {"extensions", {{"KHR_gaussian_splatting_compression_spz_2", nested}}}};
+    const Gaussians turned = read_splats(folder.write("b.gltf", older.dump())).gaussians;
+    for (size_t i = 0; i < g.size(); ++i)
+        for (size_t k = 0; k < 3; ++k)
+            ASSERT_EQ(turned.means[3 * i + k], (k == 1 ? 1 : -1) * alone.gaussians.means[3 * i + k]);
+
+    const auto refuse = [&](std::initializer_list<std::string> parts) {
+        expect_error<InputError>([&] { read(); }, parts);
+    };
+    nested["bufferView"] = 9;
+    refuse({"b.gltf", "bufferView"});
+    nested["bufferView"] = 0;
+    extension["kernel"] = "cube";
+    refuse({"kernel"});
+    extension["kernel"] = "ellipse";
+    top["accessors"][primitive["attributes"]["POSITION"].get<int>()]["count"] = 61;
+    refuse({"60 splats", "61"});
+    top["accessors"][primitive["attributes"]["POSITION"].get<int>()]["count"] = 60;
+    top["bufferViews"][0]["byteLength"] = 40;
+    refuse({"b.gltf", "the SPZ", "byte"});
+}
+
 TEST(GltfSplats, GlbChunks) {
     TempFolder folder;
     save_splats(folder / "a.glb", storable_splats(1, 5, 0));

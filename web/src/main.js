@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page: decodes its scene, and draws it when something changes.
+import {openArchive} from "./archive.js";
 import {between, Camera} from "./camera.js";
 import {Controls} from "./controls.js";
+import {joined, LevelScene, openLevels} from "./levels.js";
 import {Renderer} from "./renderer.js";
 import {decodeSog} from "./sog.js";
 import {Sorter} from "./sorter.js";
@@ -10,6 +12,7 @@ import {turn} from "./vector.js";
 const byId = (id) => document.getElementById(id);
 const state = document.documentElement.dataset;  // for whoever drives the page
 const kSecondsAView = 1.5, kSecondsARound = 20;
+const kRest = 200;  // ms without a new view, after which levels are chosen
 
 function say(text) {
     byId("message").hidden = text === "";
@@ -35,11 +38,18 @@ function bytesOf(text) {
 }
 
 class Page {
-    constructor(gl, scene, settings) {
-        Object.assign(this, {gl, settings, canvas: gl.canvas, renderer: new Renderer(gl, scene), index: -1, film: 0,
-                             light: false, drawn: false});
+    constructor(gl, settings) {
+        Object.assign(this, {gl, settings, canvas: gl.canvas, renderer: new Renderer(gl), index: -1, film: 0, light: false,
+                             coming: null, levels: null, timer: null, rested: ""});
         this.camera = new Camera(settings.start, settings.up, settings.target);
-        this.sorter = new Sorter(scene.positions, (order) => {
+        this.sorter = new Sorter((order, scene) => {
+            try {
+                // A scene replaces the one before together with its order.
+                if (this.coming?.number === scene) this.renderer.setScene(this.coming.scene);
+            } catch (error) {
+                return fail(error);
+            }
+            if (this.coming?.number === scene) this.coming = null;
             this.renderer.setOrder(order);
             this.request();
         });
@@ -48,10 +58,40 @@ class Page {
             this.request();
         });
         new ResizeObserver(() => this.request()).observe(this.canvas);
-        byId("count").textContent = `${scene.count.toLocaleString("en")} splats`;
         this.addCommands();
         this.jump();
         this.request();
+    }
+
+    /// Shows the scene as soon as it is sorted.
+    show(scene) {
+        state.splats = scene.count;
+        byId("count").textContent = `${scene.count.toLocaleString("en")} splats`;
+        const {positions} = scene;
+        scene.positions = null;
+        this.coming = {scene, number: this.sorter.setPositions(positions)};
+        this.request();
+    }
+
+    /// Shows the levels of a lod-meta.json that suit the view.
+    stream(meta) {
+        const wanted = Number(new URLSearchParams(location.hash.slice(1)).get("budget"));
+        this.levels = new LevelScene(this.gl, meta, wanted > 0 ? wanted : this.settings.budget, () => {
+            const parts = this.levels.shown();
+            state.levels = this.levels.chosen.join();
+            if (parts.length > 0) this.show(joined(parts));
+        }, fail);
+        this.rest();
+    }
+
+    /// Chooses levels once the view has stayed for a moment.
+    rest() {
+        clearTimeout(this.timer);
+        this.timer = setTimeout(() => {
+            this.timer = null;
+            this.levels.choose(this.camera.eye, this.camera.forward);
+            this.request();
+        }, kRest);
     }
 
     /// The view that the address names: #camera=3, #camera=NAME, #light.
@@ -128,7 +168,7 @@ class Page {
     }
 
     request() {
-        state.scene = "drawing";
+        if (state.scene !== "failed") state.scene = "drawing";
         if (this.waiting) return;
         this.waiting = true;
         requestAnimationFrame(() => {
@@ -143,15 +183,25 @@ class Page {
         const width = Math.max(1, Math.round(canvas.clientWidth * scale)),
               height = Math.max(1, Math.round(canvas.clientHeight * scale));
         if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, {width, height});
+        const view = [...camera.eye, ...camera.forward].join();
+        if (this.levels && view !== this.rested) this.rest();
+        this.rested = view;
         this.sorter.sort([...camera.eye], [...camera.forward]);
+        if (!this.renderer.splats) return;
         this.renderer.draw(camera.for(width, height), width, height, this.light ? [1, 1, 1] : this.settings.background);
         byId("where").textContent = this.index < 0 ? "" : this.settings.cameras[this.index].name;
         byId("play").textContent = this.film ? "⏸" : "▶";
-        if (!this.sorter.current()) return;
-        state.scene = "ready";
+        if (!this.sorter.current() || state.scene === "failed") return;
+        if (this.levels && (this.timer !== null || !this.levels.complete())) state.scene = "refining";
+        else state.scene = "ready";
         say("");
         if (this.film) this.request();
     }
+}
+
+function fail(error) {
+    state.scene = "failed";
+    say(`The scene cannot be shown: ${error.message}`);
 }
 
 async function start() {
@@ -166,11 +216,15 @@ async function start() {
     try {
         const settings = JSON.parse(byId("settings").textContent), text = byId("scene").textContent.trim();
         byId("scene").remove();
-        const scene = await decodeSog(gl, bytesOf(text), (part) => { byId("progress").value = part; });
-        new Page(gl, scene, settings);
+        if (settings.levels) {
+            const meta = await openLevels(settings.levels);
+            return new Page(gl, settings).stream(meta);
+        }
+        const files = openArchive(bytesOf(text));
+        const scene = await decodeSog(gl, (name) => files.get(name), (part) => { byId("progress").value = part; });
+        new Page(gl, settings).show(scene);
     } catch (error) {
-        state.scene = "failed";
-        say(`The scene cannot be shown: ${error.message}`);
+        fail(error);
     }
 }
 

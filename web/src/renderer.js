@@ -22,35 +22,63 @@ function compile(gl, vertex, fragment) {
 }
 
 export class Renderer {
-    /// scene: of decodeSog.
-    constructor(gl, scene) {
+    constructor(gl) {
         this.gl = gl;
-        this.splats = compile(gl, splatVertex(scene), splatFragment);
         this.screen = compile(gl, screenVertex, screenFragment);
         // Eight bits would round after each splat.
         this.format = gl.getExtension("EXT_color_buffer_float") ? gl.RGBA16F
                     : gl.getExtension("EXT_color_buffer_half_float") ? gl.RGBA16F : gl.RGBA8;
-        const width = 2048, height = Math.max(1, Math.ceil(scene.count / 1024));
-        if (height > gl.getParameter(gl.MAX_TEXTURE_SIZE))
-            throw new Error(`this device cannot hold ${scene.count.toLocaleString("en")} splats`);
-        const rows = new Uint32Array(4 * width * height);
-        rows.set(scene.packed);
-        this.textures = [this.texture(gl.RGBA32UI, width, height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, rows),
-                         this.texture(gl.R32F, 256, 3, gl.RED, gl.FLOAT, scene.codebooks)];
-        if (scene.palette)
-            this.textures.push(this.texture(gl.RGBA8UI, scene.palette.width, scene.palette.height, gl.RGBA_INTEGER,
-                                            gl.UNSIGNED_BYTE, scene.palette.data));
+        this.textures = [];
+        this.kind = "";
         this.order = gl.createBuffer();
         this.count = 0;
         this.vertices = gl.createVertexArray();
         gl.bindVertexArray(this.vertices);
         gl.bindBuffer(gl.ARRAY_BUFFER, this.order);
-        gl.bufferData(gl.ARRAY_BUFFER, 4 * Math.max(1, scene.count), gl.DYNAMIC_DRAW);
         gl.enableVertexAttribArray(0);
         gl.vertexAttribIPointer(0, 1, gl.UNSIGNED_INT, 0, 0);
         gl.vertexAttribDivisor(0, 1);
         this.empty = gl.createVertexArray();
         this.target = {frame: gl.createFramebuffer(), picture: null, width: 0, height: 0};
+    }
+
+    /// Another scene in place of the present one, without an order. scene: of decodeSog or joined.
+    setScene(scene) {
+        const gl = this.gl, kind = `${scene.degree} ${scene.antialias} ${scene.chunks !== undefined}`;
+        if (kind !== this.kind) this.splats = compile(gl, splatVertex(scene), splatFragment);
+        this.kind = kind;
+        for (const {texture} of this.textures) gl.deleteTexture(texture);
+        const width = 2048, height = Math.max(1, Math.ceil(scene.count / 1024));
+        if (height > gl.getParameter(gl.MAX_TEXTURE_SIZE))
+            throw new Error(`this device cannot hold ${scene.count.toLocaleString("en")} splats`);
+        const rows = new Uint32Array(4 * width * height), flat = gl.TEXTURE_2D;
+        rows.set(scene.packed);
+        const books = 3 * (scene.chunks ?? 1);
+        this.textures = [{target: flat, texture: this.texture(gl.RGBA32UI, width, height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, rows)},
+                         {target: flat, texture: this.texture(gl.R32F, 256, books, gl.RED, gl.FLOAT, scene.codebooks)}];
+        if (scene.palette)
+            this.textures.push({target: flat, texture: this.texture(gl.RGBA8UI, scene.palette.width, scene.palette.height,
+                                                                    gl.RGBA_INTEGER, gl.UNSIGNED_BYTE, scene.palette.data)});
+        if (scene.palettes?.length > 0) this.textures.push({target: gl.TEXTURE_2D_ARRAY, texture: this.layers(scene.palettes)});
+        this.count = 0;
+        gl.bindBuffer(gl.ARRAY_BUFFER, this.order);
+        gl.bufferData(gl.ARRAY_BUFFER, 4 * Math.max(1, scene.count), gl.DYNAMIC_DRAW);
+    }
+
+    /// One layer for each palette; null leaves a layer of zeros.
+    layers(palettes) {
+        const gl = this.gl, target = gl.TEXTURE_2D_ARRAY, texture = gl.createTexture();
+        const largest = (side) => Math.max(...palettes.map((palette) => palette?.[side] ?? 1));
+        gl.bindTexture(target, texture);
+        gl.texParameteri(target, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+        gl.texParameteri(target, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+        gl.texStorage3D(target, 1, gl.RGBA8UI, largest("width"), largest("height"), palettes.length);
+        palettes.forEach((palette, layer) => {
+            if (palette)
+                gl.texSubImage3D(target, 0, 0, 0, layer, palette.width, palette.height, 1, gl.RGBA_INTEGER, gl.UNSIGNED_BYTE,
+                                 palette.data);
+        });
+        return texture;
     }
 
     texture(format, width, height, layout, type, data) {
@@ -90,9 +118,9 @@ export class Renderer {
         gl.clear(gl.COLOR_BUFFER_BIT);
         gl.useProgram(this.splats.program);
         const places = this.splats.places;
-        this.textures.forEach((texture, unit) => {
+        this.textures.forEach(({target, texture}, unit) => {
             gl.activeTexture(gl.TEXTURE0 + unit);
-            gl.bindTexture(gl.TEXTURE_2D, texture);
+            gl.bindTexture(target, texture);
             gl.uniform1i(places[["splats", "codebooks", "palette"][unit]], unit);
         });
         gl.uniformMatrix3fv(places.rotation, true, camera.rows.flat());

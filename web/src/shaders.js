@@ -5,6 +5,7 @@ const kHeader = `#version 300 es
 precision highp float;
 precision highp int;
 precision highp usampler2D;
+precision highp usampler2DArray;
 `;
 
 // SH of degree 1 to 3 in INRIA's order, after degree 0.
@@ -21,13 +22,13 @@ const kBands = [
        + sh(13u) * (1.445305721320277 * d.z * (d.x * d.x - d.y * d.y))
        + sh(14u) * (-0.5900435899266435 * d.x * (d.x * d.x - 3.0 * d.y * d.y));`];
 
-/// The vertex shader of a scene: what it does not need is left out.
-export function splatVertex({degree, antialias}) {
-    const coefficients = [0, 3, 8, 15][degree];
+/// The vertex shader of a scene: what it does not need is left out. chunks: how many chunks it is made of; missing for one SOG.
+export function splatVertex({degree, antialias, chunks}) {
+    const coefficients = [0, 3, 8, 15][degree], many = chunks !== undefined;
     return kHeader + `
 uniform usampler2D splats;
 uniform sampler2D codebooks;
-${degree > 0 ? "uniform usampler2D palette;" : ""}
+${degree > 0 ? `uniform usampler2D${many ? "Array" : ""} palette;` : ""}
 uniform mat3 rotation;
 uniform vec3 eye;
 uniform vec4 lens;      // fx, fy, cx, cy in px
@@ -36,7 +37,10 @@ layout(location = 0) in uint index;
 out vec2 at;            // standard deviations
 flat out vec4 tint;     // colour and opacity
 
-float code(uint word, int channel, int table) { return texelFetch(codebooks, ivec2(int(word >> (8 * channel) & 255u), table), 0).x; }
+${many ? "int chunk;" : ""}
+float code(uint word, int channel, int table) {
+    return texelFetch(codebooks, ivec2(int(word >> (8 * channel) & 255u), table${many ? " + 3 * chunk" : ""}), 0).x;
+}
 vec3 codes(uint word, int table) { return vec3(code(word, 0, table), code(word, 1, table), code(word, 2, table)); }
 
 mat3 rotation_of(uint word) {
@@ -54,7 +58,7 @@ mat3 rotation_of(uint word) {
 ${degree > 0 ? `
 uint row;
 vec3 sh(uint k) {
-    uvec4 word = texelFetch(palette, ivec2(int((row & 63u) * ${coefficients}u + k), int(row >> 6)), 0);
+    uvec4 word = texelFetch(palette, ivec${many ? 3 : 2}(int((row & 63u) * ${coefficients}u + k), int(row >> 6)${many ? ", chunk" : ""}), 0);
     return codes(word.x | word.y << 8 | word.z << 16, 2);
 }` : ""}
 vec3 color_of(uint word, vec3 d) {
@@ -67,6 +71,7 @@ void main() {
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
     ivec2 texel = ivec2(int(index & 1023u) * 2, int(index >> 10));
     uvec4 a = texelFetch(splats, texel, 0), b = texelFetch(splats, texel + ivec2(1, 0), 0);
+    ${many ? "chunk = int(b.w);" : ""}
     vec3 relative = uintBitsToFloat(a.xyz) - eye, p = rotation * relative;
     if (!(p.z > 0.01)) return;
 

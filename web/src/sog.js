@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Decodes a SOG of version 2 (src/io/splats/sog.h describes the layout).
-import {openArchive} from "./archive.js";
-
 /// Reads the bytes of images as they are stored: a 2D canvas would multiply colour by alpha.
 class PixelReader {
     constructor(gl) {
@@ -42,19 +40,18 @@ function positionsOf(meta, low, high) {
 
 /// Returns {count, degree, positions, packed, codebooks, palette}.
 /// - packed: 8 uint32 a splat: x y z as float bits, the palette's row, the bytes of rotation, scale codes, and colour codes
-///   with the opacity; one is unused.
+///   with the opacity; one is unused here.
 /// - codebooks: three tables of 256: standard deviations, SH degree 0, SH of higher degrees.
 /// - palette: an image of SH codes, or null.
-/// progress(0..1) is called on the way.
-export async function decodeSog(gl, bytes, progress) {
-    const files = openArchive(bytes);
-    const meta = JSON.parse(new TextDecoder().decode(files.get("meta.json")));
+/// open(name) gives the bytes of a file of the SOG, at once or later. progress(0..1) is called on the way.
+export async function decodeSog(gl, open, progress) {
+    const meta = JSON.parse(new TextDecoder().decode(await open("meta.json")));
     const reader = new PixelReader(gl);
     const names = [...meta.means.files, ...meta.quats.files, ...meta.scales.files, ...meta.sh0.files,
                    ...(meta.shN ? meta.shN.files : [])];
     const images = new Map();
     for (const name of names) {
-        images.set(name, await reader.read(files.get(name)));
+        images.set(name, await reader.read(await open(name)));
         progress(images.size / (names.length + 1));
     }
     const pixels = (part, i = 0) => images.get(meta[part].files[i]).data;

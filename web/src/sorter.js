@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The order of the splats, near to far, in a worker.
 
-/// The worker's whole program: it must not use names from outside. First message: the positions, 3 floats a splat. Each
-/// further one: {eye, forward}. Answers {order, count, eye, forward}; splats behind the camera are not in the order.
+/// The worker's whole program: it must not use names from outside. A message is the positions, 3 floats a splat, or a view,
+/// {eye, forward, scene}. It answers a view with {order, eye, forward, scene}; splats behind the camera are not in the order.
 function program() {
     let positions, keys, order, other;
     const counts = new Uint32Array(2048), depth = new Float32Array(1), bits = new Uint32Array(depth.buffer);
@@ -26,7 +26,7 @@ function program() {
             other = new Uint32Array(data.length / 3);
             return;
         }
-        const {eye, forward} = data;
+        const {eye, forward, scene} = data;
         let count = 0;
         for (let i = 0, at = 0; i < keys.length; ++i, at += 3) {
             depth[0] = (positions[at] - eye[0]) * forward[0] + (positions[at + 1] - eye[1]) * forward[1] +
@@ -38,26 +38,34 @@ function program() {
         pass(0, count, order, other);
         pass(11, count, other, order);
         const result = order.slice(0, count);
-        postMessage({order: result, eye, forward}, [result.buffer]);
+        postMessage({order: result, eye, forward, scene}, [result.buffer]);
     };
 }
 
 export class Sorter {
-    /// sorted(order) is called after each sort.
-    constructor(positions, sorted) {
+    /// sorted(order, scene) is called after each sort, with the number of the scene.
+    constructor(sorted) {
         const source = URL.createObjectURL(new Blob([`(${program})()`], {type: "text/javascript"}));
         this.worker = new Worker(source);
         URL.revokeObjectURL(source);
-        this.worker.postMessage(positions, [positions.buffer]);
         this.busy = false;
+        this.scene = 0;      // how often positions were set
         this.done = null;    // the view of the last sort
         this.wanted = null;
         this.worker.onmessage = ({data}) => {
             this.busy = false;
             this.done = data;
-            sorted(data.order);
+            if (data.scene === this.scene) sorted(data.order, data.scene);
             this.start();
         };
+    }
+
+    /// Another scene, which is sorted from now on. The array is given away. Returns its number.
+    setPositions(positions) {
+        this.worker.postMessage(positions, [positions.buffer]);
+        this.scene += 1;
+        this.start();
+        return this.scene;
     }
 
     /// Sorts for a camera, after the sort that runs.
@@ -71,12 +79,13 @@ export class Sorter {
 
     same() {
         const near = (a, b) => a.every((v, i) => v === b[i]);
-        return this.done !== null && near(this.done.eye, this.wanted.eye) && near(this.done.forward, this.wanted.forward);
+        return this.done !== null && this.done.scene === this.scene && near(this.done.eye, this.wanted.eye) &&
+               near(this.done.forward, this.wanted.forward);
     }
 
     start() {
-        if (this.busy || this.wanted === null || this.same()) return;
+        if (this.busy || this.wanted === null || this.scene === 0 || this.same()) return;
         this.busy = true;
-        this.worker.postMessage(this.wanted);
+        this.worker.postMessage({...this.wanted, scene: this.scene});
     }
 }

@@ -322,6 +322,16 @@ GltfDocument::Buffer GltfDocument::open_view(int index, const std::string& what)
     return part;
 }
 
+std::vector<std::byte> GltfDocument::view_bytes(int index, const std::string& what) const {
+    const Buffer part = open_view(index, what);
+    const std::byte* bytes = reinterpret_cast<const std::byte*>(part.data.data());
+    if (part.file.empty()) return {bytes, bytes + part.size};
+    core::FileReader reader(part.file);
+    reader.skip(part.begin, what);
+    bytes = reader.take(size_t(part.size), what);
+    return {bytes, bytes + part.size};
+}
+
 std::vector<unsigned char> GltfDocument::image_bytes(size_t index) const {
     const ImageSource& source = images_[index];
     const std::string what = "image " + std::to_string(index) + ": ";

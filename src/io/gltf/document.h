@@ -55,6 +55,9 @@ class GltfDocument {
     void read(const tinygltf::Accessor& accessor, const std::string& what,
               const std::function<void(size_t, const double*)>& element) const;
 
+    /// The bytes of a buffer view. what: begins the errors.
+    std::vector<std::byte> view_bytes(int index, const std::string& what) const;
+
     /// With GltfContent::meshes: the number of images, and the encoded bytes of one, from its file, buffer or
     /// data URI. Throws InputError, also for more than 64 MiB.
     size_t images() const { return images_.size(); }

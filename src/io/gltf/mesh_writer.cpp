@@ -11,6 +11,7 @@
 #include "core/atomic_file.h"
 #include "ewa/error.h"
 #include "io/gltf/document.h"
+#include "io/gltf/glb_file.h"
 #include "scene/color.h"
 
 namespace ewa::io {
@@ -98,23 +99,13 @@ void write_array(core::AtomicFile& file, const std::vector<Element>& values) {
 
 void write_glb_mesh(const std::filesystem::path& path, const scene::TriangleMesh& mesh) {
     BufferLayout layout;
-    std::string text = structure_of(mesh, layout).dump();
-    text.resize((text.size() + 3) / 4 * 4, ' ');
-    const uint64_t total = 12 + 8 + text.size() + 8 + layout.bytes;
-    if (total > std::numeric_limits<uint32_t>::max())
-        throw InputError(path.string() + ": a .glb is limited to 4 GiB, and this one would have " +
-                         std::to_string(total) + " bytes; write a .ply, or fewer triangles");
-    core::AtomicFile file(path);
-    const uint32_t head[5] = {kGlbMagic, 2, uint32_t(total), uint32_t(text.size()), kGlbJson};
-    file.write(head, sizeof(head));
-    file.write(text);
-    const uint32_t chunk[2] = {uint32_t(layout.bytes), kGlbBin};
-    file.write(chunk, sizeof(chunk));
-    write_array(file, mesh.positions);
-    write_array(file, mesh.normals);
-    write_array(file, linear_colors(mesh));
-    write_array(file, mesh.triangles);
-    file.commit();
+    const std::string text = structure_of(mesh, layout).dump();
+    write_glb(path, text, layout.bytes, "write a .ply, or fewer triangles", [&](core::AtomicFile& file) {
+        write_array(file, mesh.positions);
+        write_array(file, mesh.normals);
+        write_array(file, linear_colors(mesh));
+        write_array(file, mesh.triangles);
+    });
 }
 
 }  // namespace ewa::io

@@ -11,6 +11,10 @@
 #include "ewa/splat_scene.h"
 #include "io/splats/value_files.h"
 
+namespace ewa::core {
+class FileReader;
+}
+
 namespace ewa::io {
 
 class PlyTable;
@@ -54,11 +58,16 @@ SplatScene read_ksplat(const std::filesystem::path& path);
 
 /// SPZ (nianticlabs/spz), versions 1 to 4. SH degree 4 is cut to degree 3, and extension records are skipped.
 SplatScene read_spz(const std::filesystem::path& path);
+SplatScene read_spz(core::FileReader& reader);
 
-/// Writes version 3 or 4, as options.spz_version states. Positions have 12 fractional bits, or fewer if a
+/// Writes version 2, 3 or 4, as options.spz_version states. Positions have 12 fractional bits, or fewer if a
 /// coordinate does not fit. Throws InputError for a coordinate beyond +-8388607 or more than 2^32 - 1 splats.
 std::vector<std::string> write_spz(const std::filesystem::path& path, const Gaussians& gaussians,
                                    const SaveOptions& options);
+
+/// The bytes that write_spz would write to `path`, which errors name.
+std::string pack_spz(const std::filesystem::path& path, const Gaussians& gaussians,
+                     const SaveOptions& options, std::vector<std::string>& remarks);
 
 /// glTF with KHR_gaussian_splatting. Reads every primitive with the extension that the scene's nodes reach,
 /// in the order of the nodes, into one scene. Accepts float32 and the quantised component types, with or
@@ -116,6 +125,7 @@ ValueFiles sog_value_files(const std::filesystem::path& meta);
 /// file and the property. The names in it must stay in its folder. The environment is skipped with a remark.
 SplatScene read_level(const std::filesystem::path& path, size_t level);
 SplatScene read_levels(const std::filesystem::path& path);
+std::vector<size_t> count_levels(const std::filesystem::path& path);
 
 /// Writes the chunks, one level after the other, then the lod-meta.json. Throws InputError for a scene without splats. The same
 /// scene gives the same bytes.

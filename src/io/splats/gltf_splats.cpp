@@ -9,41 +9,33 @@
 //   KHR_gaussian_splatting:OPACITY             linear, 0..1
 //   KHR_gaussian_splatting:SH_DEGREE_l_COEF_m  RGB, l = 0..3, m = 0..2l in INRIA's order
 //   COLOR_0                                    linear colour and opacity, for programs that draw points
+// With KHR_gaussian_splatting_compression_spz_2 (draft), the values are an SPZ in a buffer view, and the accessors have none. The
+// text of the extension turns its values from SPZ's frame (RUB) into glTF's (LUF). Files of Cesium's older profile, without "kernel" and
+// "colorSpace", are in SPZ's frame.
 // glTF's world is LUF (x left, y up, z forward), which is PLY's turned by 180 degrees about z. The writer
 // keeps the stored values and adds that turn as a node's rotation. The reader applies the nodes' transforms,
 // to SH too.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
 #include <glm/mat4x4.hpp>
-#include <limits>
-#include <nlohmann/json.hpp>
 #include <optional>
 
-#include "core/atomic_file.h"
+#include "core/file_reader.h"
 #include "core/folders.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
-#include "io/gltf/document.h"
 #include "io/splats/formats.h"
+#include "io/splats/gltf_splats.h"
 #include "io/splats/linear_colors.h"
 #include "io/splats/splat_values.h"
-#include "scene/color.h"
 
 namespace ewa::io {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-const std::string kPrefix = kSplatExtension + ":";
 constexpr int kMostPlacedPrimitives = 4096;  // each reads its attributes again
-
-std::string sh_name(int degree, int coefficient) {
-    return kPrefix + "SH_DEGREE_" + std::to_string(degree) + "_COEF_" + std::to_string(coefficient);
-}
 
 double opacity_logit(int component_type, double opacity) {
     const uint32_t steps = component_type == TINYGLTF_COMPONENT_TYPE_BYTE             ? 127
@@ -85,9 +77,10 @@ class SplatReader {
                 document_.fail(node + ": more than " + std::to_string(kMostPlacedPrimitives) +
                                " primitives are placed in the scene");
             where_ = "mesh " + std::to_string(index) + ", primitive " + std::to_string(i);
+            turn_ = glm::dmat4(1.0);
             Gaussians part = read_primitive(mesh.primitives[i], extension->second);
             try {
-                transform_splats(part, matrix);
+                transform_splats(part, matrix * turn_);
             } catch (const InputError& error) {
                 document_.fail(node + ": " + error.what());
             }
@@ -99,12 +92,9 @@ class SplatReader {
     }
 
     Gaussians read_primitive(const tinygltf::Primitive& primitive, const tinygltf::Value& extension) {
-        const std::string kernel = text(extension, "kernel"), space = text(extension, "colorSpace");
-        if (kernel != "ellipse")
-            document_.fail(where_ + ": \"kernel\" is \"" + kernel + "\"; only \"ellipse\" is supported");
-        const bool linear = space == "lin_rec709_display";
-        if (!linear && space != "srgb_rec709_display")
-            document_.fail(where_ + ": \"colorSpace\" \"" + space + "\" is not supported");
+        if (const auto view = spz_view(extension)) return read_packed(primitive, extension, *view);
+        check_kernel(extension);
+        const bool linear = is_linear(extension);
         if (primitive.mode != TINYGLTF_MODE_POINTS) remark("a primitive's \"mode\" is not 0 (points)");
 
         const tinygltf::Accessor& position = attribute(primitive, "POSITION", TINYGLTF_TYPE_VEC3);
@@ -114,9 +104,11 @@ class SplatReader {
         require_memory(document_.name(), document_.bytes(), uint64_t(scene_.gaussians.size()) + count_,
                        std::max(g.sh_degree, scene_.gaussians.sh_degree));
         // All accessors are checked before memory is allocated.
-        const tinygltf::Accessor& rotation = attribute(primitive, kPrefix + "ROTATION", TINYGLTF_TYPE_VEC4);
-        const tinygltf::Accessor& scale = attribute(primitive, kPrefix + "SCALE", TINYGLTF_TYPE_VEC3);
-        const tinygltf::Accessor& opacity = attribute(primitive, kPrefix + "OPACITY", TINYGLTF_TYPE_SCALAR);
+        const tinygltf::Accessor& rotation =
+            attribute(primitive, kSplatPrefix + "ROTATION", TINYGLTF_TYPE_VEC4);
+        const tinygltf::Accessor& scale = attribute(primitive, kSplatPrefix + "SCALE", TINYGLTF_TYPE_VEC3);
+        const tinygltf::Accessor& opacity =
+            attribute(primitive, kSplatPrefix + "OPACITY", TINYGLTF_TYPE_SCALAR);
         require_fractions(rotation, "ROTATION");
         require_fractions(opacity, "OPACITY");
         g.resize(count_);
@@ -137,6 +129,58 @@ class SplatReader {
         return g;
     }
 
+    /// The buffer view of the SPZ, if the primitive has one.
+    std::optional<int> spz_view(const tinygltf::Value& extension) const {
+        if (!extension.IsObject() || !extension.Has("extensions")) return std::nullopt;
+        const tinygltf::Value& nested = extension.Get("extensions");
+        if (!nested.IsObject() || !nested.Has(kSpzExtension)) return std::nullopt;
+        const tinygltf::Value& spz = nested.Get(kSpzExtension);
+        if (!spz.IsObject() || !spz.Has("bufferView") || !spz.Get("bufferView").IsInt())
+            document_.fail(where_ + ": " + kSpzExtension + " has no \"bufferView\"");
+        return spz.Get("bufferView").GetNumberAsInt();
+    }
+
+    Gaussians read_packed(const tinygltf::Primitive& primitive, const tinygltf::Value& extension, int view) {
+        if (extension.Has("kernel")) check_kernel(extension);
+        const auto position = primitive.attributes.find("POSITION");
+        if (position == primitive.attributes.end() || position->second < 0 ||
+            size_t(position->second) >= model_.accessors.size())
+            document_.fail(where_ + ", attribute POSITION: is missing");
+        const size_t count = model_.accessors[size_t(position->second)].count;
+        require_memory(document_.name(), document_.bytes(), uint64_t(scene_.gaussians.size()) + count,
+                       scene_.gaussians.sh_degree, kPackedExpansion);
+        const std::string name = document_.name() + ": " + where_ + ", the SPZ";
+        core::FileReader reader(name, document_.view_bytes(view, where_ + ", " + kSpzExtension + ": "));
+        SplatScene packed = read_spz(reader);
+        if (packed.gaussians.size() != count)
+            document_.fail(where_ + ": the SPZ has " + std::to_string(packed.gaussians.size()) +
+                           " splats, and POSITION has " + std::to_string(count));
+        for (const std::string& text : packed.remarks) remark(text);
+        scene_.antialiased = scene_.antialiased || packed.antialiased;
+        scene_.file_sh_degree = std::max(scene_.file_sh_degree, packed.file_sh_degree);
+        // read_spz has turned the values into a PLY's frame.
+        const bool plain = extension.Has("kernel") || extension.Has("colorSpace");
+        turn_[1][1] = -1;
+        turn_[plain ? 0 : 2][plain ? 0 : 2] = -1;
+        if (extension.Has("colorSpace") && is_linear(extension))
+            remark(linear_colors_to_srgb(packed.gaussians));
+        return std::move(packed.gaussians);
+    }
+
+    void check_kernel(const tinygltf::Value& extension) const {
+        const std::string kernel = text(extension, "kernel");
+        if (kernel != "ellipse")
+            document_.fail(where_ + ": \"kernel\" is \"" + kernel + "\"; only \"ellipse\" is supported");
+    }
+
+    bool is_linear(const tinygltf::Value& extension) const {
+        const std::string space = text(extension, "colorSpace");
+        const bool linear = space == "lin_rec709_display";
+        if (!linear && space != "srgb_rec709_display")
+            document_.fail(where_ + ": \"colorSpace\" \"" + space + "\" is not supported");
+        return linear;
+    }
+
     std::string text(const tinygltf::Value& extension, const char* property) const {
         if (!extension.IsObject() || !extension.Has(property) || !extension.Get(property).IsString())
             document_.fail(where_ + ": the extension " + kSplatExtension + " has no \"" + property + "\"");
@@ -152,7 +196,8 @@ class SplatReader {
 
     void require_fractions(const tinygltf::Accessor& accessor, const char* name) const {
         if (accessor.componentType != TINYGLTF_COMPONENT_TYPE_FLOAT && !accessor.normalized)
-            document_.fail(where_ + ", attribute " + kPrefix + name + ": integers must be \"normalized\"");
+            document_.fail(where_ + ", attribute " + kSplatPrefix + name +
+                           ": integers must be \"normalized\"");
     }
 
     void read_values(const tinygltf::Accessor& accessor, const char* name,
@@ -202,177 +247,11 @@ class SplatReader {
     const GltfDocument& document_;
     const tinygltf::Model& model_;
     SplatScene scene_;
-    std::string where_;   // the primitive being read, for errors
-    size_t count_ = 0;    // its splats
-    int primitives_ = 0;  // read so far
+    std::string where_;     // the primitive being read, for errors
+    glm::dmat4 turn_{1.0};  // from its values to the node's frame
+    size_t count_ = 0;      // its splats
+    int primitives_ = 0;    // read so far
 };
-
-// Writing. The layout of the buffer is known before its values, so they go to the file without a copy in
-// memory.
-
-struct Attribute {
-    std::string name;
-    const char* type;
-    size_t bytes;                                                      // per element; a multiple of 4
-    std::function<void(const Gaussians&, size_t, std::byte*)> encode;  // element i
-    int component = TINYGLTF_COMPONENT_TYPE_FLOAT;
-    bool normalized = false;
-};
-
-template <size_t n, class Value>
-Attribute floats(const std::string& name, const char* type, Value value) {
-    const auto encode = [value](const Gaussians& g, size_t i, std::byte* to) {
-        std::array<float, n> values{};
-        for (size_t k = 0; k < n; ++k) values[k] = value(g, i, k);
-        std::memcpy(to, values.data(), sizeof(values));
-    };
-    return {name, type, sizeof(float) * n, encode, TINYGLTF_COMPONENT_TYPE_FLOAT, false};
-}
-
-/// COLOR_0: the base colour in linear light, and opacity.
-void encode_color(const Gaussians& g, size_t i, std::byte* to) {
-    constexpr double kLargest = 65535;
-    std::array<uint16_t, 4> color{};
-    for (size_t k = 0; k < 3; ++k) {
-        const double shown = std::clamp(color_of_sh0(g.sh[g.sh_stride() * i + k]), 0.0, 1.0);
-        color[k] = uint16_t(to_level(scene::linear_of_srgb(shown) * kLargest, uint32_t(kLargest)));
-    }
-    color[3] = uint16_t(to_level(sigmoid(g.opacity_logits[i]) * kLargest, uint32_t(kLargest)));
-    std::memcpy(to, color.data(), sizeof(color));
-}
-
-std::vector<Attribute> attributes_of(const Gaussians& gaussians) {
-    std::vector<Attribute> list;
-    list.push_back(floats<3>("POSITION", "VEC3",
-                             [](const Gaussians& g, size_t i, size_t k) { return g.means[3 * i + k]; }));
-    list.push_back({"COLOR_0", "VEC4", 8, encode_color, TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, true});
-    list.push_back(floats<4>(kPrefix + "ROTATION", "VEC4", [](const Gaussians& g, size_t i, size_t k) {
-        return float(unit_quaternion(&g.quaternions[4 * i])[(k + 1) % 4]);
-    }));
-    list.push_back(floats<3>(kPrefix + "SCALE", "VEC3", [](const Gaussians& g, size_t i, size_t k) {
-        return scale_of_log(g.log_scales[3 * i + k]);
-    }));
-    list.push_back(floats<1>(kPrefix + "OPACITY", "SCALAR", [](const Gaussians& g, size_t i, size_t) {
-        return float(sigmoid(g.opacity_logits[i]));
-    }));
-    size_t first = 0;
-    for (int degree = 0; degree <= gaussians.sh_degree; ++degree)
-        for (int k = 0; k < 2 * degree + 1; ++k, first += 3)
-            list.push_back(
-                floats<3>(sh_name(degree, k), "VEC3", [first](const Gaussians& g, size_t i, size_t channel) {
-                    return g.sh[g.sh_stride() * i + first + channel];
-                }));
-    return list;
-}
-
-void add_bounds(const Gaussians& gaussians, Json& accessor) {
-    std::array<double, 3> low, high;
-    low.fill(std::numeric_limits<double>::infinity());
-    high.fill(-std::numeric_limits<double>::infinity());
-    for (size_t i = 0; i < gaussians.means.size(); ++i) {
-        low[i % 3] = std::min(low[i % 3], double(gaussians.means[i]));
-        high[i % 3] = std::max(high[i % 3], double(gaussians.means[i]));
-    }
-    accessor["min"] = low;
-    accessor["max"] = high;
-}
-
-/// The node turns by 180 degrees about z, because the values are in PLY's frame.
-Json structure(const Gaussians& gaussians, const std::vector<Attribute>& attributes, uint64_t buffer_bytes) {
-    const size_t count = gaussians.size();
-    Json views = Json::array(), accessors = Json::array(), names = Json::object();
-    uint64_t offset = 0;
-    for (const Attribute& attribute : attributes) {
-        const uint64_t bytes = uint64_t(attribute.bytes) * count;
-        Json accessor = {{"bufferView", views.size()},
-                         {"componentType", attribute.component},
-                         {"count", count},
-                         {"type", attribute.type}};
-        if (attribute.normalized) accessor["normalized"] = true;
-        if (attribute.name == "POSITION") add_bounds(gaussians, accessor);
-        names[attribute.name] = accessors.size();
-        accessors.push_back(std::move(accessor));
-        views.push_back({{"buffer", 0},
-                         {"byteOffset", offset},
-                         {"byteLength", bytes},
-                         {"target", TINYGLTF_TARGET_ARRAY_BUFFER}});
-        offset += bytes;
-    }
-    const Json extension = {{"kernel", "ellipse"},
-                            {"colorSpace", "srgb_rec709_display"},
-                            {"projection", "perspective"},
-                            {"sortingMethod", "cameraDistance"}};
-    const Json primitive = {{"attributes", names},
-                            {"mode", TINYGLTF_MODE_POINTS},
-                            {"extensions", {{kSplatExtension, extension}}}};
-    return {{"asset", {{"version", "2.0"}, {"generator", "ewa " EWA_VERSION}}},
-            {"extensionsUsed", {kSplatExtension}},
-            {"scene", 0},
-            {"scenes", {{{"nodes", {0}}}}},
-            {"nodes", {{{"mesh", 0}, {"rotation", {0, 0, 1, 0}}}}},
-            {"meshes", {{{"primitives", {primitive}}}}},
-            {"accessors", accessors},
-            {"bufferViews", views},
-            {"buffers", {{{"byteLength", buffer_bytes}}}}};
-}
-
-void write_values(core::AtomicFile& file, const Gaussians& gaussians,
-                  const std::vector<Attribute>& attributes, const SaveOptions& options) {
-    const size_t n = gaussians.size();
-    for (size_t a = 0; a < attributes.size(); ++a) {
-        encode_in_pieces(
-            n, attributes[a].bytes, [&](size_t i, std::byte* to) { attributes[a].encode(gaussians, i, to); },
-            [&](const std::byte* bytes, size_t size, size_t) { file.write(bytes, size); });
-        if (options.progress) options.progress(n * uint64_t(a + 1) / attributes.size(), n);
-    }
-}
-
-/// Encodes all characters but the unreserved ones of RFC 3986.
-std::string percent_encoded(const std::string& text) {
-    std::string encoded;
-    for (const char c : text) {
-        const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                           c == '-' || c == '.' || c == '_' || c == '~';
-        constexpr const char* kDigits = "0123456789ABCDEF";
-        const auto byte = static_cast<unsigned char>(c);
-        encoded += plain ? std::string(1, c) : std::string{'%', kDigits[byte >> 4], kDigits[byte & 15]};
-    }
-    return encoded;
-}
-
-void write_binary(const std::filesystem::path& path, const Gaussians& gaussians,
-                  const std::vector<Attribute>& attributes, const Json& root, uint64_t bytes,
-                  const SaveOptions& options) {
-    std::string text = root.dump();
-    text.resize((text.size() + 3) / 4 * 4, ' ');
-    const uint64_t total = 12 + 8 + text.size() + 8 + bytes;
-    if (total > std::numeric_limits<uint32_t>::max())
-        throw InputError(path.string() + ": a .glb is limited to 4 GiB, and this one would have " +
-                         std::to_string(total) + " bytes; write a .gltf");
-    core::AtomicFile file(path);
-    const uint32_t head[5] = {kGlbMagic, 2, uint32_t(total), uint32_t(text.size()), kGlbJson};
-    file.write(head, sizeof(head));
-    file.write(text);
-    const uint32_t chunk[2] = {uint32_t(bytes), kGlbBin};
-    file.write(chunk, sizeof(chunk));
-    write_values(file, gaussians, attributes, options);
-    file.commit();
-}
-
-/// Both files are on disk before either is renamed. The new values have another name than the old ones. The rename of
-/// the .gltf thus replaces all of it at once.
-void write_pair(const std::filesystem::path& path, const Gaussians& gaussians,
-                const std::vector<Attribute>& attributes, Json root, const SaveOptions& options) {
-    const ValueFiles beside = gltf_value_files(path);
-    const std::filesystem::path& buffer = beside.written[0];
-    root["buffers"][0]["uri"] = percent_encoded(buffer.filename().string());
-    core::AtomicFile values(buffer), file(path);
-    write_values(values, gaussians, attributes, options);
-    file.write(root.dump(1) + "\n");
-    values.commit();
-    file.commit();
-    remove_values(beside);
-}
 
 }  // namespace
 
@@ -390,20 +269,6 @@ std::vector<std::filesystem::path> gltf_values(const std::filesystem::path& gltf
 
 ValueFiles gltf_value_files(const std::filesystem::path& gltf) {
     return value_files(gltf, {std::filesystem::path(gltf).replace_extension(".bin")}, gltf_values);
-}
-
-std::vector<std::string> write_gltf_splats(const std::filesystem::path& path, const Gaussians& gaussians,
-                                           const SaveOptions& options) {
-    if (gaussians.size() == 0) throw InputError(path.string() + ": glTF cannot store a scene without splats");
-    const std::vector<Attribute> attributes = attributes_of(gaussians);
-    uint64_t bytes = 0;
-    for (const Attribute& attribute : attributes) bytes += uint64_t(attribute.bytes) * gaussians.size();
-    const Json json = structure(gaussians, attributes, bytes);
-    if (core::lower(path.filename().string()).ends_with(".glb"))
-        write_binary(path, gaussians, attributes, json, bytes, options);
-    else
-        write_pair(path, gaussians, attributes, json, options);
-    return {};
 }
 
 }  // namespace ewa::io

@@ -143,6 +143,12 @@ std::string counts_text(const LevelsMeta& meta) {
     return text;
 }
 
+SplatScene read_chunk(const LevelsMeta& meta, size_t index) try {
+    return read_sog_meta(meta.files()[index]);
+} catch (const InputError& error) {
+    meta.fail("\"filenames\" " + std::to_string(index) + ": " + error.what());
+}
+
 }  // namespace
 
 SplatScene read_level(const std::filesystem::path& path, size_t level) {
@@ -157,7 +163,7 @@ SplatScene read_level(const std::filesystem::path& path, size_t level) {
     const std::vector<Rows>& rows = meta.rows(level);
     for (size_t begin = 0, end = 0; begin < rows.size(); begin = end) {
         const std::filesystem::path& file = meta.files()[rows[begin].file];
-        SplatScene chunk = read_sog_meta(file);
+        SplatScene chunk = read_chunk(meta, rows[begin].file);
         std::vector<uint32_t> kept;
         for (end = begin; end < rows.size() && rows[end].file == rows[begin].file; ++end) {
             if (rows[end].offset + rows[end].count > chunk.gaussians.size())
@@ -178,6 +184,13 @@ SplatScene read_level(const std::filesystem::path& path, size_t level) {
     if (meta.has_environment())
         scene.remarks.emplace_back("the environment, which all levels show, is skipped");
     return scene;
+}
+
+std::vector<size_t> count_levels(const std::filesystem::path& path) {
+    const LevelsMeta meta(path);
+    std::vector<size_t> counts;
+    for (size_t level = 0; level < meta.levels(); ++level) counts.push_back(size_t(meta.count(level)));
+    return counts;
 }
 
 SplatScene read_levels(const std::filesystem::path& path) {

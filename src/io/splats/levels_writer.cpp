@@ -1,20 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes streamed SOG, whose layout levels.h describes.
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <limits>
 #include <nlohmann/json.hpp>
-#include <span>
 
 #include "core/atomic_file.h"
 #include "core/folders.h"
 #include "ewa/splat_edit.h"
 #include "io/splats/formats.h"
 #include "io/splats/levels.h"
-#include "scene/splat_shape.h"
+#include "io/splats/splat_tree.h"
 
 namespace ewa::io {
 
@@ -32,111 +27,15 @@ constexpr size_t kMostOfAChunk = size_t(512) << 10;
 /// Levels are made until one has at most this number of splats.
 constexpr size_t kCoarseEnough = 1'000'000;
 
-struct Box {
-    glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
-
-    void add(const glm::dvec3& from, const glm::dvec3& to) {
-        low = glm::min(low, from);
-        high = glm::max(high, to);
-    }
-};
-
 struct LevelRows {
     size_t level, file, offset, count;
 };
 
-struct TreeNode {
-    int axis = -1;  // of an inner node: its first child has what is below the plane
-    float plane = 0;
-    size_t first = 0, second = 0;
-    std::vector<LevelRows> rows;
-    Box bound;
+/// What the file has of a node.
+struct NodeRows {
+    std::vector<LevelRows> rows;  // of a leaf
+    Bound bound;
 };
-
-/// A tree over the means of level 0. Its planes divide the whole of space, so it has a leaf for the splats of each level.
-class SplatTree {
-  public:
-    explicit SplatTree(const Gaussians& gaussians) : g_(gaussians) {
-        std::vector<uint32_t> all(g_.size());
-        for (size_t i = 0; i < all.size(); ++i) all[i] = uint32_t(i);
-        build(all);
-    }
-
-    std::vector<TreeNode>& nodes() { return nodes_; }
-
-    static size_t leaf_of(const std::vector<TreeNode>& nodes, const float* mean) {
-        size_t at = 0;
-        while (nodes[at].axis >= 0)
-            at = mean[nodes[at].axis] < nodes[at].plane ? nodes[at].first : nodes[at].second;
-        return at;
-    }
-
-  private:
-    float place(uint32_t i, int axis) const { return g_.means[3 * size_t(i) + size_t(axis)]; }
-
-    size_t build(std::span<uint32_t> splats) {
-        const size_t index = nodes_.size();
-        nodes_.emplace_back();
-        Box box;
-        for (const uint32_t i : splats) {
-            const glm::dvec3 mean(place(i, 0), place(i, 1), place(i, 2));
-            box.add(mean, mean);
-        }
-        const glm::dvec3 sides = box.high - box.low;
-        int axis = 0;
-        for (int k = 1; k < 3; ++k)
-            if (sides[k] > sides[axis]) axis = k;
-        const bool split =
-            splats.size() > kMostOfALeaf || (sides[axis] > kLongestLeaf && splats.size() > kFew);
-        if (!split || !(sides[axis] > 0)) return index;
-        const auto middle = splats.begin() + std::ptrdiff_t(splats.size() / 2);
-        std::nth_element(splats.begin(), middle, splats.end(),
-                         [&](uint32_t a, uint32_t b) { return place(a, axis) < place(b, axis); });
-        float plane = place(*middle, axis);
-        if (plane == float(box.low[axis])) {  // nothing is below it: the next place divides
-            plane = std::numeric_limits<float>::infinity();
-            for (const uint32_t i : splats)
-                if (place(i, axis) > float(box.low[axis])) plane = std::min(plane, place(i, axis));
-        }
-        // Sorted parts keep the result independent of how nth_element leaves them.
-        const auto second =
-            std::partition(splats.begin(), splats.end(), [&](uint32_t i) { return place(i, axis) < plane; });
-        const size_t below = size_t(second - splats.begin());
-        const size_t left = build(splats.subspan(0, below)), right = build(splats.subspan(below));
-        nodes_[index].axis = axis;
-        nodes_[index].plane = plane;
-        nodes_[index].first = left;
-        nodes_[index].second = right;
-        return index;
-    }
-
-    const Gaussians& g_;
-    std::vector<TreeNode> nodes_;
-};
-
-Gaussians rows_of(const Gaussians& g, std::span<const uint32_t> rows) {
-    Gaussians part;
-    part.sh_degree = g.sh_degree;
-    part.resize(rows.size());
-    const auto copy = [&](const std::vector<float>& from, std::vector<float>& to, size_t stride) {
-        for (size_t i = 0; i < rows.size(); ++i)
-            std::copy_n(from.data() + rows[i] * stride, stride, to.data() + i * stride);
-    };
-    copy(g.means, part.means, 3);
-    copy(g.quaternions, part.quaternions, 4);
-    copy(g.log_scales, part.log_scales, 3);
-    copy(g.opacity_logits, part.opacity_logits, 1);
-    copy(g.sh, part.sh, g.sh_stride());
-    return part;
-}
-
-/// The box of the splat's ellipsoid at one standard deviation.
-void add_ellipsoid(Box& box, const Gaussians& g, size_t i) {
-    const glm::dmat3 c = scene::covariance_of(g, i);
-    const glm::dvec3 mean = g.world_mean(i),
-                     reach(std::sqrt(c[0][0]), std::sqrt(c[1][1]), std::sqrt(c[2][2]));
-    box.add(mean - reach, mean + reach);
-}
 
 /// Seven digits, as other writers have.
 double rounded(double value) {
@@ -159,7 +58,8 @@ class LevelsWriter {
     }
 
     std::vector<std::string> write(Gaussians g) {
-        nodes_ = std::move(SplatTree(g).nodes());
+        nodes_ = build_tree(g, {.most = kMostOfALeaf, .longest = kLongestLeaf, .few = kFew});
+        rows_.resize(nodes_.size());
         for (size_t level = 0; level < sizes_.size(); ++level) {
             if (level > 0) decimate_splats(g, sizes_[level]);
             write_level(g, level);
@@ -181,16 +81,15 @@ class LevelsWriter {
   private:
     void write_level(const Gaussians& g, size_t level) {
         std::vector<std::vector<uint32_t>> splats(nodes_.size());
-        for (size_t i = 0; i < g.size(); ++i)
-            splats[SplatTree::leaf_of(nodes_, &g.means[3 * i])].push_back(uint32_t(i));
+        for (size_t i = 0; i < g.size(); ++i) splats[node_of(nodes_, &g.means[3 * i])].push_back(uint32_t(i));
         Gaussians chunk;
         for (size_t at = 0; at < nodes_.size(); ++at) {
             if (splats[at].empty()) continue;
             Gaussians leaf = rows_of(g, splats[at]);
             splats[at] = {};
-            for (size_t i = 0; i < leaf.size(); ++i) add_ellipsoid(nodes_[at].bound, leaf, i);
+            for (size_t i = 0; i < leaf.size(); ++i) rows_[at].bound.add(bound_of_splat(leaf, i));
             select_splats(leaf, morton_order(leaf));
-            nodes_[at].rows.push_back({level, names_.size(), chunk.size(), leaf.size()});
+            rows_[at].rows.push_back({level, names_.size(), chunk.size(), leaf.size()});
             append_splats(chunk, leaf);
             if (chunk.size() > kMostOfAChunk) write_chunk(chunk, level);
         }
@@ -213,7 +112,7 @@ class LevelsWriter {
         chunk = {};
     }
 
-    static ordered_json json_of(const Box& box) {
+    static ordered_json json_of(const Bound& box) {
         ordered_json json;
         for (int k = 0; k < 3; ++k) {
             json["min"].push_back(rounded(box.low[k]));
@@ -227,18 +126,18 @@ class LevelsWriter {
         for (size_t at = nodes_.size(); at-- > 0;)
             if (nodes_[at].axis >= 0)
                 for (const size_t child : {nodes_[at].first, nodes_[at].second})
-                    nodes_[at].bound.add(nodes_[child].bound.low, nodes_[child].bound.high);
+                    rows_[at].bound.add(rows_[child].bound);
     }
 
     ordered_json json_of(size_t at) const {
         ordered_json json;
-        json["bound"] = json_of(nodes_[at].bound);
+        json["bound"] = json_of(rows_[at].bound);
         if (nodes_[at].axis >= 0) {
             json["children"] = {json_of(nodes_[at].first), json_of(nodes_[at].second)};
             return json;
         }
         json["lods"] = ordered_json::object();
-        for (const LevelRows& rows : nodes_[at].rows)
+        for (const LevelRows& rows : rows_[at].rows)
             json["lods"][std::to_string(rows.level)] = {
                 {"file", rows.file}, {"offset", rows.offset}, {"count", rows.count}};
         return json;
@@ -263,6 +162,7 @@ class LevelsWriter {
     const SaveOptions& options_;
     std::vector<size_t> sizes_;  // of the levels
     std::vector<TreeNode> nodes_;
+    std::vector<NodeRows> rows_;  // of each node
     std::vector<std::string> names_, lost_;
     size_t chunks_ = 0, written_ = 0;
 };

@@ -31,7 +31,12 @@ struct Kind {
     SplatScene (*read)(const std::filesystem::path&);
     /// Null where ewa only reads the format.
     std::vector<std::string> (*write)(const std::filesystem::path&, const Gaussians&, const SaveOptions&);
+    std::string_view readers;  // programs that open it
 };
+constexpr std::string_view kOfSog = "SuperSplat, PlayCanvas, Spark, Babylon.js",
+                           kOfGltf =
+                               "PlayCanvas, Babylon.js, CesiumJS; others that know KHR_gaussian_splatting",
+                           kOfUsd = "Omniverse, Isaac Sim, Houdini; others that know OpenUSD 26.03";
 /// An extension that is the end of another one comes after it. One without a dot is a whole name.
 constexpr Kind kKinds[] = {
     {SplatFormat::compressed_ply,
@@ -39,18 +44,49 @@ constexpr Kind kKinds[] = {
      "compressed PLY",
      {},
      io::read_compressed_ply,
-     io::write_compressed_ply},
-    {SplatFormat::ply, ".ply", "PLY", {"ply\n", "ply\r"}, io::read_ply, io::write_ply},
-    {SplatFormat::splat, ".splat", "splat", {}, io::read_splat, io::write_splat},
-    {SplatFormat::spz, ".spz", "SPZ", {"NGSP", "\x1f\x8b"}, io::read_spz, io::write_spz},
-    {SplatFormat::glb, ".glb", "GLB", {"glTF"}, io::read_gltf_splats, io::write_gltf_splats},
-    {SplatFormat::gltf, ".gltf", "glTF", {"{"}, io::read_gltf_splats, io::write_gltf_splats},
-    {SplatFormat::sog, ".sog", "SOG", {"PK\x03\x04"}, io::read_sog, io::write_sog},
-    {SplatFormat::sog_meta, "meta.json", "SOG", {}, io::read_sog_meta, io::write_sog_meta},
-    {SplatFormat::sog_levels, "lod-meta.json", "streamed SOG", {}, io::read_levels, write_levels_of_copy},
-    {SplatFormat::usda, ".usda", "USD", {"#usd", "PXR-"}, io::read_usda, io::write_usda},
-    {SplatFormat::usdz, ".usdz", "USDZ", {}, io::read_usdz, io::write_usdz},
-    {SplatFormat::ksplat, ".ksplat", "ksplat", {std::string_view("\0\1\0\0", 4)}, io::read_ksplat, nullptr}};
+     io::write_compressed_ply,
+     "SuperSplat, PlayCanvas, Spark, Babylon.js"},
+    {SplatFormat::ply,
+     ".ply",
+     "PLY",
+     {"ply\n", "ply\r"},
+     io::read_ply,
+     io::write_ply,
+     "SuperSplat, PlayCanvas, Spark, Babylon.js, SIBR's viewers; trainers and editors"},
+    {SplatFormat::splat,
+     ".splat",
+     "splat",
+     {},
+     io::read_splat,
+     io::write_splat,
+     "antimatter15/splat, SuperSplat, Spark, Babylon.js"},
+    {SplatFormat::spz,
+     ".spz",
+     "SPZ",
+     {"NGSP", "\x1f\x8b"},
+     io::read_spz,
+     io::write_spz,
+     "SuperSplat, Spark, Babylon.js, Scaniverse"},
+    {SplatFormat::glb, ".glb", "GLB", {"glTF"}, io::read_gltf_splats, io::write_gltf_splats, kOfGltf},
+    {SplatFormat::gltf, ".gltf", "glTF", {"{"}, io::read_gltf_splats, io::write_gltf_splats, kOfGltf},
+    {SplatFormat::sog, ".sog", "SOG", {"PK\x03\x04"}, io::read_sog, io::write_sog, kOfSog},
+    {SplatFormat::sog_meta, "meta.json", "SOG", {}, io::read_sog_meta, io::write_sog_meta, kOfSog},
+    {SplatFormat::sog_levels,
+     "lod-meta.json",
+     "streamed SOG",
+     {},
+     io::read_levels,
+     write_levels_of_copy,
+     "PlayCanvas, SuperSplat's viewer"},
+    {SplatFormat::usda, ".usda", "USD", {"#usd", "PXR-"}, io::read_usda, io::write_usda, kOfUsd},
+    {SplatFormat::usdz, ".usdz", "USDZ", {}, io::read_usdz, io::write_usdz, kOfUsd},
+    {SplatFormat::ksplat,
+     ".ksplat",
+     "ksplat",
+     {std::string_view("\0\1\0\0", 4)},
+     io::read_ksplat,
+     nullptr,
+     "GaussianSplats3D, Spark"}};
 
 const Kind& kind_of(SplatFormat format) {
     return *std::ranges::find(kKinds, format, &Kind::format);
@@ -89,6 +125,11 @@ const Kind* kind_of_head(std::string_view head) {
         for (const std::string_view beginning : kind.beginnings)
             if (!beginning.empty() && head.starts_with(beginning)) return &kind;
     return nullptr;
+}
+
+void require_levels(const std::filesystem::path& path) {
+    if (format_of_file(path) != SplatFormat::sog_levels)
+        throw InputError(core::one_line(path.string()) + ": has no levels; a lod-meta.json has");
 }
 
 void warn_of(const std::filesystem::path& path, const std::vector<std::string>& remarks) {
@@ -154,6 +195,10 @@ std::string_view name_of(SplatFormat format) {
     return kind_of(format).name;
 }
 
+std::string_view readers_of(SplatFormat format) {
+    return kind_of(format).readers;
+}
+
 SplatFormat format_of_name(const std::filesystem::path& path) {
     const Kind* kind = kind_of_name(path);
     if (!kind) refuse(path, all_kinds());
@@ -196,9 +241,13 @@ SplatScene read_splats(const std::filesystem::path& path) {
 }
 
 SplatScene read_splat_level(const std::filesystem::path& path, size_t level) {
-    if (format_of_file(path) != SplatFormat::sog_levels)
-        throw InputError(core::one_line(path.string()) + ": has no levels; a lod-meta.json has");
+    require_levels(path);
     return io::read_level(path, level);
+}
+
+std::vector<size_t> level_counts(const std::filesystem::path& path) {
+    require_levels(path);
+    return io::count_levels(path);
 }
 
 Gaussians load_splats(const std::filesystem::path& path) {
@@ -236,7 +285,7 @@ std::vector<std::string> save_splats(const std::filesystem::path& path, const Ga
         more = write(path, drawable_only(gaussians, remarks), options);
     remarks.insert(remarks.end(), more.begin(), more.end());
     const bool unmarked = !ply && format != SplatFormat::compressed_ply && format != SplatFormat::spz &&
-                          format != SplatFormat::sog && format != SplatFormat::sog_meta;
+                          format != SplatFormat::sog && format != SplatFormat::sog_meta && !options.gltf_spz;
     if (options.antialiased && unmarked)
         remarks.push_back("the mark that the scene was trained anti-aliased is dropped");
     if (!options.comments.empty() && !ply && format != SplatFormat::compressed_ply)

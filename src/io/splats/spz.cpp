@@ -278,7 +278,8 @@ int fractional_bits(const std::filesystem::path& path, const Gaussians& gaussian
 
 class Encoder {
   public:
-    Encoder(const Gaussians& gaussians, int bits) : g_(gaussians), bits_(bits) {}
+    Encoder(const Gaussians& gaussians, int bits, int version)
+        : g_(gaussians), bits_(bits), version_(version) {}
 
     size_t clamped() const { return clamped_; }  // values outside the range of their byte
 
@@ -333,6 +334,10 @@ class Encoder {
     void encode_rotation(size_t i, uint8_t* to) const {
         const std::array<double, 4> wxyz = unit_quaternion(&g_.quaternions[4 * i]);
         const std::array<double, 4> q = {kFlip[0] * wxyz[1], kFlip[1] * wxyz[2], kFlip[2] * wxyz[3], wxyz[0]};
+        if (version_ < 3) {
+            for (size_t k = 0; k < 3; ++k) to[k] = to_byte((q[3] < 0 ? -q[k] : q[k]) * 127.5 + 127.5);
+            return;
+        }
         const size_t largest = largest_component(q);
         const bool negate = q[largest] < 0;  // -q is the same rotation
         uint32_t word = uint32_t(largest);
@@ -347,7 +352,7 @@ class Encoder {
     }
 
     const Gaussians& g_;
-    int bits_;
+    int bits_, version_;
     size_t clamped_ = 0;
 };
 
@@ -371,10 +376,9 @@ std::vector<std::byte> header(const Gaussians& gaussians, const SaveOptions& opt
 
 using Sizes = std::array<size_t, kBlocks>;
 
-void write_gzipped(core::AtomicFile& file, const std::vector<std::byte>& head, const Sizes& sizes,
+void write_gzipped(const Packer::Sink& sink, const std::vector<std::byte>& head, const Sizes& sizes,
                    Encoder& encoder, size_t count, const SaveOptions& options) {
-    const std::unique_ptr<Packer> packer =
-        make_gzip([&](const void* bytes, size_t n) { file.write(bytes, n); });
+    const std::unique_ptr<Packer> packer = make_gzip(sink);
     packer->write(head.data(), head.size());
     for (int block = 0; block < kBlocks; ++block) {
         write_block(Block(block), sizes[size_t(block)], encoder, count, *packer);
@@ -383,8 +387,8 @@ void write_gzipped(core::AtomicFile& file, const std::vector<std::byte>& head, c
     packer->finish();
 }
 
-void write_streams(core::AtomicFile& file, std::vector<std::byte> head, const Sizes& sizes, Encoder& encoder,
-                   size_t count, const SaveOptions& options) {
+void write_streams(const Packer::Sink& sink, std::vector<std::byte> head, const Sizes& sizes,
+                   Encoder& encoder, size_t count, const SaveOptions& options) {
     std::vector<uint64_t> table;
     std::vector<std::byte> packed;
     for (int block = 0; block < kBlocks; ++block) {
@@ -406,48 +410,70 @@ void write_streams(core::AtomicFile& file, std::vector<std::byte> head, const Si
     head.resize(kPackedHeaderBytes);
     const auto table_at = uint32_t(kPackedHeaderBytes);
     std::memcpy(&head[kHeaderBytes], &table_at, sizeof(table_at));
-    file.write(head.data(), head.size());
-    file.write(table.data(), table.size() * sizeof(table[0]));
-    file.write(packed.data(), packed.size());
+    sink(head.data(), head.size());
+    sink(table.data(), table.size() * sizeof(table[0]));
+    sink(packed.data(), packed.size());
 }
 
-}  // namespace
-
-SplatScene read_spz(const std::filesystem::path& path) {
-    core::FileReader reader(path);
-    if (reader.size() < 2) reader.fail("this is not an SPZ file: it has less than 2 bytes");
-    const bool gzipped = reader.read<uint16_t>("the header") == 0x8b1f;
-    reader.go_to(0, "the header");
-    return gzipped ? read_gzipped(reader) : read_streams(reader);
-}
-
-std::vector<std::string> write_spz(const std::filesystem::path& path, const Gaussians& gaussians,
-                                   const SaveOptions& options) {
-    if (options.spz_version != 3 && options.spz_version != 4)
+/// Passes the bytes of the file to the sink, and returns the remarks.
+std::vector<std::string> write_to(const Packer::Sink& sink, const std::filesystem::path& path,
+                                  const Gaussians& gaussians, const SaveOptions& options) {
+    if (options.spz_version < 2 || options.spz_version > 4)
         throw InputError("SPZ version " + std::to_string(options.spz_version) +
-                         " cannot be written; write 3 or 4");
+                         " cannot be written; write 2, 3 or 4");
     if (gaussians.size() > std::numeric_limits<uint32_t>::max())
         throw InputError(path.string() + ": SPZ holds no more than 4294967295 splats");
     const int bits = fractional_bits(path, gaussians);
     const Sizes sizes = block_bytes(uint32_t(options.spz_version), gaussians.sh_degree);
-    Encoder encoder(gaussians, bits);
-    core::AtomicFile file(path);
+    Encoder encoder(gaussians, bits, options.spz_version);
     const std::vector<std::byte> head = header(gaussians, options, bits);
-    if (options.spz_version == 3)
-        write_gzipped(file, head, sizes, encoder, gaussians.size(), options);
+    if (options.spz_version < 4)
+        write_gzipped(sink, head, sizes, encoder, gaussians.size(), options);
     else
-        write_streams(file, head, sizes, encoder, gaussians.size(), options);
-    file.commit();
+        write_streams(sink, head, sizes, encoder, gaussians.size(), options);
 
     std::vector<std::string> remarks = {"positions are rounded to 1/" + std::to_string(1 << bits) +
                                         ", scales to 1/16 of their logarithm, colours and opacities to 8 "
-                                        "bits, rotations to 10 bits per component"};
+                                        "bits, rotations to " +
+                                        (options.spz_version < 3 ? "8" : "10") + " bits per component"};
     if (gaussians.sh_degree > 0)
         remarks.push_back("SH coefficients have 5 bits (degree 1) and 4 bits (others), clamped to -1..1");
     if (encoder.clamped() > 0)
         remarks.push_back(std::to_string(encoder.clamped()) +
                           " scales, colours and SH coefficients are outside SPZ's range and are clamped");
     return remarks;
+}
+
+}  // namespace
+
+SplatScene read_spz(core::FileReader& reader) {
+    if (reader.size() < 2) reader.fail("this is not an SPZ file: it has less than 2 bytes");
+    const bool gzipped = reader.read<uint16_t>("the header") == 0x8b1f;
+    reader.go_to(0, "the header");
+    return gzipped ? read_gzipped(reader) : read_streams(reader);
+}
+
+SplatScene read_spz(const std::filesystem::path& path) {
+    core::FileReader reader(path);
+    return read_spz(reader);
+}
+
+std::vector<std::string> write_spz(const std::filesystem::path& path, const Gaussians& gaussians,
+                                   const SaveOptions& options) {
+    core::AtomicFile file(path);
+    std::vector<std::string> remarks =
+        write_to([&](const void* bytes, size_t n) { file.write(bytes, n); }, path, gaussians, options);
+    file.commit();
+    return remarks;
+}
+
+std::string pack_spz(const std::filesystem::path& path, const Gaussians& gaussians,
+                     const SaveOptions& options, std::vector<std::string>& remarks) {
+    std::string packed;
+    remarks =
+        write_to([&](const void* bytes, size_t n) { packed.append(static_cast<const char*>(bytes), n); },
+                 path, gaussians, options);
+    return packed;
 }
 
 }  // namespace ewa::io

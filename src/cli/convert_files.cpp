@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/convert_files.h"
+
+#include "cli/convert_page.h"
+#include "cli/convert_tiles.h"
+#include "core/text.h"
+#include "ewa/error.h"
+#include "ewa/splat_files.h"
+#include "io/splats/formats.h"
+
+namespace ewa::cli {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> values_of(const fs::path& path) {
+    const std::string name = core::lower(path.filename().string());
+    if (name.ends_with(".gltf")) return io::gltf_values(path);
+    if (name == "lod-meta.json") return io::level_files(path);
+    return name == "meta.json" ? io::sog_images(path) : std::vector<fs::path>();
+}
+
+uint64_t bytes_of(const std::vector<fs::path>& files) {
+    uint64_t sum = 0;
+    for (const fs::path& file : files) sum += fs::file_size(file);
+    return sum;
+}
+
+void check_not_a_part(const fs::path& out, const fs::path& input) {
+    const fs::path folder = fs::weakly_canonical(input).parent_path();
+    const std::string name = folder.filename().string();
+    const bool chunk =
+        name.find('_') != std::string::npos && name.find_first_not_of("0123456789_") == std::string::npos;
+    if ((names_tileset(out) ? name == "tiles" : chunk) &&
+        folder.parent_path() == fs::weakly_canonical(out).parent_path())
+        throw InputError(core::one_line(out.string()) + ": would replace its parts, of which an input, " +
+                         core::one_line(input.string()) + ", is one; write to another folder");
+}
+
+std::string_view format_text(const fs::path& out) {
+    if (names_page(out)) return "page";
+    return names_tileset(out) ? "3D Tiles" : name_of(format_of_name(out));
+}
+
+}  // namespace ewa::cli

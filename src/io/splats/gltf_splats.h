@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the reader and the writer of splats in glTF share. gltf_splats.cpp describes the layout.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "ewa/splat_scene.h"
+#include "io/gltf/document.h"
+
+namespace ewa::io {
+
+inline const std::string kSplatPrefix = kSplatExtension + ":";
+
+/// Nested in kSplatExtension: the values of the primitive are an SPZ in a buffer view (Khronos, draft of 2026).
+inline const std::string kSpzExtension = kSplatExtension + "_compression_spz_2";
+
+/// The attribute of an SH coefficient; both count from 0.
+inline std::string sh_name(int degree, int coefficient) {
+    return kSplatPrefix + "SH_DEGREE_" + std::to_string(degree) + "_COEF_" + std::to_string(coefficient);
+}
+
+/// Writes the content of a tile of 3D Tiles: a .glb with an SPZ, in Cesium's older profile. Otherwise as write_gltf_splats.
+std::vector<std::string> write_cesium_tile(const std::filesystem::path& path, const Gaussians& gaussians,
+                                           const SaveOptions& options);
+
+}  // namespace ewa::io

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// A tree of boxes over a scene of splats, for formats with levels of detail.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "ewa/gaussians.h"
+
+namespace ewa::io {
+
+struct Bound {
+    glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
+
+    void add(const glm::dvec3& from, const glm::dvec3& to) {
+        low = glm::min(low, from);
+        high = glm::max(high, to);
+    }
+    void add(const Bound& other) { add(other.low, other.high); }
+};
+
+/// The box of the splat's ellipsoid at one standard deviation, in the world.
+Bound bound_of_splat(const Gaussians& gaussians, size_t i);
+
+struct TreeNode {
+    int axis = -1;  // of an inner node: its first child has what is below the plane
+    float plane = 0;
+    size_t first = 0, second = 0;  // children; both come after their parent
+};
+
+/// When a node is divided.
+struct TreeLimits {
+    size_t most = 0;     // splats of a leaf
+    double longest = 0;  // a leaf with a longer side is divided too, world units; 0: never for that
+    size_t few = 0;      // unless it has at most so many splats
+    int depth = 64;      // of the deepest leaf; the root has 0
+};
+
+/// Planes through the medians of the means. They divide the whole of space, so that every place is in a leaf. The first node is the
+/// root.
+std::vector<TreeNode> build_tree(const Gaussians& gaussians, const TreeLimits& limits);
+
+/// The node at this depth that has the place, or the leaf above it. mean: three coordinates.
+size_t node_of(const std::vector<TreeNode>& nodes, const float* mean, int depth = 64);
+
+/// These splats of the scene. rows: below size().
+Gaussians rows_of(const Gaussians& gaussians, std::span<const uint32_t> rows);
+
+}  // namespace ewa::io

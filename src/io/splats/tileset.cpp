@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/splats/tileset.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/glm.hpp>
+#include <nlohmann/json.hpp>
+
+#include "core/atomic_file.h"
+#include "core/folders.h"
+#include "ewa/error.h"
+#include "ewa/splat_edit.h"
+#include "io/splats/formats.h"
+#include "io/splats/gltf_splats.h"
+#include "io/splats/splat_tree.h"
+
+namespace ewa::io {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr size_t kMostOfATile = 100'000;
+constexpr int kDeepest = 31;
+constexpr const char* kFolder = "tiles";
+/// CesiumJS replaces a tile whose error covers more than 16 px. Splats that are 2 px wide then suffice.
+constexpr double kErrorPerWidth = 8;
+
+/// From a PLY's frame (x right, y down, z forward) to that of 3D Tiles (x east, y north, z up).
+const glm::dmat4 kUp({1, 0, 0, 0}, {0, 0, -1, 0}, {0, 1, 0, 0}, {0, 0, 0, 1});
+
+struct Tile {
+    int depth = 0;
+    size_t level = 0, splats = 0;
+    double error = 0;  // world units
+    Bound bound;       // in the frame of a PLY, relative to the scene's origin
+    std::string file;
+};
+
+/// The width of a usual splat: twice its second standard deviation, as a surface has two. World units.
+double usual_width(const Gaussians& g) {
+    std::vector<float> widths;
+    for (size_t i = 0; i < g.size(); ++i) {
+        std::array<float, 3> scales = {g.log_scales[3 * i], g.log_scales[3 * i + 1], g.log_scales[3 * i + 2]};
+        std::ranges::sort(scales);
+        widths.push_back(scales[1]);
+    }
+    const auto middle = widths.begin() + std::ptrdiff_t(widths.size() / 2);
+    std::nth_element(widths.begin(), middle, widths.end());
+    return 2 * std::exp(double(*middle));
+}
+
+class TilesetWriter {
+  public:
+    TilesetWriter(const std::filesystem::path& path, const TilesetOptions& options)
+        : path_(path), options_(options) {}
+
+    std::vector<std::string> write(Gaussians g) {
+        const glm::dvec3 origin = g.origin;
+        g.origin = glm::dvec3(0);
+        plan(g);
+        core::make_folder(path_.parent_path() / kFolder);
+        const size_t levels = size_t(deepest_) + 1;
+        std::vector<size_t> sizes(1, g.size());
+        for (size_t level = 0; level < levels; ++level) {
+            if (level > 0) {
+                sizes.push_back((sizes.back() + 1) / 2);
+                decimate_splats(g, sizes.back());
+            }
+            write_level(g, level);
+        }
+        join();
+        core::AtomicFile file(path_);
+        file.write(structure(origin).dump(1) + "\n");
+        file.commit();
+        std::string text = std::to_string(written_) + " tiles of levels with ";
+        for (size_t level = 0; level < levels; ++level)
+            text.append(level == 0 ? "" : ", ").append(std::to_string(sizes[level]));
+        std::vector<std::string> remarks(1, text + " splats");
+        remarks.insert(remarks.end(), lost_.begin(), lost_.end());
+        return remarks;
+    }
+
+  private:
+    void plan(const Gaussians& g) {
+        const int levels = options_.save.levels;
+        nodes_ = build_tree(g, {.most = levels > 0 ? size_t(1) : kMostOfATile,
+                                .longest = 0,
+                                .few = 0,
+                                .depth = levels > 0 ? levels - 1 : kDeepest});
+        tiles_.resize(nodes_.size());
+        for (size_t at = 0; at < nodes_.size(); ++at) {
+            deepest_ = std::max(deepest_, tiles_[at].depth);
+            if (nodes_[at].axis < 0) continue;
+            for (const size_t child : {nodes_[at].first, nodes_[at].second})
+                tiles_[child].depth = tiles_[at].depth + 1;
+        }
+        for (size_t at = 0; at < nodes_.size(); ++at)
+            tiles_[at].level = nodes_[at].axis < 0 ? 0 : size_t(deepest_ - tiles_[at].depth);
+    }
+
+    /// Each tile of the level.
+    void write_level(const Gaussians& g, size_t level) {
+        std::vector<std::vector<uint32_t>> splats(nodes_.size());
+        for (size_t i = 0; i < g.size(); ++i)
+            for (int depth = 0; depth <= deepest_; ++depth) {
+                const size_t at = node_of(nodes_, &g.means[3 * i], depth);
+                if (tiles_[at].level != level || tiles_[at].depth != depth) continue;
+                splats[at].push_back(uint32_t(i));
+                break;
+            }
+        for (size_t at = 0; at < nodes_.size(); ++at) {
+            if (splats[at].empty()) continue;
+            Gaussians part = rows_of(g, splats[at]);
+            splats[at] = {};
+            select_splats(part, morton_order(part));
+            write_tile(part, tiles_[at]);
+        }
+    }
+
+    void write_tile(const Gaussians& part, Tile& tile) {
+        for (size_t i = 0; i < part.size(); ++i) tile.bound.add(bound_of_splat(part, i));
+        tile.splats = part.size();
+        tile.error = tile.level == 0 ? 0 : kErrorPerWidth * usual_width(part);
+        tile.file = std::string(kFolder) + "/" + std::to_string(tile.level) + "_" +
+                    std::to_string(written_++) + ".glb";
+        SaveOptions options = options_.save;
+        options.progress = {};
+        lost_ = write_cesium_tile(path_.parent_path() / tile.file, part, options);
+    }
+
+    /// Boxes and errors of parents are those of their children too. Children follow their parents.
+    void join() {
+        for (size_t at = nodes_.size(); at-- > 0;) {
+            if (nodes_[at].axis < 0) continue;
+            for (const size_t child : {nodes_[at].first, nodes_[at].second}) {
+                tiles_[at].bound.add(tiles_[child].bound);
+                tiles_[at].error = std::max(tiles_[at].error, tiles_[child].error);
+            }
+        }
+    }
+
+    static ordered_json box_of(const Bound& bound) {
+        const glm::dvec3 middle = kUp * glm::dvec4(0.5 * (bound.low + bound.high), 1);
+        const glm::dvec3 half = 0.5 * (bound.high - bound.low);
+        return {{"box", {middle.x, middle.y, middle.z, half.x, 0, 0, 0, half.z, 0, 0, 0, half.y}}};
+    }
+
+    ordered_json tile_of(size_t at) const {
+        const Tile& tile = tiles_[at];
+        ordered_json value = {{"boundingVolume", box_of(tile.bound)}, {"geometricError", tile.error}};
+        if (!tile.file.empty()) value["content"]["uri"] = tile.file;
+        if (nodes_[at].axis >= 0)
+            for (const size_t child : {nodes_[at].first, nodes_[at].second})
+                if (tiles_[child].bound.low.x <= tiles_[child].bound.high.x)
+                    value["children"].push_back(tile_of(child));
+        return value;
+    }
+
+    ordered_json structure(const glm::dvec3& origin) const {
+        ordered_json value = {{"asset", {{"version", "1.1"}, {"generator", "ewa " EWA_VERSION}}}};
+        value["extensionsUsed"] = {"3DTILES_content_gltf"};
+        const ordered_json names = {kSplatExtension, kSpzExtension};
+        value["extensions"]["3DTILES_content_gltf"] = {{"extensionsUsed", names},
+                                                       {"extensionsRequired", names}};
+        const Bound& all = tiles_[0].bound;
+        // What a viewer misses that shows nothing at all.
+        value["geometricError"] = std::max(glm::length(all.high - all.low), tiles_[0].error);
+        value["root"] = tile_of(0);
+        value["root"]["refine"] = "REPLACE";
+        glm::dmat4 move(1.0);
+        move[3] = glm::dvec4(origin, 1);
+        if (options_.earth || origin != glm::dvec3(0)) {
+            const glm::dmat4 root = (options_.earth ? *options_.earth : kUp) * move * glm::inverse(kUp);
+            for (int i = 0; i < 16; ++i) value["root"]["transform"].push_back(root[i / 4][i % 4]);
+        }
+        return value;
+    }
+
+    std::filesystem::path path_;
+    const TilesetOptions& options_;
+    std::vector<TreeNode> nodes_;
+    std::vector<Tile> tiles_;
+    std::vector<std::string> lost_;
+    int deepest_ = 0;
+    size_t written_ = 0;
+};
+
+}  // namespace
+
+glm::dmat4 earth_of_place(const Place& place) {
+    constexpr double kRadius = 6378137.0, kFlattening = 1 / 298.257223563;  // WGS 84
+    const double squared = kFlattening * (2 - kFlattening);                 // eccentricity
+    const double latitude = glm::radians(place.latitude), longitude = glm::radians(place.longitude),
+                 heading = glm::radians(place.heading);
+    const glm::dvec3 up(std::cos(latitude) * std::cos(longitude), std::cos(latitude) * std::sin(longitude),
+                        std::sin(latitude));
+    const glm::dvec3 east(-std::sin(longitude), std::cos(longitude), 0), north = glm::cross(up, east);
+    const double normal = kRadius / std::sqrt(1 - squared * up.z * up.z);
+    const glm::dvec3 at(up.x * (normal + place.height), up.y * (normal + place.height),
+                        up.z * (normal * (1 - squared) + place.height));
+    const glm::dvec3 forward = std::cos(heading) * north + std::sin(heading) * east;
+    const glm::dvec3 right = glm::cross(forward, up);
+    return {glm::dvec4(right, 0), glm::dvec4(-up, 0), glm::dvec4(forward, 0), glm::dvec4(at, 1)};
+}
+
+std::vector<std::string> write_tileset(const std::filesystem::path& path, Gaussians gaussians,
+                                       const TilesetOptions& options) {
+    if (gaussians.size() == 0) throw InputError(path.string() + ": a tileset without splats has no box");
+    return TilesetWriter(path, options).write(std::move(gaussians));
+}
+
+}  // namespace ewa::io

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// 3D Tiles 1.1 (OGC 22-025r4): a tileset.json beside the folder tiles/ with a .glb for each tile, for globes such as CesiumJS.
+//
+// A tree divides the scene in boxes, and each tile has the splats in its box: the tiles without children those of the scene, and their
+// parents those of a level with half as many, and so on. A viewer replaces a tile by its children where its geometricError (world
+// units) covers too many pixels. The box is in the frame of 3D Tiles, where z is up.
+//
+// The tiles have Cesium's older profile of KHR_gaussian_splatting_compression_spz_2, without "kernel" and "colorSpace": CesiumJS takes the
+// values of an SPZ as they are stored, which gltf_splats.cpp does for this profile too. So x of a PLY points east, z north and y down.
+#pragma once
+#include <filesystem>
+#include <glm/mat4x4.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ewa/gaussians.h"
+#include "ewa/splat_scene.h"
+
+namespace ewa::io {
+
+inline constexpr const char* kTilesetName = "tileset.json";
+
+/// A place on the globe: WGS 84, degrees and metres above the ellipsoid. heading: of the scene's z axis, clockwise from north.
+struct Place {
+    double latitude = 0, longitude = 0, height = 0, heading = 0;
+};
+
+/// From an INRIA PLY's frame at the place to earth-centred, earth-fixed coordinates (EPSG 4978), metres: x east, z north, y down.
+glm::dmat4 earth_of_place(const Place& place);
+
+struct TilesetOptions {
+    SaveOptions save;  // levels: 0 for tiles of at most 100,000 splats
+    /// From the scene's world to earth-centred, earth-fixed coordinates. Empty: the scene is at no place.
+    std::optional<glm::dmat4> earth;
+};
+
+/// Writes the tiles, then the tileset.json. Returns a line for each thing that the format does not store. Throws InputError for a
+/// scene without splats, RunError. The same scene gives the same bytes. Splats must be drawable, with opacities of 3DGS's kernel.
+std::vector<std::string> write_tileset(const std::filesystem::path& path, Gaussians gaussians,
+                                       const TilesetOptions& options);
+
+}  // namespace ewa::io
