@@ -38,6 +38,7 @@ constexpr int kLargestSide = 16384;  // px
 
 struct Arguments {
     std::filesystem::path path, cameras, picture, views, film, output;
+    size_t budget = kUsualBudget;
     struct {
         std::string address, token;
         std::filesystem::path token_file;
@@ -123,7 +124,7 @@ OpenedScene open_what(const Arguments& arguments, Startup& startup) {
             throw InputError("PATH is required: splats, a dataset, or a run's folder (see ewa-view --help)");
         return {};  // files are dropped on the window
     }
-    OpenedScene scene = open_scene(arguments.path, arguments.cameras);
+    OpenedScene scene = open_scene(arguments.path, arguments.cameras, arguments.budget);
     if (!scene.photos.empty() && (!arguments.picture.empty() || !arguments.film.empty()))
         throw InputError(arguments.path.string() +
                          " has no cameras yet; ewa cameras finds them, and so does the window");
@@ -280,6 +281,10 @@ void add_options(CLI::App& app, Arguments& arguments) {
     option("--background", arguments.background, "COLOUR",
            "Background colour: r,g,b in 0..1, a name such as white, or #rrggbb");
     app.add_flag("--antialias", arguments.antialias, "Render with the filter of Mip-Splatting");
+    option("--budget", arguments.budget, "N",
+           "Splats to show of a lod-meta.json while the view changes: a level with at most so many [1M]")
+        ->transform(CLI::Validator(
+            [](std::string& text) { return core::settle_number(text, size_t(1), size_t(1) << 32); }, ""));
     option("--size", arguments.size, "WxH",
            "Size of the window in px [that of the last session, or panel and picture as large as fits]");
     option("--screenshot", arguments.picture, "FILE",
@@ -302,7 +307,7 @@ void group_options(CLI::App& app) {
     const std::pair<const char*, std::vector<const char*>> subjects[] = {
         {"Data", {"--cameras", "--frame", "--views"}},
         {"Training", {"--train", "--output", "--connect", "--token", "--token-file"}},
-        {"Quality", {"--mode", "--compare", "--background", "--antialias"}},
+        {"Quality", {"--mode", "--compare", "--background", "--antialias", "--budget"}},
         {"Output", {"--size", "--screenshot", "--film", "--film-seconds", "--verbose"}},
         {"Device", {"--device"}}};
     for (const auto& [subject, names] : subjects)

@@ -25,7 +25,7 @@ class Writer {
 
     /// Throws what the render thread throws.
     void write(const Camera& camera, const std::filesystem::path& file) {
-        thread_.ask({camera, look_, 1, ++serial_, file});
+        thread_.ask({camera, look_, 1, false, ++serial_, file});
         for (;;) {
             {
                 std::unique_lock lock(mutex_);

@@ -135,9 +135,21 @@ OpenedScene open_run(const live::Run& run, const fs::path& cameras) {
     return scene;
 }
 
-OpenedScene open_splats(const fs::path& path, const fs::path& cameras) {
+/// The finest level of a lod-meta.json that has at most `budget` splats, or else the last one. Null where level 0, of `splats`
+/// splats, is such a level.
+std::shared_ptr<const Gaussians> level_within(const fs::path& path, size_t splats, size_t budget) {
+    if (splats <= budget || format_of_file(path) != SplatFormat::sog_levels) return nullptr;
+    const std::vector<size_t> counts = level_counts(path);
+    size_t level = 0;
+    while (level + 1 < counts.size() && counts[level] > budget) ++level;
+    if (level == 0) return nullptr;
+    return std::make_shared<const Gaussians>(read_splat_level(path, level).gaussians);
+}
+
+OpenedScene open_splats(const fs::path& path, const fs::path& cameras, size_t budget) {
     OpenedScene scene;
     SplatScene splats = read_splats(path);
+    scene.coarse = level_within(path, splats.gaussians.size(), budget);
     if (splats.antialiased) scene.look.kernel = Footprint::antialias;
     const bool density = splats.gaussians.density;
     if (!splats.remarks.empty()) scene.remark = splats.remarks.front();
@@ -187,7 +199,7 @@ Gaussians splats_of_points(const PointCloud& points) {
     return splats;
 }
 
-OpenedScene open_scene(const fs::path& path, const fs::path& cameras) {
+OpenedScene open_scene(const fs::path& path, const fs::path& cameras, size_t budget) {
     std::error_code error;
     OpenedScene scene;
     if (!fs::exists(path, error)) throw InputError(path.string() + ": no such file or folder");
@@ -203,7 +215,7 @@ OpenedScene open_scene(const fs::path& path, const fs::path& cameras) {
     } else if (fs::is_directory(path, error) || is_dataset_file(path) || is_mesh_scene(path)) {
         scene = open_dataset(path);
     } else {
-        scene = open_splats(path, cameras);
+        scene = open_splats(path, cameras, budget);
     }
     scene.title = scene_title(path);
     scene.path = path;

@@ -14,6 +14,8 @@
 
 namespace ewa::viewer {
 
+inline constexpr size_t kUsualBudget = 1'000'000;  // splats
+
 struct OpenedScene {
     std::string title;           // empty: nothing is open
     std::filesystem::path path;  // as it was named
@@ -22,6 +24,8 @@ struct OpenedScene {
     bool points = false;  // the splats are the points of the dataset
     /// Never null; empty if a run has none yet. set_gaussians() also sets the next two.
     std::shared_ptr<const Gaussians> gaussians = std::make_shared<const Gaussians>();
+    /// A level within the budget, for a view that changes, where a lod-meta.json has more splats. Null: none.
+    std::shared_ptr<const Gaussians> coarse;
     int sh_degree = 0;                       // the highest that changes the image
     std::vector<PlanLine> plan;              // what rendering skips
     std::shared_ptr<const Dataset> dataset;  // null: no cameras
@@ -48,7 +52,9 @@ bool is_dataset(const std::filesystem::path& path);
 /// metrics.jsonl). A run, and the splats.ply of a run, come with the cameras of the run's dataset, if that is
 /// found. cameras: the dataset to use instead; empty: none. Photos without cameras, or a video, only set `photos` and
 /// the title. Throws InputError.
-OpenedScene open_scene(const std::filesystem::path& path, const std::filesystem::path& cameras);
+/// budget: splats of OpenedScene::coarse, at most unless all levels have more.
+OpenedScene open_scene(const std::filesystem::path& path, const std::filesystem::path& cameras,
+                       size_t budget = kUsualBudget);
 
 /// The splats of `splats` with the cameras of `cameras`, and a remark that says so. Both are scenes as opened.
 OpenedScene with_cameras(const OpenedScene& splats, const OpenedScene& cameras);

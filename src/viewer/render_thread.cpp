@@ -56,9 +56,11 @@ RenderThread::RenderThread(OpenDevice open, std::function<void()> on_news)
       on_news_(std::move(on_news)),
       thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
-uint64_t RenderThread::set_scene(std::shared_ptr<const Gaussians> gaussians) {
+uint64_t RenderThread::set_scene(std::shared_ptr<const Gaussians> gaussians,
+                                 std::shared_ptr<const Gaussians> coarse) {
     const std::lock_guard lock(mutex_);
     next_.scene = std::move(gaussians);
+    next_.coarse = std::move(coarse);
     wake_.notify_one();
     return ++next_.scene_number;
 }
@@ -104,6 +106,7 @@ bool RenderThread::next(const std::stop_token& stop, Work& work) {
     wake_.wait(lock, stop, [this] { return next_.probe || next_.full || !waiting_.empty() || next_.scene; });
     if (stop.stop_requested()) return false;
     work.scene = std::exchange(next_.scene, nullptr);
+    work.coarse = std::exchange(next_.coarse, nullptr);
     work.scene_number = next_.scene_number;
     work.probe = std::exchange(next_.probe, std::nullopt);
     if (!waiting_.empty()) {
@@ -118,10 +121,12 @@ bool RenderThread::next(const std::stop_token& stop, Work& work) {
 void RenderThread::prepare(const Work& work) {
     if (work.scene) {
         scene_ = work.scene;
+        coarse_ = work.coarse;
         scene_is_up_ = false;
     }
     if (!device_) {
         renderer_.reset();
+        coarse_renderer_.reset();
         device_ = open_();
         report([&](News& news) { news.device = device_info(*device_).name; });
     }
@@ -129,14 +134,19 @@ void RenderThread::prepare(const Work& work) {
 }
 
 void RenderThread::upload(bool densities) {
-    std::optional<Gaussians> fitted;
-    if (scene_->density != densities) fit_opacities(fitted.emplace(*scene_), densities);
-    const Gaussians& splats = fitted ? *fitted : *scene_;
+    const auto put = [&](const Gaussians& scene, std::optional<Renderer>& renderer) {
+        std::optional<Gaussians> fitted;
+        if (scene.density != densities) fit_opacities(fitted.emplace(scene), densities);
+        const Gaussians& splats = fitted ? *fitted : scene;
+        if (renderer)
+            renderer->replace(splats);
+        else
+            renderer.emplace(device_, splats, RenderOptions{});
+    };
     scene_is_up_ = false;
-    if (renderer_)
-        renderer_->replace(splats);
-    else
-        renderer_.emplace(device_, splats, RenderOptions{});
+    if (!coarse_) coarse_renderer_.reset();
+    put(*scene_, renderer_);
+    if (coarse_) put(*coarse_, coarse_renderer_);
     scene_is_up_ = true;
     densities_are_up_ = densities;
 }
@@ -179,21 +189,22 @@ std::shared_ptr<const RenderedFrame> RenderThread::draw(const RenderRequest& req
     const Look& look = request.look;
     const Camera camera = downscale(request.camera, request.divisor);
     fit_to(look);
+    Renderer& renderer = request.coarse && coarse_renderer_ ? *coarse_renderer_ : *renderer_;
     const DrawOptions options{options_of(look), drawing_for(look.mode), double(look.splat_scale)};
     auto finished = std::make_shared<RenderedFrame>();
     finished->request = request;
     finished->scene = scene;
     const bool bytes_do = request.file.empty() && (look.mode == Mode::color || look.mode == Mode::ellipsoids);
     if (bytes_do) {
-        finished->picture = {camera.width, camera.height, renderer_->render_bytes(camera, options), 0};
+        finished->picture = {camera.width, camera.height, renderer.render_bytes(camera, options), 0};
     } else {
-        const Rendering rendering = renderer_->render(camera, options);
+        const Rendering rendering = renderer.render(camera, options);
         finished->picture = picture_of(rendering, look.mode);
         if (!request.file.empty()) save(request.file, rendering, finished->picture, look.mode);
     }
-    finished->pass_times = renderer_->pass_times();
-    finished->skipped_nonfinite = renderer_->skipped_nonfinite();
-    finished->splats_drawn = renderer_->splats_drawn();
+    finished->pass_times = renderer.pass_times();
+    finished->skipped_nonfinite = renderer.skipped_nonfinite();
+    finished->splats_drawn = renderer.splats_drawn();
     finished->device_bytes = device_bytes(*device_);
     finished->milliseconds =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
@@ -236,6 +247,7 @@ void RenderThread::work(const std::stop_token& stop) {
             } catch (...) {
                 // The device may be lost, or its memory full of unused buffers. Opening it again solves both.
                 renderer_.reset();
+                coarse_renderer_.reset();
                 device_.reset();
                 scene_is_up_ = false;
                 if (!again) fail(work);

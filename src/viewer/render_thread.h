@@ -31,7 +31,8 @@ struct Look {
 struct RenderRequest {
     Camera camera;  // of the size at which the frame is shown
     Look look;
-    int divisor = 1;  // the frame has 1/divisor of that size
+    int divisor = 1;      // the frame has 1/divisor of that size
+    bool coarse = false;  // of the coarse scene, if there is one
     uint64_t serial = 0;
     std::filesystem::path file;  // written as by `ewa render` with this extension; empty: no file
 };
@@ -61,9 +62,10 @@ class RenderThread {
     /// once for each frame that fails.
     RenderThread(OpenDevice open, std::function<void()> on_news);
 
-    /// Sets the scene of all frames requested from now on. Returns the number that RenderedFrame::scene will
-    /// have.
-    uint64_t set_scene(std::shared_ptr<const Gaussians> gaussians);
+    /// Sets the scene of all frames requested from now on. coarse: the same with fewer splats, for RenderRequest::coarse; null:
+    /// none. Returns the number that RenderedFrame::scene will have.
+    uint64_t set_scene(std::shared_ptr<const Gaussians> gaussians,
+                       std::shared_ptr<const Gaussians> coarse = nullptr);
     /// Replaces a waiting request that has no file. The frame that is being rendered is finished first.
     void ask(const RenderRequest& request);
     /// Asks for the point on the surface at a pixel, by its median depth. News::point has it once News::points is the returned
@@ -98,7 +100,7 @@ class RenderThread {
         uint64_t number = 0;
     };
     struct Work {
-        std::shared_ptr<const Gaussians> scene;  // null: as before
+        std::shared_ptr<const Gaussians> scene, coarse;  // scene is null: both as before
         std::optional<RenderRequest> request;
         std::optional<Probe> probe;
         std::optional<Full> full;
@@ -119,8 +121,8 @@ class RenderThread {
     std::function<void()> on_news_;
     // Used by the thread only.
     std::shared_ptr<gpu::Device> device_;
-    std::optional<Renderer> renderer_;
-    std::shared_ptr<const Gaussians> scene_;
+    std::optional<Renderer> renderer_, coarse_renderer_;
+    std::shared_ptr<const Gaussians> scene_, coarse_;
     bool scene_is_up_ = false;
     bool densities_are_up_ = false;  // the scene has opacities of Footprint::density
 

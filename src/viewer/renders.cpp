@@ -101,8 +101,9 @@ void SessionTimes::print(const RenderedFrame* last) const {
     std::fprintf(stderr, "\n");
 }
 
-void Renders::set_scene(std::shared_ptr<const Gaussians> gaussians) {
-    scene_ = thread_.set_scene(std::move(gaussians));
+void Renders::set_scene(std::shared_ptr<const Gaussians> gaussians, std::shared_ptr<const Gaussians> coarse) {
+    has_coarse_ = coarse != nullptr;
+    scene_ = thread_.set_scene(std::move(gaussians), std::move(coarse));
 }
 
 void Renders::send(const RenderRequest& request) {
@@ -112,13 +113,14 @@ void Renders::send(const RenderRequest& request) {
 }
 
 void Renders::ask(const Camera& camera, const Look& look, bool full) {
-    RenderRequest request{camera, look, 1, asked_.serial + 1, {}};
+    RenderRequest request{camera, look, 1, false, asked_.serial + 1, {}};
     const auto now = Clock::now();
     const bool first = asked_.serial == 0;
     if (first || asked_scene_ != scene_ || !same_view(request, asked_)) {
         changed_ = now;
         request.divisor = full ? 1 : first ? kFirstDivisor : pace_.divisor();
-    } else if (asked_.divisor == 1 || now - changed_ < std::chrono::duration<double>(kRestSeconds)) {
+        request.coarse = has_coarse_ && !full;
+    } else if (!reduced() || now - changed_ < std::chrono::duration<double>(kRestSeconds)) {
         // A full frame takes long: a moving camera should not wait for it, and a resting one needs it once.
         return;
     }
@@ -126,7 +128,7 @@ void Renders::ask(const Camera& camera, const Look& look, bool full) {
 }
 
 uint64_t Renders::write(const Camera& camera, const Look& look, const std::filesystem::path& file) {
-    send({camera, look, 1, asked_.serial + 1, file});
+    send({camera, look, 1, false, asked_.serial + 1, file});
     return asked_.serial;
 }
 
@@ -140,14 +142,15 @@ Renders::News Renders::take() {
     news.frame = news.picture != shown_;
     if (news.frame) {
         shown_ = news.picture;
-        pace_.drawn(shown_->request.divisor, shown_->milliseconds);
+        // The frames of a resting view have other splats than those that set the pace.
+        if (shown_->request.coarse == has_coarse_) pace_.drawn(shown_->request.divisor, shown_->milliseconds);
     }
     return news;
 }
 
 bool Renders::settled() const {
     return shown_ && shown_->request.serial == asked_.serial && shown_->request.divisor == 1 &&
-           shown_->scene == scene_ && points_ == points_asked_;
+           !shown_->request.coarse && shown_->scene == scene_ && points_ == points_asked_;
 }
 
 }  // namespace ewa::viewer

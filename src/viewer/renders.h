@@ -77,7 +77,9 @@ class Renders {
     /// wake: called on the render thread when take() has something new.
     Renders(OpenDevice open, std::function<void()> wake) : thread_(std::move(open), std::move(wake)) {}
 
-    void set_scene(std::shared_ptr<const Gaussians> gaussians);
+    /// coarse: the same with fewer splats, which is shown while the view changes; null: none.
+    void set_scene(std::shared_ptr<const Gaussians> gaussians,
+                   std::shared_ptr<const Gaussians> coarse = nullptr);
     /// Asks for the view if it changed, or in full resolution once it has rested. full: always in full
     /// resolution.
     void ask(const Camera& camera, const Look& look, bool full);
@@ -101,14 +103,15 @@ class Renders {
     const std::shared_ptr<const RenderedFrame>& shown() const { return shown_; }
     /// Whether the last frame is the requested one in full resolution, and no point is asked for.
     bool settled() const;
-    /// Whether the requested frame has a reduced resolution, so that a better one follows.
-    bool reduced() const { return asked_.divisor > 1; }
+    /// Whether the requested frame has a reduced resolution or fewer splats, so that a better one follows.
+    bool reduced() const { return asked_.divisor > 1 || asked_.coarse; }
 
   private:
     using Clock = std::chrono::steady_clock;
     void send(const RenderRequest& request);
 
     uint64_t scene_ = 0, asked_scene_ = 0;
+    bool has_coarse_ = false;
     RenderRequest asked_;
     Clock::time_point changed_;  // last change of the requested view
     std::shared_ptr<const RenderedFrame> shown_;

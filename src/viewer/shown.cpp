@@ -28,7 +28,7 @@ Shown::Shown(ViewState& state, Navigation& navigation)
       quality_(state.wake) {}
 
 void Shown::enter_scene() {
-    renders.set_scene(state_.scene.gaussians);
+    renders.set_scene(state_.scene.gaussians, state_.scene.coarse);
     images_.forget_scene();
     measurement = {};
     quality_.forget();

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "cli/expect.h"
 #include "cli/program.h"
 #include "ewa/sky_map.h"
 #include "viewer/opening.h"
@@ -80,6 +81,23 @@ TEST(Opening, TheSplatsOfARunHaveItsCameras) {
     test::write_file(folder / "run/config.json", R"({"dataset": "data"})");
     std::filesystem::copy_file(splats, folder / "run/mine.ply");
     EXPECT_FALSE(open_scene(folder / "run/mine.ply", {}).dataset);
+}
+
+TEST(Opening, AViewThatChangesGetsALevelWithinTheBudget) {
+    const test::Folder folder;
+    test::make_splats(folder / "s.ply", 1000);
+    test::expect_success(
+        test::run_ewa({"convert", folder / "s.ply", folder / "l/lod-meta.json", "--levels", "3"}));
+    const auto coarse = [&](size_t budget) {
+        const OpenedScene scene = open_scene(folder / "l/lod-meta.json", {}, budget);
+        EXPECT_EQ(scene.gaussians->size(), 1000u);
+        return scene.coarse ? scene.coarse->size() : 0;
+    };
+    EXPECT_EQ(coarse(1000), 0u) << "all fit";
+    EXPECT_EQ(coarse(999), 500u);
+    EXPECT_EQ(coarse(499), 250u);
+    EXPECT_EQ(coarse(1), 250u) << "there is no coarser one";
+    EXPECT_EQ(open_scene(folder / "s.ply", {}, 10).coarse, nullptr) << "no levels";
 }
 
 TEST(Opening, AnEmptyFileSaysSo) {

@@ -13,6 +13,7 @@
 #include "support/soon.h"
 #include "viewer/opening.h"
 #include "viewer/render_thread.h"
+#include "viewer/renders.h"
 #include "viewer/view_quality.h"
 
 namespace ewa::viewer {
@@ -103,6 +104,43 @@ TEST(RenderThread, FitsOpacitiesToTheKernel) {
     EXPECT_GT(std::abs(density - peak), 2) << "the fit is of the whole footprint, not of its middle";
     EXPECT_EQ(red(Footprint::density), density) << "the fit is undone";
     EXPECT_EQ(red(Footprint::peak), peak);
+}
+
+/// While the view changes there are fewer splats, and all of them once it rests.
+TEST(Renders, ShowTheCoarseSceneUntilTheViewRests) {
+    Gaussians green = *red_splat();
+    std::swap(green.sh[0], green.sh[1]);
+    Renders renders([] { return open_device({}); }, [] {});
+    renders.set_scene(red_splat(), std::make_shared<const Gaussians>(green));
+    Camera camera = request(0).camera;
+    const auto shown = [&](const Camera& seen, bool coarse) {
+        return soon([&] {
+            renders.ask(seen, {}, false);
+            renders.take();
+            return renders.shown() && renders.shown()->request.camera.fx == seen.fx &&
+                   renders.shown()->request.coarse == coarse;
+        });
+    };
+    const auto red_and_green = [&] {
+        const ByteImage& picture = renders.shown()->picture;
+        const size_t middle = 4 * (size_t(picture.height / 2) * picture.width + picture.width / 2);
+        return std::pair{picture.rgba[middle] > 100, picture.rgba[middle + 1] > 100};
+    };
+    for (int i = 0; i < 2; ++i) {
+        camera.fx += 1;
+        ASSERT_TRUE(shown(camera, true));
+        EXPECT_EQ(red_and_green(), std::pair(false, true));
+        EXPECT_FALSE(renders.settled());
+        ASSERT_TRUE(shown(camera, false));
+        EXPECT_EQ(red_and_green(), std::pair(true, false));
+        EXPECT_TRUE(renders.settled());
+    }
+    camera.fx += 1;
+    renders.ask(camera, {}, true);
+    ASSERT_TRUE(shown(camera, false)) << "a film has all splats";
+    renders.set_scene(red_splat());
+    camera.fx += 1;
+    ASSERT_TRUE(shown(camera, false)) << "there is no coarse scene any more";
 }
 
 TEST(RenderThread, OpensItsDeviceAgainWhereItFails) {
