@@ -42,12 +42,12 @@ TEST(MeshSpace, IsContractedBeyondTheRadius) {
 }
 
 /// A ball in the middle, and a sphere around it and the cameras.
-struct Scene {
+struct SphereScene {
     static constexpr double kBall = 0.5, kBackground = 6;
     const glm::dvec3 middle{0.3, -0.2, 0.1};
     const std::vector<Camera> cameras = test::cameras_around(middle, 20);
     std::vector<Image> depths;
-    Scene() {
+    SphereScene() {
         for (const Camera& camera : cameras) {
             const Image ball = test::sphere_depth(camera, middle, kBall);
             Image depth = test::sphere_depth(camera, middle, kBackground);
@@ -65,7 +65,7 @@ struct Scene {
 };
 
 TEST(MeshSpace, IsAboutWhatTheCamerasLookAt) {
-    const Scene scene;
+    const SphereScene scene;
     const mesh::Space space = mesh::space_of_views(scene.cameras, scene.depth());
     EXPECT_LT(glm::length(space.middle - scene.middle), 0.02);
     EXPECT_NEAR(space.radius, 2, 0.05);
@@ -92,10 +92,10 @@ TEST(MeshSpace, IsAboutWhatTheCamerasLookAt) {
 }
 
 TEST(UnboundedFusion, HasTheMiddleAndTheBackground) {
-    const Scene scene;
+    const SphereScene scene;
     const mesh::Fused unbounded = scene.fused({.voxel = 0.06, .unbounded = true, .least_part = 8});
     const scene::TriangleMesh& m = unbounded.mesh;
-    const double outward = unbounded.voxel_at(scene.middle + glm::dvec3(Scene::kBackground, 0, 0));
+    const double outward = unbounded.voxel_at(scene.middle + glm::dvec3(SphereScene::kBackground, 0, 0));
     EXPECT_NEAR(outward, 0.06 * 9, 0.03);
     size_t near = 0, far = 0;
     double ball = 0, background = 0;
@@ -103,12 +103,12 @@ TEST(UnboundedFusion, HasTheMiddleAndTheBackground) {
         const double at = glm::length(m.origin + glm::dvec3(p) - scene.middle);
         if (at < 2) {
             ++near;
-            ball += std::abs(at - Scene::kBall);
-            EXPECT_NEAR(at, Scene::kBall, 0.04);
+            ball += std::abs(at - SphereScene::kBall);
+            EXPECT_NEAR(at, SphereScene::kBall, 0.04);
         } else {
             ++far;
-            background += std::abs(at - Scene::kBackground);
-            EXPECT_NEAR(at, Scene::kBackground, outward);
+            background += std::abs(at - SphereScene::kBackground);
+            EXPECT_NEAR(at, SphereScene::kBackground, outward);
         }
     }
     EXPECT_GT(near, 1000u);
@@ -124,7 +124,7 @@ TEST(UnboundedFusion, HasTheMiddleAndTheBackground) {
 }
 
 TEST(UnboundedFusion, WhatIsAlmostInfinitelyFarIsLeftOut) {
-    Scene scene;
+    SphereScene scene;
     for (Image& depth : scene.depths)
         for (float& z : depth.pixels)
             if (z > 2) z = 1e6f;
