@@ -32,7 +32,7 @@ foreach(shader ${ewa_shaders})
         if(name IN_LIST ewa_pinhole_shaders)
             set(module ${ewa_spirv_dir}/${name}.${fetches}.pinhole.spv)
             add_custom_command(
-                OUTPUT ${module}.h
+                OUTPUT ${module} ${module}.h # the depfile names the first
                 COMMAND ${CMAKE_COMMAND} -E make_directory ${ewa_spirv_dir}
                 COMMAND ${GLSLANG} --quiet --target-env vulkan1.2 -I${PROJECT_SOURCE_DIR}/shaders ${define} -DEWA_PINHOLE
                         --depfile ${module}.d -V -o ${module} ${shader}

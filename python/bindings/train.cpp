@@ -46,7 +46,6 @@ struct TrainerStart {
     bool own_start = false;  // the first splats are an argument
 
     void resolve_options() {
-        if (own_start && run.train.halvings == kAutomaticHalvings) run.train.halvings = 0;  // finished splats
         run.train = resolve(run.train, *dataset, frames);
         run.train.render.sh_degree = run.train.sh_degree;
     }
@@ -180,6 +179,9 @@ void start_training(Training* self, const LoadedDataset& dataset, nb::handle ini
     start.frames = train_frames.is_none() ? split_frames(*dataset.dataset, usual_test_every()).train
                                           : frames_of(train_frames, *dataset.dataset, "train_frames");
     check_options(start.run);
+    const bool from_points =
+        init.is_none() || (nb::isinstance<nb::str>(init) && nb::cast<std::string>(init) == "sfm");
+    if (!from_points && start.run.train.halvings == kAutomaticHalvings) start.run.train.halvings = 0;
     start.resolve_options();
     new (self) Training(std::move(start), init);
 }

@@ -174,7 +174,13 @@ mesh::FusionOptions fusion_options(const MeshArguments& arguments) {
 void enlarge(mesh::Fused& fused, double scale) {
     if (scale == 1) return;
     fused.mesh.origin *= scale;
-    for (glm::vec3& p : fused.mesh.positions) p *= float(scale);
+    for (glm::vec3& p : fused.mesh.positions) {
+        const glm::dvec3 to = scale * glm::dvec3(p);
+        p = glm::vec3(to);
+        if (!(glm::length(to) <= double(std::numeric_limits<float>::max())))
+            throw InputError(
+                fmt::format("--scale-to: {:g} times as large, the mesh is too large for its numbers", scale));
+    }
     fused.voxel *= scale;
     fused.space.radius *= scale;
 }
@@ -188,15 +194,16 @@ void print(const mesh::Fused& fused, const MeshArguments& arguments, size_t most
                               core::counted(triangles, "triangle"), core::counted(topology.parts, "part"),
                               voxels, mesh::watertight_text(topology)));
     if (most > 0 && triangles > most)
-        progress.note(
-            fmt::format("--triangles {}: with fewer than {}, the surface would tear", most, triangles));
+        progress.note(fmt::format("{} {}: with fewer triangles than {}, the surface would tear",
+                                  arguments.triangles > 0 ? "--triangles" : "--collision with at most", most,
+                                  triangles));
 }
 
 int make_mesh(const MeshArguments& arguments, const std::optional<live::Run>& run) {
     RenderOptions options;
     const DrawArguments draw;
-    const Gaussians gaussians = draw.load(arguments.splats, options);
     const double scale = arguments.scale_to.empty() ? 1 : parse_scale_to(arguments.scale_to);
+    const Gaussians gaussians = draw.load(arguments.splats, options);
     const std::optional<Dataset> dataset = dataset_of_mesh(arguments, run);
     check_output(arguments, dataset);
     const std::vector<Camera> cameras = dataset ? cameras_of(*dataset) : own_cameras(gaussians);

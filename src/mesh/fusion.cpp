@@ -97,11 +97,17 @@ Image fine_depth(const Camera& camera, const Image& depth, const Lattice& lattic
 /// About how many blocks a view needs: those that its pixels cover, times two in depth.
 double blocks_of_view(const Camera& camera, const Image& depth, const Lattice& lattice) {
     const double per_depth = 1 / (focal(camera) * lattice.voxel * kBlockSide);
+    const glm::dmat3 to_world = glm::transpose(camera.rotation);
     double blocks = 0;
-    for (const float z : depth.pixels) {
-        const double side = double(z) * per_depth;
-        blocks += 2 * std::min(1.0, side * side);
-    }
+    for (int y = 0; y < depth.height; ++y)
+        for (int x = 0; x < depth.width; ++x) {
+            const double z = double(*depth.at(x, y));
+            if (!(z > 0)) continue;
+            double side = z * per_depth;
+            if (lattice.contracts())
+                side /= lattice.space.growth(to_world * (z * ray_of(camera, x, y) - camera.translation));
+            blocks += 2 * std::min(1.0, side * side);
+        }
     return blocks;
 }
 

@@ -31,7 +31,7 @@ Protocol protocol_named(const std::string& name) {
 }
 
 size_t points_at(const Surface& mesh, double spacing) {
-    constexpr double kMost = 1e8;
+    constexpr double kMost = 1e7;
     const double points = std::ceil(mesh.area() / (spacing * spacing));
     if (!(points <= kMost))
         throw InputError(

@@ -134,7 +134,7 @@ int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, 
     if (asked.halvings == kAutomaticHalvings) {
         options.train.resolution_every = asked.resolution_every;
         take("resolution-schedule", options);
-        take("resolution-every", options);
+        if (asked.resolution_every == TrainOptions().resolution_every) take("resolution-every", options);
     }
     options.train.measure_exposures = false;
     const int step = earlier.state.report.step;
@@ -151,7 +151,8 @@ int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, 
     before.train.most_halvings = options.train.most_halvings;
     const Schedule schedule = schedule_for(before.train);
     options.train.least_sh_degree = schedule.degree(step);
-    options.train.most_halvings = schedule.halvings_at(step);
+    // The steps of the smaller images were chosen for fewer steps in all.
+    options.train.most_halvings = asked.halvings == kAutomaticHalvings ? 0 : schedule.halvings_at(step);
     return before.train.steps;
 }
 

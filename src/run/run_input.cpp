@@ -399,7 +399,8 @@ RunInput load_run(const RunOptions& options) {
             fmt::format("appearance {}: {}{}", learned ? "ppisp" : "none", choice.reason,
                         learned ? "; --metrics cc_psnr compares held-out images without it" : ""));
     }
-    if (train.halvings == kAutomaticHalvings && options.init != "sfm") train.halvings = 0;  // finished splats
+    // The rule is for splats that start from the dataset's points.
+    if (train.halvings == kAutomaticHalvings && options.init != "sfm") train.halvings = 0;
     train = resolve(train, input.dataset, input.split.train);
     train.render.sh_degree = train.sh_degree;
     input.options.output = output_folder(options);

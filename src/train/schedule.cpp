@@ -36,7 +36,7 @@ constexpr double kLastFading = 0.1;
 constexpr double kPpispWarmUp = 500, kGridWarmUp = 1000, kLastAppearanceRate = 0.01;
 constexpr size_t kMostPhotosOfRate = 400;
 // With kAutomaticHalvings: how long the images of a run have half their sides, and the longest such run.
-constexpr int kCoarseSteps = 100, kLongestCoarseRun = 1000;
+constexpr int kCoarseSteps = 100, kLeastCoarseRun = 10, kLongestCoarseRun = 1000;
 constexpr double kMostCoarse = 0.4;   // of the steps
 constexpr int kMostTileRows = 16;     // px, of any device's tiles
 constexpr double kPruneShare = 0.75;  // of the steps: 0.55 gave no better images (docs/training.md)
@@ -242,15 +242,15 @@ namespace {
 /// pixels than there are points. Each band needs a row of tiles, also in the smaller image.
 bool starts_coarse(const TrainOptions& options, const Dataset& dataset,
                    const std::vector<int>& train_frames) {
-    if (options.steps > train::kLongestCoarseRun || options.strategy != Strategy::adc ||
-        options.render.points || train_frames.size() <= size_t(options.few_photos) ||
-        dataset.points.positions.empty())
+    if (options.steps < train::kLeastCoarseRun || options.steps > train::kLongestCoarseRun ||
+        options.strategy != Strategy::adc || options.render.points ||
+        train_frames.size() <= size_t(options.few_photos) || dataset.points.positions.empty())
         return false;
     return std::ranges::all_of(train_frames, [&](int frame) {
         const Camera& camera = dataset.frames[size_t(frame)].camera;
         const int width = camera.width / 2, height = camera.height / 2;
         return int64_t(width) * height >= int64_t(dataset.points.positions.size()) &&
-               height >= train::kMostTileRows * options.bands;
+               width >= train::kMostTileRows && height >= train::kMostTileRows * options.bands;
     });
 }
 

@@ -76,6 +76,18 @@ void compile_splatting(Compiler& compiler) {
                                        {SPEC_KERNEL, kFootprints},
                                        {SPEC_MODE, {0, PROJECT_DEBUG, PROJECT_NORMALS, PROJECT_SLOPES}}});
     const uint32_t packed = UPDATE_PACKED_MOMENTS;
+    // Without SPEC_LENSES, these three are compiled by their modules for pinholes.
+    const Values other_lenses = {LENSES_ANY, LENSES_ROLLING};
+    compiler.compile<passes::Project>(
+        {{SPEC_SH_DEGREE, {3}}, {SPEC_KERNEL, kFootprints}, {SPEC_MODE, {0}}, {SPEC_LENSES, other_lenses}});
+    compiler.compile<passes::Update>({{SPEC_SH_DEGREE, {3}},
+                                      {SPEC_KERNEL, kFootprints},
+                                      {SPEC_MODE, {packed | UPDATE_STATISTICS}},
+                                      {SPEC_LENSES, other_lenses}});
+    compiler.compile<passes::UpdateViews>({{SPEC_SH_DEGREE, {3}},
+                                           {SPEC_KERNEL, kFootprints},
+                                           {SPEC_MODE, {packed | UPDATE_STATISTICS}},
+                                           {SPEC_LENSES, other_lenses}});
     compiler.compile<passes::Update>(
         {{SPEC_SH_DEGREE, kDegrees},
          {SPEC_KERNEL, kFootprints},

@@ -308,6 +308,8 @@ TEST(Schedule, ShortRunsOfAdcStartWithImagesOfHalfTheirSize) {
     EXPECT_EQ(coarse(500), 100);
     EXPECT_EQ(coarse(1000), 100);
     EXPECT_EQ(coarse(1001), 0);
+    EXPECT_EQ(coarse(10), 4);
+    EXPECT_EQ(coarse(9), 0);
 
     options.resolution_every = 6000;
     EXPECT_EQ(coarse(500), 100) << "as asked for: a fifth";
