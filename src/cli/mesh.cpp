@@ -194,7 +194,7 @@ void print(const mesh::Fused& fused, const MeshArguments& arguments, size_t most
                               core::counted(triangles, "triangle"), core::counted(topology.parts, "part"),
                               voxels, mesh::watertight_text(topology)));
     if (most > 0 && triangles > most)
-        progress.note(fmt::format("{} {}: with fewer triangles than {}, the surface would tear",
+        progress.note(fmt::format("{} {}: with fewer than {}, the surface would tear",
                                   arguments.triangles > 0 ? "--triangles" : "--collision with at most", most,
                                   triangles));
 }
