@@ -290,7 +290,8 @@ int run(CLI::App& app, RenderArguments& arguments) {
     }
     const ViewsOutput output = views_output(arguments.output);
     const bool free = any_given(arguments.views) || (arguments.views.lens && of_frames.empty()) ||
-                      output == ViewsOutput::film || (output == ViewsOutput::image && of_frames.empty());
+                      output == ViewsOutput::film ||
+                      (output == ViewsOutput::image && of_frames.empty() && !arguments.contact_sheet);
     if (input.run && !free) {
         arguments.cameras = dataset_of(*input.run);
         arguments.run = std::move(input.run);

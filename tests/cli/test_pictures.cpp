@@ -188,7 +188,16 @@ TEST_F(Pictures, AContactSheetHasAllViews) {
     make_dataset(data);
     expect_success(run_ewa(
         {"render", splats, "--cameras", data, "--contact-sheet", "--quiet", "-o", folder / "frames.jpg"}));
-    EXPECT_GT(load_image(folder / "frames.jpg").width, 60);
+    const Image frames = load_image(folder / "frames.jpg");
+    EXPECT_GT(frames.width, 60);
+    // A run's are those of its dataset.
+    expect_success(run_ewa({"train", data, "-o", folder / "run", "--init", splats, "--max-splats", "400",
+                            "--steps", "2", "--quiet"}));
+    expect_success(
+        run_ewa({"render", folder / "run", "--contact-sheet", "--quiet", "-o", folder / "run.jpg"}));
+    const Image of_run = load_image(folder / "run.jpg");
+    EXPECT_EQ(of_run.width, frames.width);
+    EXPECT_EQ(of_run.height, frames.height);
     expect_failure(render("d", {"--orbit", "6", "--contact-sheet"}), 2, "one image");
 }
 
