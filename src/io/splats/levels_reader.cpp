@@ -125,7 +125,9 @@ class LevelsMeta {
         });
         for (size_t k = 1; k < rows.size(); ++k)
             if (rows[k].file == rows[k - 1].file && rows[k].offset < rows[k - 1].offset + rows[k - 1].count)
-                fail("two leaves of one level have the same rows of file " + std::to_string(rows[k].file));
+                fail("two leaves of one level have the same rows of the chunk \"" +
+                     core::one_line(files_[rows[k].file].lexically_relative(path_.parent_path()).string()) +
+                     "\"");
     }
 
     std::filesystem::path path_;
