@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/contact_sheet.h"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
+#include "ewa/error.h"
 #include "scene/camera.h"
 
 namespace ewa::cli {
@@ -12,6 +16,8 @@ namespace {
 constexpr int kCellWidth = 320, kGap = 8;     // px
 constexpr int kLowest = 120, kHighest = 480;  // of a cell, px
 constexpr float kPaper = 0.12f;
+constexpr int64_t kLongestSide = 65535,
+                  kMostPixels = 134'000'000;  // as of a render; JPEG has no longer sides
 
 }  // namespace
 
@@ -29,7 +35,13 @@ ContactSheet::ContactSheet(const std::vector<Camera>& views) {
     const int count = int(views.size());
     columns_ = std::clamp(int(std::lround(std::sqrt(1.5 * count * cell_height_ / kCellWidth))), 1, count);
     const int rows = (count + columns_ - 1) / columns_;
-    sheet_ = Image(kGap + columns_ * (kCellWidth + kGap), kGap + rows * (cell_height_ + kGap), 3);
+    const int64_t width = kGap + int64_t(columns_) * (kCellWidth + kGap),
+                  height = kGap + int64_t(rows) * (cell_height_ + kGap);
+    if (width > kLongestSide || height > kLongestSide || width * height > kMostPixels)
+        throw InputError(
+            fmt::format("--contact-sheet: {} views take {}x{} px, more than {} million; choose fewer", count,
+                        width, height, kMostPixels / 1'000'000));
+    sheet_ = Image(int(width), int(height), 3);
     std::ranges::fill(sheet_.pixels, kPaper);
 }
 

@@ -275,6 +275,8 @@ int run(CLI::App& app, RenderArguments& arguments) {
         throw InputError("--mode depth: the integrator march draws no depth; the others do");
     if (arguments.contact_sheet && views_output(arguments.output) != ViewsOutput::image)
         throw InputError("--contact-sheet: all views go into one image; name a .png, .jpg or .exr with -o");
+    if (arguments.contact_sheet && arguments.picture.transparent)
+        throw InputError("--contact-sheet has a background of its own: not with --transparent");
     if (!arguments.codec.empty() && views_output(arguments.output) != ViewsOutput::film)
         throw InputError("--codec: only a film has one, such as -o film.mp4");
     SplatInput input = splat_input(arguments.splats);

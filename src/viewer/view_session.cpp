@@ -146,6 +146,7 @@ void ViewSession::take_live() {
     const bool highest = degree == scene.sh_degree;
     scene.set_gaussians(news.splats);
     scene.points = false;
+    scene.coarse = nullptr;  // of the scene before
     shown_.renders.set_scene(news.splats);
     if (highest) degree = scene.sh_degree;
     navigation_.take_splats();

@@ -199,6 +199,9 @@ TEST_F(Pictures, AContactSheetHasAllViews) {
     EXPECT_EQ(of_run.width, frames.width);
     EXPECT_EQ(of_run.height, frames.height);
     expect_failure(render("d", {"--orbit", "6", "--contact-sheet"}), 2, "one image");
+    expect_failure(render("x.png", {"--orbit", "6", "--contact-sheet", "--transparent"}), 2,
+                   "background of its own");
+    expect_failure(render("x.png", {"--orbit", "3000", "--contact-sheet"}), 2, "3000 views take ");
 }
 
 TEST_F(Pictures, SizesOfScreensHaveNames) {

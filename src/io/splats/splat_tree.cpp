@@ -67,11 +67,11 @@ class TreeBuilder {
 
 }  // namespace
 
-Bound bound_of_splat(const Gaussians& gaussians, size_t i) {
+Bound bound_of_splat(const Gaussians& gaussians, size_t i, double deviations) {
     const glm::dmat3 c = scene::covariance_of(gaussians, i);
     const glm::dvec3 mean = gaussians.world_mean(i),
                      reach(std::sqrt(c[0][0]), std::sqrt(c[1][1]), std::sqrt(c[2][2]));
-    return {mean - reach, mean + reach};
+    return {mean - deviations * reach, mean + deviations * reach};
 }
 
 std::vector<TreeNode> build_tree(const Gaussians& gaussians, const TreeLimits& limits) {

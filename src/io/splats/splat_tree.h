@@ -22,8 +22,8 @@ struct Bound {
     void add(const Bound& other) { add(other.low, other.high); }
 };
 
-/// The box of the splat's ellipsoid at one standard deviation, in the world.
-Bound bound_of_splat(const Gaussians& gaussians, size_t i);
+/// The box of the splat's ellipsoid at so many standard deviations, in the world.
+Bound bound_of_splat(const Gaussians& gaussians, size_t i, double deviations = 1);
 
 struct TreeNode {
     int axis = -1;  // of an inner node: its first child has what is below the plane

@@ -22,6 +22,7 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr size_t kMostOfATile = 100'000;
+constexpr double kReach = 3;  // standard deviations that viewers draw; they cull by the box
 constexpr int kDeepest = 31;
 constexpr const char* kFolder = "tiles";
 /// CesiumJS replaces a tile whose error covers more than 16 px. Splats that are 2 px wide then suffice.
@@ -120,7 +121,7 @@ class TilesetWriter {
     }
 
     void write_tile(const Gaussians& part, Tile& tile) {
-        for (size_t i = 0; i < part.size(); ++i) tile.bound.add(bound_of_splat(part, i));
+        for (size_t i = 0; i < part.size(); ++i) tile.bound.add(bound_of_splat(part, i, kReach));
         tile.splats = part.size();
         tile.error = tile.level == 0 ? 0 : kErrorPerWidth * usual_width(part);
         tile.file = std::string(kFolder) + "/" + std::to_string(tile.level) + "_" +
