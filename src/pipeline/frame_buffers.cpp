@@ -53,7 +53,8 @@ uint64_t appearance_sums(AppearanceModel model, const Sizes& s) {
 
 constexpr uint64_t kAlone = ~uint64_t(0);
 
-constexpr uint32_t kWideDigitBits = 13;  // of a sort in one pass
+// Digits of sorts whose lanes count alone: where one pass then does, with few lanes or many; and otherwise.
+constexpr uint32_t kWideDigitBits = 13, kWidestDigitBits = 17, kDigitBits = 8, kDigitBitsOfMany = 11;
 
 struct Allocation {
     gpu::Buffer* buffer;
@@ -140,14 +141,22 @@ std::vector<Allocation> allocations(FrameBuffers& f, const Sizes& s) {
 
 RadixCut radix_cut(const passes::KernelConfig& config, uint32_t items, uint32_t key_bits) {
     RadixCut cut;
-    // Lanes that count in memory of their own can take a wider digit, where one pass then does.
-    cut.passes = !config.ranked_sort && key_bits <= kWideDigitBits ? 1 : divide_up(key_bits, 8);
+    // Lanes that count in memory of their own can take a wider digit. The widest have few lanes, a workgroup for each
+    // CPU thread: the counters of more would not stay in a core's cache. A lane has no fewer items than counters.
+    uint32_t lanes_max = config.sort_lanes_max, digit = kDigitBits;
+    if (!config.ranked_sort) {
+        while (digit < kDigitBitsOfMany && items >> (digit + 1) >= lanes_max) ++digit;
+        const uint32_t few = lanes_max >> (std::clamp(key_bits, kWideDigitBits, kWideDigitBits + 2) - kWideDigitBits);
+        if (key_bits <= kWideDigitBits || (key_bits <= kWidestDigitBits && items >> key_bits >= few)) {
+            digit = std::max(digit, key_bits);
+            lanes_max = few;
+        }
+    }
+    cut.passes = divide_up(key_bits, digit);
     cut.bits = divide_up(key_bits, cut.passes);
-    // A lane has no fewer items than counters.
     const uint32_t chunk = std::max(config.sort_chunk, 1u << cut.bits);
-    cut.lanes = config.ranked_sort
-                    ? std::max(divide_up(items, ranked_keys(config)), 1u)
-                    : std::clamp(divide_up(items, chunk), config.subgroup, config.sort_lanes_max);
+    cut.lanes = config.ranked_sort ? std::max(divide_up(items, ranked_keys(config)), 1u)
+                                   : std::clamp(divide_up(items, chunk), config.subgroup, lanes_max);
     return cut;
 }
 

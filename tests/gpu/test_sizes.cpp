@@ -159,12 +159,24 @@ TEST(SizesFor, SortsByAsManyBitsAsThereAreTiles) {
 TEST(SizesFor, AWideDigitSavesAPassWhereLanesCountAlone) {
     passes::KernelConfig config = config_of(8);
     const RadixCut wide = radix_cut(config, 1'000'000, 13), two = radix_cut(config, 1'000'000, 14);
+    EXPECT_EQ(radix_cut(config, (512 << 11) - 1, 32).passes, 4u);
+    EXPECT_EQ(radix_cut(config, 512 << 11, 32).passes, 3u);  // digits of 11 bits
     EXPECT_EQ(wide.passes, 1u);
     EXPECT_EQ(wide.lanes, (1'000'000 + 8191) / 8192);  // no more counters than items
     EXPECT_EQ(two.passes, 2u);
     EXPECT_EQ(two.lanes, 512u);
+    // Many items: one pass of fewer lanes. A lane has as many items as counters.
+    for (const auto& [bits, lanes] : {std::pair{14u, 256u}, {15u, 128u}, {16u, 128u}, {17u, 128u}}) {
+        const RadixCut cut = radix_cut(config, lanes << bits, bits);
+        EXPECT_EQ(cut.passes, 1u);
+        EXPECT_EQ(cut.lanes, lanes);
+        EXPECT_EQ(radix_cut(config, (lanes << bits) - 1, bits).passes, 2u);
+    }
+    EXPECT_EQ(radix_cut(config, 512 << 15, 18).passes, 2u);
+    const uint32_t many = 512 << 13;
     config.ranked_sort = true;
     EXPECT_EQ(radix_cut(config, 1'000'000, 11).passes, 2u);
+    EXPECT_EQ(radix_cut(config, many, 15).passes, 2u);
 }
 
 TEST(SizesFor, LanesAreBetweenASubgroupAndTheMost) {

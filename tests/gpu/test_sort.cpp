@@ -142,6 +142,19 @@ TEST_P(Sort, CarriesValuesTellsPlacesAndReadsTheNumberOfItemsOnTheDevice) {
     for (uint32_t place = 0; place < items; ++place) ASSERT_EQ(sorted.places[order[place]], place);
 }
 
+TEST(SortEdges, ManyItemsWithKeysOf15BitsTakeOnePass) {
+    if (rig().config().ranked_sort) GTEST_SKIP() << "the device ranks keys in shared memory";
+    const uint32_t items = rig().config().sort_lanes_max << 13;
+    if (items > 1u << 21) GTEST_SKIP() << "too many lanes for a short test";
+    Random random(15);
+    std::vector<uint32_t> keys(items);
+    for (auto& key : keys) key = uint32_t(random.bits() & 0x7fff);
+    const RadixCut cut = cut_for(items, 15);
+    EXPECT_EQ(cut.passes, 1u);
+    const Sorted sorted = run_sort(keys, cut, true, false, false, items);
+    EXPECT_EQ(sorted.values, reference::stable_order<uint32_t>(keys));
+}
+
 INSTANTIATE_TEST_SUITE_P(Sizes, Sort, testing::Values(0u, 1u, 7u, 1000u, 100003u));
 
 TEST(SortEdges, MoreItemsThanRoomSortsNothing) {
