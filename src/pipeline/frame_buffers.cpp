@@ -146,7 +146,8 @@ RadixCut radix_cut(const passes::KernelConfig& config, uint32_t items, uint32_t 
     uint32_t lanes_max = config.sort_lanes_max, digit = kDigitBits;
     if (!config.ranked_sort) {
         while (digit < kDigitBitsOfMany && items >> (digit + 1) >= lanes_max) ++digit;
-        const uint32_t few = lanes_max >> (std::clamp(key_bits, kWideDigitBits, kWideDigitBits + 2) - kWideDigitBits);
+        const uint32_t few =
+            lanes_max >> (std::clamp(key_bits, kWideDigitBits, kWideDigitBits + 2) - kWideDigitBits);
         if (key_bits <= kWideDigitBits || (key_bits <= kWidestDigitBits && items >> key_bits >= few)) {
             digit = std::max(digit, key_bits);
             lanes_max = few;
