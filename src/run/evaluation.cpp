@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <future>
 #include <string>
 #include <utility>
 #include <variant>
@@ -105,15 +106,68 @@ Measures measures_of(const RunOptions& options) {
     return measures;
 }
 
+namespace {
+
+struct JudgedView {
+    RenderedView view;
+    EvalFrame figures;
+};
+
+/// Draws on the device while another thread reads and compares the view before: both take about as long.
+class ViewComparison {
+  public:
+    ViewComparison(const RenderOptions& options, const Measures& measures, bool psnr_alone)
+        : options_(options), measures_(measures), psnr_alone_(psnr_alone) {}
+
+    void start(Image drawn, const Frame& frame, const Appearance* appearance) {
+        judged_ =
+            std::async(std::launch::async, [this, &frame, appearance, drawn = std::move(drawn)]() mutable {
+                return judge(std::move(drawn), frame, appearance);
+            });
+    }
+    bool started() const { return judged_.valid(); }
+    JudgedView result() { return judged_.get(); }
+
+  private:
+    JudgedView judge(Image drawn, const Frame& frame, const Appearance* appearance) const {
+        JudgedView judged;
+        judged.view =
+            measures_.protocol == Protocol::ewa
+                ? with_photo(std::move(drawn), frame, options_, appearance)
+                : view_of_protocol(measures_.protocol, std::move(drawn), frame, options_, appearance);
+        const auto& [photo, weights, rendering] = judged.view;
+        judged.figures = {frame.name, psnr(rendering, photo, weights), 0, {}};
+        if (std::isnan(judged.figures.psnr) || psnr_alone_) return judged;
+        const auto similarity = measures_.protocol == Protocol::nerfbaselines ? image::ssim_valid : ewa::ssim;
+        judged.figures.ssim = similarity(rendering, photo, weights);
+        judged.figures.figures = measures_.meter.measure(rendering, photo, weights);
+        return judged;
+    }
+
+    const RenderOptions& options_;
+    const Measures& measures_;
+    bool psnr_alone_;
+    std::future<JudgedView> judged_;  // last: it uses the others
+};
+
+}  // namespace
+
 Evaluation evaluate_views(const ViewRenderer& renderer, const Dataset& dataset,
                           const std::vector<int>& frames, const RenderOptions& options,
                           const std::vector<Appearance>& appearances,
                           const std::function<void()>& before_frame,
                           const std::function<void(size_t, const RenderedView&, const EvalFrame&)>& on_view,
-                          const Measures& measures) {
+                          const Measures& measures, bool psnr_alone) {
     const auto start = std::chrono::steady_clock::now();
     Evaluation result;
     std::vector<Image> drawn;
+    ViewComparison comparison(options, measures, psnr_alone);
+    const auto take = [&](size_t i) {
+        JudgedView judged = comparison.result();
+        if (std::isnan(judged.figures.psnr)) return;  // no pixel counts
+        result.frames.push_back(std::move(judged.figures));
+        if (on_view) on_view(i, judged.view, result.frames.back());
+    };
     for (size_t i = 0; i < frames.size(); ++i) {
         if (before_frame) before_frame();
         const size_t place = i % renderer.at_once;
@@ -123,21 +177,14 @@ Evaluation evaluate_views(const ViewRenderer& renderer, const Dataset& dataset,
                 cameras.push_back(dataset.frames[size_t(frames[k])].camera);
             drawn = renderer.images(cameras);
         }
-        const Frame& frame = dataset.frames[size_t(frames[i])];
-        const Appearance* appearance = appearances.empty() ? nullptr : &appearances.at(i);
-        const RenderedView view =
-            measures.protocol == Protocol::ewa
-                ? with_photo(std::move(drawn[place]), frame, options, appearance)
-                : view_of_protocol(measures.protocol, std::move(drawn[place]), frame, options, appearance);
-        const double db = psnr(view.rendering, view.photo, view.weights);
-        if (std::isnan(db)) continue;  // no pixel counts
-        const auto similarity = measures.protocol == Protocol::nerfbaselines ? image::ssim_valid : ewa::ssim;
-        result.frames.push_back({frame.name, db, similarity(view.rendering, view.photo, view.weights),
-                                 measures.meter.measure(view.rendering, view.photo, view.weights)});
-        if (on_view) on_view(i, view, result.frames.back());
+        if (comparison.started()) take(i - 1);
+        comparison.start(std::move(drawn[place]), dataset.frames[size_t(frames[i])],
+                         appearances.empty() ? nullptr : &appearances.at(i));
     }
+    if (comparison.started()) take(frames.size() - 1);
     const double none = result.frames.empty() ? std::nan("") : 0.0;
-    for (const std::string& name : measures.meter.names()) result.figures.push_back({name, none});
+    if (!psnr_alone)
+        for (const std::string& name : measures.meter.names()) result.figures.push_back({name, none});
     for (const EvalFrame& frame : result.frames) {
         for (size_t k = 0; k < frame.figures.size(); ++k)
             result.figures[k].value += frame.figures[k].value / double(result.frames.size());

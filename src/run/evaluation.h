@@ -39,12 +39,13 @@ std::vector<Appearance> for_new_views(const std::vector<Appearance>& learned, si
 /// What the options of a run measure. Throws InputError (weights that cannot be read).
 Measures measures_of(const RunOptions& options);
 
-/// As ewa::evaluate. on_view: called after each view that counts, with its place in `frames`.
+/// As ewa::evaluate. on_view: called after each view that counts, with its place in `frames`. The next view is drawn before.
+/// psnr_alone: without SSIM and the figures of the meter.
 Evaluation evaluate_views(const ViewRenderer& renderer, const Dataset& dataset,
                           const std::vector<int>& frames, const RenderOptions& options,
                           const std::vector<Appearance>& appearances,
                           const std::function<void()>& before_frame,
                           const std::function<void(size_t, const RenderedView&, const EvalFrame&)>& on_view,
-                          const Measures& measures = {});
+                          const Measures& measures = {}, bool psnr_alone = false);
 
 }  // namespace ewa::train

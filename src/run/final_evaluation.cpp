@@ -108,7 +108,7 @@ Evaluation FinalEvaluation::evaluated(const std::vector<int>& frames,
             if (shown) add_view(frames[i], view, figures);
             observer_.on_view(++done_, evaluated_views(input_.split));
         },
-        measures);
+        measures, !shown);
 }
 
 /// Adds a view to the report. Saves its render if it is one of those.
