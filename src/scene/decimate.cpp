@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Merges splats pair by pair. The cost of a pair is the error of the merged splat in three views along the axes, of parallel
 // rays, in closed form: there a splat is a Gaussian in two dimensions. docs/sharing.md has measurements.
+#include "scene/decimate.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -104,8 +106,12 @@ double color_distance(const Gaussians& g, size_t i, size_t j) {
     return sum / (4 * std::numbers::pi);
 }
 
-/// The error of merging: of the colours, each splat's against their mean, and of the opacities.
-double cost(const Shape& a, const Shape& b, double color) {
+/// What merging two splats changes: the squares of the colours, each splat's against their mean, and of the opacities.
+struct Change {
+    double squared, both;  // both: the squared opacity of the two splats
+};
+
+Change change_of(const Shape& a, const Shape& b, double color) {
     const double aa = overlap(a, a), bb = overlap(b, b), ab = overlap(a, b);
     const Merged merged = merge(a, b, ab);
     const Shape& m = merged.shape;
@@ -115,8 +121,12 @@ double cost(const Shape& a, const Shape& b, double color) {
                            2 * m.opacity * (oa * overlap(a, m) + ob * overlap(b, m));
     const double ca = (1 - merged.share) * a.opacity, cb = merged.share * b.opacity;
     const double colors = color * (ca * ca * aa - 2 * ca * cb * ab + cb * cb * bb);
-    return (std::max(colors, 0.0) + kOpacityWeight * std::max(opacity, 0.0)) /
-           std::pow(std::max(both, kSmallest), kRelative);
+    return {std::max(colors, 0.0) + kOpacityWeight * std::max(opacity, 0.0), both};
+}
+
+double cost(const Shape& a, const Shape& b, double color) {
+    const Change change = change_of(a, b, color);
+    return change.squared / std::pow(std::max(change.both, kSmallest), kRelative);
 }
 
 /// Splats whose means are the first at their place: a query of a tree would visit all that share one.
@@ -145,10 +155,31 @@ struct Pair {
     }
 };
 
+/// What of a shape takes time to find.
+struct Measured {
+    std::array<double, 6> covariance;
+    double opacity;
+};
+
+Measured measured(const Gaussians& g, size_t i) {
+    const glm::dmat3 c = scene::covariance_of(g, i);
+    return {{c[0][0], c[0][1], c[0][2], c[1][1], c[1][2], c[2][2]},
+            1 / (1 + std::exp(-double(g.opacity_logits[i])))};
+}
+
+Shape shape_at(const Gaussians& g, size_t i, const Measured& values) {
+    Shape shape;
+    shape.mean = {g.means[3 * i], g.means[3 * i + 1], g.means[3 * i + 2]};
+    shape.covariance = values.covariance;
+    shape.opacity = values.opacity;
+    measure_area(shape);
+    return shape;
+}
+
 /// One round: finds pairs among near splats, and merges the cheapest of them.
 class Round {
   public:
-    explicit Round(Gaussians& gaussians) : g_(gaussians) {}
+    Round(Gaussians& gaussians, const scene::MergeTrace& trace) : g_(gaussians), trace_(trace) {}
 
     void run(size_t target) {
         measure();
@@ -157,11 +188,6 @@ class Round {
     }
 
   private:
-    struct Measured {
-        std::array<double, 6> covariance;
-        double opacity;
-    };
-
     template <class Work>
     void for_all(size_t count, const Work& work) const {
         core::on_all_cores((count + kAtOnce - 1) / kAtOnce, [&](size_t piece) {
@@ -171,21 +197,10 @@ class Round {
 
     void measure() {
         measured_.resize(g_.size());
-        for_all(g_.size(), [&](size_t i) {
-            const glm::dmat3 c = scene::covariance_of(g_, i);
-            measured_[i] = {{c[0][0], c[0][1], c[0][2], c[1][1], c[1][2], c[2][2]},
-                            1 / (1 + std::exp(-double(g_.opacity_logits[i])))};
-        });
+        for_all(g_.size(), [&](size_t i) { measured_[i] = measured(g_, i); });
     }
 
-    Shape shape_of(size_t i) const {
-        Shape shape;
-        shape.mean = {g_.means[3 * i], g_.means[3 * i + 1], g_.means[3 * i + 2]};
-        shape.covariance = measured_[i].covariance;
-        shape.opacity = measured_[i].opacity;
-        measure_area(shape);
-        return shape;
-    }
+    Shape shape_of(size_t i) const { return shape_at(g_, i, measured_[i]); }
 
     Pair pair_of(const Shape& a, size_t i, size_t j) const {
         Pair pair{float(cost(a, shape_of(j), color_distance(g_, i, j))), uint32_t(i), uint32_t(j)};
@@ -236,6 +251,8 @@ class Round {
     void merge_cheapest(size_t least) {
         std::sort(pairs_.begin(), pairs_.end());
         std::vector<uint8_t> state(g_.size(), 0);  // 1: merged, 2: gone
+        std::vector<uint32_t> into(trace_.into ? g_.size() : 0);
+        std::iota(into.begin(), into.end(), 0u);
         size_t left = g_.size();
         for (const Pair& pair : pairs_) {
             if (left == least) break;
@@ -243,6 +260,7 @@ class Round {
             merge_into(pair.i, pair.j);
             state[pair.i] = 1;
             state[pair.j] = 2;
+            if (trace_.into) into[pair.j] = pair.i;
             --left;
         }
         pairs_ = {};
@@ -252,10 +270,24 @@ class Round {
         for (size_t i = 0; i < state.size(); ++i)
             if (state[i] != 2) kept.push_back(uint32_t(i));
         keep_splats(g_, kept);
+        if (trace_.into) follow(into, kept);
+        if (!trace_.errors) return;
+        for (size_t k = 0; k < kept.size(); ++k) (*trace_.errors)[k] = (*trace_.errors)[kept[k]];
+        trace_.errors->resize(kept.size());
+    }
+
+    /// into: of each splat, the one that has it. kept: those that are left.
+    void follow(const std::vector<uint32_t>& into, const std::vector<uint32_t>& kept) {
+        std::vector<uint32_t> place(into.size());
+        for (size_t k = 0; k < kept.size(); ++k) place[kept[k]] = uint32_t(k);
+        for (uint32_t& now : *trace_.into) now = place[into[now]];
     }
 
     void merge_into(size_t i, size_t j) {
         const Shape a = shape_of(i), b = shape_of(j);
+        if (trace_.errors)
+            (*trace_.errors)[i] +=
+                (*trace_.errors)[j] + float(change_of(a, b, color_distance(g_, i, j)).squared);
         const Merged merged = merge(a, b, overlap(a, b));
         const auto& c = merged.shape.covariance;
         for (size_t k = 0; k < 3; ++k) g_.means[3 * i + k] = float(merged.shape.mean[int(k)]);
@@ -269,9 +301,20 @@ class Round {
     }
 
     Gaussians& g_;
+    const scene::MergeTrace& trace_;
     std::vector<Measured> measured_;
     std::vector<Pair> pairs_;  // kBestOfThem of each splat
 };
+
+/// The splats must be drawable, with opacities of 3DGS's kernel.
+void merge_rounds(Gaussians& gaussians, size_t target, const scene::MergeTrace& trace,
+                  const std::function<void(size_t)>& progress) {
+    target = std::max(target, size_t(1));
+    while (gaussians.size() > target) {
+        Round(gaussians, trace).run(target);
+        if (progress) progress(gaussians.size());
+    }
+}
 
 }  // namespace
 
@@ -283,11 +326,26 @@ void decimate_splats(Gaussians& gaussians, size_t target, const std::function<vo
     keep_splats(gaussians, kept);
     const bool density = gaussians.density;
     fit_opacities(gaussians, false);
-    while (gaussians.size() > std::max(target, size_t(1))) {
-        Round(gaussians).run(std::max(target, size_t(1)));
-        if (progress) progress(gaussians.size());
-    }
+    merge_rounds(gaussians, target, {}, progress);
     fit_opacities(gaussians, density);
 }
+
+namespace scene {
+
+double squared_light(const Gaussians& gaussians, size_t i) {
+    const Shape shape = shape_at(gaussians, i, measured(gaussians, i));
+    return shape.opacity * shape.opacity * overlap(shape, shape);
+}
+
+void decimate_traced(Gaussians& gaussians, size_t target, const MergeTrace& trace) {
+    if (trace.into) {
+        trace.into->resize(gaussians.size());
+        std::iota(trace.into->begin(), trace.into->end(), 0u);
+    }
+    if (trace.errors) trace.errors->resize(gaussians.size());
+    merge_rounds(gaussians, target, trace, {});
+}
+
+}  // namespace scene
 
 }  // namespace ewa

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "ewa/splat_edit.h"
+#include "scene/decimate.h"
 #include "scene/splat_shape.h"
 #include "support/splat_scenes.h"
 
@@ -158,6 +159,88 @@ TEST(SplatShape, IsUndoneToTheCovariance) {
         for (int k = 0; k < 3; ++k)
             for (int row = 0; row < 3; ++row) EXPECT_NEAR(after[k][row], before[k][row], 2e-6 * size) << i;
     }
+}
+
+/// The squares of fields in the views along the axes, by sums over a grid.
+TEST(DecimateTrace, ErrorsAreThoseOfTheImages) {
+    Gaussians g = balls({-2.f, 2.f}, 0.7f, -1);
+    for (size_t k = 0; k < 3; ++k) g.log_scales[3 + k] = std::log(0.4f);
+    g.opacity_logits[1] = 0.5f;
+    g.sh = {0.3f, -0.2f, 0.9f, -0.5f, 0.4f, 0.1f};
+    const Gaussians before = g;
+    std::vector<float> errors;
+    scene::decimate_traced(g, 1, {.errors = &errors});
+    ASSERT_EQ(errors.size(), 1u);
+    double color = 0;
+    for (size_t k = 0; k < 3; ++k)
+        color += std::pow(double(before.sh[k]) - before.sh[3 + k], 2) / (4 * std::numbers::pi);
+    const double a = opacity_of(before, 0) * area_of(before, 0),
+                 b = opacity_of(before, 1) * area_of(before, 1);
+    const double share = a / (a + b);
+    // The opacity of a splat at a place of a view: x and y are two axes of the world.
+    const auto at = [](const Gaussians& from, size_t i, int ax, int ay, double x, double y) {
+        const glm::dmat3 c = scene::covariance_of(from, i);
+        const glm::dvec3 mean = from.world_mean(i);
+        const double dx = x - mean[ax], dy = y - mean[ay], xx = c[ax][ax], xy = c[ax][ay], yy = c[ay][ay];
+        return opacity_of(from, i) *
+               std::exp(-(yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy) / 2);
+    };
+    double colors = 0, opacities = 0, light = 0;
+    constexpr double kStep = 0.05;
+    for (const auto& [ax, ay] : {std::pair{0, 1}, {0, 2}, {1, 2}})
+        for (double x = -8; x < 8; x += kStep)
+            for (double y = -8; y < 8; y += kStep) {
+                const double p = at(before, 0, ax, ay, x, y), q = at(before, 1, ax, ay, x, y);
+                colors += color * std::pow((1 - share) * p - share * q, 2) * kStep * kStep;
+                opacities += std::pow(p + q - at(g, 0, ax, ay, x, y), 2) * kStep * kStep;
+                light += p * p * kStep * kStep;
+            }
+    EXPECT_NEAR(scene::squared_light(before, 0), light, 1e-6 * light);
+    // What both cover in the view along x counts once, in the opacities; so the sums differ a little.
+    EXPECT_NEAR(errors[0], colors + 0.03 * opacities, 0.1 * errors[0]);
+}
+
+TEST(DecimateTrace, FollowsEachSplat) {
+    const Gaussians before = test::storable_splats(5, 4000, 0);
+    Gaussians g = before;
+    std::vector<uint32_t> into, second;
+    std::vector<float> errors;
+    scene::decimate_traced(g, 1000, {.into = &into, .errors = &errors});
+    ASSERT_EQ(into.size(), before.size());
+    ASSERT_EQ(errors.size(), g.size());
+    Gaussians plain = before;
+    decimate_splats(plain, 1000);
+    EXPECT_EQ(g.means, plain.means);
+    std::vector<std::vector<size_t>> parts(g.size());
+    for (size_t i = 0; i < into.size(); ++i) parts.at(into[i]).push_back(i);
+    double sum = 0;
+    for (size_t k = 0; k < g.size(); ++k) {
+        ASSERT_FALSE(parts[k].empty());
+        sum += errors[k];
+        if (parts[k].size() == 1) {
+            EXPECT_EQ(errors[k], 0);
+            EXPECT_EQ(g.means[3 * k], before.means[3 * parts[k][0]]);
+            EXPECT_EQ(g.opacity_logits[k], before.opacity_logits[parts[k][0]]);
+            continue;
+        }
+        EXPECT_GT(errors[k], 0);
+        glm::dvec3 low(INFINITY), high(-INFINITY);
+        for (const size_t i : parts[k]) {
+            low = glm::min(low, before.world_mean(i));
+            high = glm::max(high, before.world_mean(i));
+        }
+        for (int axis = 0; axis < 3; ++axis) {
+            EXPECT_GE(g.world_mean(k)[axis], low[axis] - 1e-5);
+            EXPECT_LE(g.world_mean(k)[axis], high[axis] + 1e-5);
+        }
+    }
+    // A further call adds to the errors.
+    scene::decimate_traced(g, 500, {.into = &second, .errors = &errors});
+    EXPECT_EQ(second.size(), 1000u);
+    ASSERT_EQ(errors.size(), 500u);
+    double all = 0;
+    for (const float error : errors) all += error;
+    EXPECT_GT(all, sum);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "scene/decimate.h"
 #include "support/splat_scenes.h"
 #include "support/temp_folder.h"
 
@@ -89,6 +90,54 @@ TEST(Levels, RoundTrip) {
     EXPECT_NEAR(sum, expected, 1e-4 * expected);
     EXPECT_NE(read_splats(folder / "lod-meta.json").variant.find("level 0 of 3 with 20000, 10000, 5000"),
               std::string::npos);
+}
+
+/// The error of a level is that of its merges, as a part of the light of the leaf.
+TEST(Levels, ErrorsOfLeaves) {
+    const TempFolder folder;
+    Gaussians scene = wide_scene(20'000);
+    // Pairs of one shape. On one side of the scene they are at one place too, so that merging them changes nothing.
+    for (size_t i = 0; i < scene.size(); i += 2) {
+        const bool same = i < scene.size() / 2;
+        for (size_t k = 0; k < 3; ++k) {
+            scene.means[3 * i + k] = (same ? -1.f : 1.f) * (std::abs(scene.means[3 * i + k]) + 1);
+            scene.means[3 * (i + 1) + k] = scene.means[3 * i + k] + (same ? 0.f : 0.1f);
+            scene.log_scales[3 * (i + 1) + k] = scene.log_scales[3 * i + k] = -2;
+        }
+        for (size_t k = 0; k < 4; ++k) scene.quaternions[4 * (i + 1) + k] = scene.quaternions[4 * i + k];
+        scene.opacity_logits[i] = scene.opacity_logits[i + 1] = 0;
+    }
+    SaveOptions options;
+    options.levels = 3;
+    save_splats(folder / "lod-meta.json", scene, options);
+    const json meta = read_json(folder / "lod-meta.json");
+    EXPECT_EQ(meta["lodErrors"], true);
+    const Gaussians finest = load_splats(folder / "lod-meta.json");
+    std::vector<double> low, high;
+    double sum = 0;
+    visit_leaves(meta["tree"], [&](const json& leaf) {
+        const size_t first = leaf["lods"]["0"]["offset"], count = leaf["lods"]["0"]["count"];
+        double light = 0;
+        for (size_t i = first; i < first + count; ++i) light += scene::squared_light(finest, i);
+        sum += light * leaf["errors"][2].get<double>();
+        ASSERT_EQ(leaf["errors"].size(), 3u);
+        EXPECT_EQ(leaf["errors"][0], 0);
+        EXPECT_LE(leaf["errors"][1], leaf["errors"][2]);
+        (leaf["bound"]["min"][0] < 0 ? low : high).push_back(leaf["errors"][1]);
+    });
+    ASSERT_FALSE(low.empty() || high.empty());
+    EXPECT_LT(*std::ranges::max_element(low), 0.5 * *std::ranges::min_element(high));
+    // The errors are those of all merges.
+    std::vector<float> errors;
+    Gaussians left = scene;
+    scene::decimate_traced(left, 10'000, {.errors = &errors});
+    scene::decimate_traced(left, 5'000, {.errors = &errors});
+    double expected = 0;
+    for (const float error : errors) expected += error;
+    EXPECT_NEAR(sum, expected, 0.02 * expected);
+    options.levels = 1;
+    save_splats(folder / "lod-meta.json", scene, options);
+    EXPECT_FALSE(read_json(folder / "lod-meta.json").contains("lodErrors"));
 }
 
 TEST(Levels, TheSameBytesTwice) {

@@ -7,6 +7,8 @@
 //   filenames  the meta.json of each chunk
 //   tree       inner nodes have `bound` and `children`, leaves `bound` and `lods`: by level, the rows offset to offset + count
 //              of the chunk with the index `file`
+//   lodErrors  true where leaves have `errors`: of each level, how much of the leaf's finest level it lacks, as a part of that. 0 for
+//              the finest and for levels that the leaf has no splats of; readers compare the numbers of all leaves
 //   environment  the meta.json of a SOG that is shown at all levels
 // A bound is the box of the leaf's ellipsoids at one standard deviation, over all levels. The frame is that of an INRIA PLY.
 #pragma once

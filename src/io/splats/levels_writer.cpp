@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes streamed SOG, whose layout levels.h describes.
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
@@ -10,6 +11,7 @@
 #include "io/splats/formats.h"
 #include "io/splats/levels.h"
 #include "io/splats/splat_tree.h"
+#include "scene/decimate.h"
 
 namespace ewa::io {
 
@@ -29,11 +31,13 @@ constexpr size_t kCoarseEnough = 1'000'000;
 
 struct LevelRows {
     size_t level, file, offset, count;
+    double error;  // squared, of all merges since level 0
 };
 
 /// What the file has of a node.
 struct NodeRows {
     std::vector<LevelRows> rows;  // of a leaf
+    double light = 0;             // of the first of them, scene::squared_light
     Bound bound;
 };
 
@@ -61,7 +65,7 @@ class LevelsWriter {
         nodes_ = build_tree(g, {.most = kMostOfALeaf, .longest = kLongestLeaf, .few = kFew});
         rows_.resize(nodes_.size());
         for (size_t level = 0; level < sizes_.size(); ++level) {
-            if (level > 0) decimate_splats(g, sizes_[level]);
+            if (level > 0) scene::decimate_traced(g, sizes_[level], {.errors = &errors_});
             write_level(g, level);
         }
         core::AtomicFile file(path_);
@@ -86,10 +90,15 @@ class LevelsWriter {
         for (size_t at = 0; at < nodes_.size(); ++at) {
             if (splats[at].empty()) continue;
             Gaussians leaf = rows_of(g, splats[at]);
+            double error = 0;
+            if (level > 0)
+                for (const uint32_t i : splats[at]) error += errors_[i];
             splats[at] = {};
             for (size_t i = 0; i < leaf.size(); ++i) rows_[at].bound.add(bound_of_splat(leaf, i));
+            if (rows_[at].rows.empty() && sizes_.size() > 1)
+                for (size_t i = 0; i < leaf.size(); ++i) rows_[at].light += scene::squared_light(leaf, i);
             select_splats(leaf, morton_order(leaf));
-            rows_[at].rows.push_back({level, names_.size(), chunk.size(), leaf.size()});
+            rows_[at].rows.push_back({level, names_.size(), chunk.size(), leaf.size(), error});
             append_splats(chunk, leaf);
             if (chunk.size() > kMostOfAChunk) write_chunk(chunk, level);
         }
@@ -129,6 +138,19 @@ class LevelsWriter {
                     rows_[at].bound.add(rows_[child].bound);
     }
 
+    /// The error of each level against the finest one of the leaf, as a part of its light. It never falls: a step to a finer level
+    /// removes an error.
+    std::vector<double> errors_of(const NodeRows& leaf) const {
+        std::vector<double> errors(sizes_.size());
+        double last = 0;
+        for (const LevelRows& rows : leaf.rows) {
+            const double error = (rows.error - leaf.rows[0].error) / leaf.light;
+            if (error > last && std::isfinite(error)) last = error;
+            errors[rows.level] = rounded(last);
+        }
+        return errors;
+    }
+
     ordered_json json_of(size_t at) const {
         ordered_json json;
         json["bound"] = json_of(rows_[at].bound);
@@ -140,6 +162,7 @@ class LevelsWriter {
         for (const LevelRows& rows : rows_[at].rows)
             json["lods"][std::to_string(rows.level)] = {
                 {"file", rows.file}, {"offset", rows.offset}, {"count", rows.count}};
+        if (sizes_.size() > 1) json["errors"] = errors_of(rows_[at]);
         return json;
     }
 
@@ -153,6 +176,7 @@ class LevelsWriter {
         json["count"] = all;
         json["counts"] = sizes_;
         json["lodLevels"] = sizes_.size();
+        if (sizes_.size() > 1) json["lodErrors"] = true;
         json["filenames"] = names_;
         json["tree"] = json_of(0);
         return json;
@@ -163,6 +187,7 @@ class LevelsWriter {
     std::vector<size_t> sizes_;  // of the levels
     std::vector<TreeNode> nodes_;
     std::vector<NodeRows> rows_;  // of each node
+    std::vector<float> errors_;   // of each splat of the level
     std::vector<std::string> names_, lost_;
     size_t chunks_ = 0, written_ = 0;
 };

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// Merging of splats as decimate_splats does it, with a record of what became of each splat.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "ewa/gaussians.h"
+
+namespace ewa::scene {
+
+/// What became of the splats; null where nobody asks.
+struct MergeTrace {
+    /// Gets, of each splat before, the index of the splat that has it now.
+    std::vector<uint32_t>* into = nullptr;
+    /// For each splat that is left, the squared errors of the merges in it, in the units of squared_light. Those of earlier calls are added
+    /// to; empty before the first one.
+    std::vector<float>* errors = nullptr;
+};
+
+/// The squared opacity of splat i over three views along the axes, of parallel rays, in squared world units. The splat must be
+/// drawable, and its opacity that of 3DGS's kernel.
+double squared_light(const Gaussians& gaussians, size_t i);
+
+/// decimate_splats of splats that are drawable and have opacities of 3DGS's kernel. The error of a merge is the squared difference of
+/// the merged splat to both splats in these views: of their colours, and in part of their opacities.
+void decimate_traced(Gaussians& gaussians, size_t target, const MergeTrace& trace);
+
+}  // namespace ewa::scene
