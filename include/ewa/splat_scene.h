@@ -24,6 +24,7 @@ enum class SplatFormat {
     sog_levels,
     usda,
     usdz,
+    rad,
     ksplat
 };
 
@@ -42,7 +43,7 @@ struct SaveOptions {
     bool antialiased = false;
     int spz_version = 3;    // of an .spz: 2, 3 or 4
     bool gltf_spz = false;  // a glTF holds an SPZ of version 2, by KHR_gaussian_splatting_compression_spz_2
-    int levels = 0;         // of a lod-meta.json; 0: until one has a million splats
+    int levels = 0;  // of a lod-meta.json; 0: until one has a million splats. A .rad has a tree from 2 on
     std::function<void(uint64_t, uint64_t)> progress = {};  // splats written, all splats
 };
 

@@ -214,14 +214,16 @@ int run(const ConvertArguments& arguments) {
     const std::optional<glm::dmat4> earth = parse_geo(arguments.geo);
     if (earth && !tiles) throw InputError("--geo: only a tileset.json is on a globe");
     const SplatFormat format = page ? SplatFormat::sog : tiles ? SplatFormat::glb : format_to_write(out);
-    const bool levels = format == SplatFormat::sog_levels;
+    const bool levels = format == SplatFormat::sog_levels, rad = format == SplatFormat::rad;
     if (levels && arguments.check)
         throw InputError(
             "--check: its splats are in another order; check a .sog, which level 0 holds in chunks");
+    if (rad && arguments.levels > 1 && arguments.check)
+        throw InputError("--check: the splats of a tree are in another order; check a .rad without --levels");
     if (arguments.unbundled && !page) throw InputError("--unbundled: only a page has its scene inside");
-    if (!levels && !tiles && !arguments.unbundled && arguments.levels > 0)
+    if (!levels && !rad && !tiles && !arguments.unbundled && arguments.levels > 0)
         throw InputError(
-            "--levels: only a lod-meta.json, a tileset.json and an --unbundled page have levels");
+            "--levels: only a lod-meta.json, a .rad, a tileset.json and an --unbundled page have levels");
     if (arguments.gltf_spz && format != SplatFormat::glb && format != SplatFormat::gltf)
         throw InputError("--gltf-spz: only a .glb or .gltf can hold an SPZ");
     // Report wrong use before the inputs are read: they may be large.
@@ -325,15 +327,16 @@ void add_editing_options(CLI::App& app, ConvertArguments& arguments) {
 
 Action add_convert(CLI::App& app) {
     const auto arguments = std::make_shared<ConvertArguments>();
-    app.add_option("FILES", arguments->files,
-                   "One or more inputs, which are joined, then the output unless -o names it. Formats: .ply "
-                   ".compressed.ply .splat .spz .sog meta.json lod-meta.json .glb .gltf .usda .usdz, inputs "
-                   "also .ksplat, "
-                   "and an output "
-                   "also .html, a page that shows the scene in a browser, and tileset.json, 3D Tiles. An "
-                   "input may be the folder of a "
-                   "training run. IN:STEP, as in b.ply:move=1,0,0, moves one input alone; more steps follow "
-                   "after more colons")
+    app.add_option(
+           "FILES", arguments->files,
+           "One or more inputs, which are joined, then the output unless -o names it. Formats: .ply "
+           ".compressed.ply .splat .spz .sog meta.json lod-meta.json .glb .gltf .usda .usdz .rad, inputs "
+           "also .ksplat, "
+           "and an output "
+           "also .html, a page that shows the scene in a browser, and tileset.json, 3D Tiles. An "
+           "input may be the folder of a "
+           "training run. IN:STEP, as in b.ply:move=1,0,0, moves one input alone; more steps follow "
+           "after more colons")
         ->required()
         ->expected(1, -1)
         ->type_name("IN... OUT");
@@ -349,10 +352,10 @@ Action add_convert(CLI::App& app) {
     app.add_flag("--gltf-spz", arguments->gltf_spz,
                  "Pack the splats of a .glb or .gltf as SPZ (KHR_gaussian_splatting_compression_spz_2)");
     app.add_option("--levels", arguments->levels,
-                   "Levels of a lod-meta.json, tileset.json or --unbundled page, each with half of the "
+                   "Levels of a lod-meta.json, .rad, tileset.json or --unbundled page, each with half of the "
                    "splats of the one "
                    "before [until one "
-                   "has at most a million, or a tile 100,000]")
+                   "has at most a million, or a tile 100,000; none in a .rad]")
         ->transform(in_range(1, 32))
         ->type_name("N");
     app.add_option("--level", arguments->level,

@@ -394,7 +394,7 @@ Action add_info(CLI::App& app) {
     app.add_option("PATH", arguments->path,
                    "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json lod-meta.json .glb "
                    ".gltf .usda "
-                   ".usdz), COLMAP folder, "
+                   ".usdz .rad), COLMAP folder, "
                    "transforms.json, cameras of another program, zip archive of one of these, "
                    "glTF file of meshes, image, or folder of a training run")
         ->required();

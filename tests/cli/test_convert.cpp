@@ -17,8 +17,8 @@ using ewa::Gaussians;
 namespace fs = std::filesystem;
 using Names = std::vector<std::string>;
 
-const Names kFiles = {"a.ply", "a.compressed.ply", "a.splat", "a.spz", "a.glb", "a.gltf",
-                      "a.sog", "meta.json",        "a.usda",  "a.usdz"};
+const Names kFiles = {"a.ply", "a.compressed.ply", "a.splat", "a.spz",  "a.glb", "a.gltf",
+                      "a.sog", "meta.json",        "a.usda",  "a.usdz", "a.rad"};
 
 TEST(Convert, FromEachFormatToEach) {
     const Folder folder;
@@ -282,7 +282,7 @@ TEST(Convert, SaysWhatToWriteInstead) {
         const Outcome outcome = run_ewa({"convert", folder / "s.ply", folder / name});
         expect_failure(outcome, 2,
                        ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, lod-meta.json, .glb, "
-                       ".gltf, .usda, .usdz\n");
+                       ".gltf, .usda, .usdz, .rad\n");
     }
     EXPECT_EQ(files_below(folder / ""), Names{"s.ply"});
 }

@@ -15,7 +15,7 @@ SEEDS = ROOT / "tests" / "fuzz" / "seeds"
 SECONDS = 120  # on a busy machine, under the sanitizers
 WORDS = [0, 0xFFFFFFFF, 0x7FFFFFFF, 0x80000000, 0x10000, 1]
 NUMBERS = [b"0", b"-1", b"4294967296", b"99999999", b"1e999", b"nan", b"-0.5", b"18446744073709551616"]
-FORMATS = ["ply", "compressed.ply", "splat", "spz", "glb", "gltf", "sog", "usda", "usdz"]
+FORMATS = ["ply", "compressed.ply", "splat", "spz", "glb", "gltf", "sog", "usda", "usdz", "rad"]
 
 
 def damaged(dice, data, other):
@@ -51,10 +51,37 @@ def damaged(dice, data, other):
     return bytes(data)
 
 
+def damaged_rad(dice, data, other):
+    """A .rad of one chunk, with one of its properties damaged before it is packed."""
+    def part(at):
+        length = struct.unpack_from("<I", data, at + 4)[0]
+        return json.loads(data[at + 8 : at + 8 + length]), at + 8 + length + -length % 8
+
+    def packed_head(magic, value):
+        text = json.dumps(value).encode()
+        return magic + struct.pack("<I", len(text)) + text + bytes(-len(text) % 8)
+
+    head, begin = part(0)
+    chunk, at = part(begin)
+    chosen, payload = dice.randrange(len(chunk["properties"])), b""
+    for i, its in enumerate(chunk["properties"]):
+        body = data[at + 8 + its["offset"] :][: its["bytes"]]
+        if i == chosen:
+            body = damaged(dice, zlib.decompress(body, -15), other)
+            packer = zlib.compressobj(1, zlib.DEFLATED, -15)
+            body = packer.compress(body) + packer.flush()
+        its["offset"], its["bytes"] = len(payload), len(body)
+        payload += body + bytes(-len(body) % 8)
+    chunk["payloadBytes"] = len(payload)
+    return packed_head(b"RAD0", head) + packed_head(b"RADC", chunk) + struct.pack("<Q", len(payload)) + payload
+
+
 def damaged_inside(dice, data, other):
     """The same below a compression or a checksum, which would notice any other damage."""
     if data[:2] == b"\x1f\x8b":
         return gzip.compress(damaged(dice, gzip.decompress(data), other), 1)
+    if data[:4] == b"RAD0":
+        return damaged_rad(dice, data, other)
     if data[:2] == b"PK":
         entries = [(i.filename, zipfile.ZipFile(io.BytesIO(data)).read(i)) for i in zipfile.ZipFile(io.BytesIO(data)).infolist()]
         chosen, packed = dice.randrange(len(entries)), io.BytesIO()
@@ -158,13 +185,13 @@ def make_cases(ewa, folder):
     cases, base = [], folder / "base.ply"
     base.write_bytes(ply(40))
     splats = [base]
-    for name in FORMATS[1:] + ["sog/meta.json", "v4.spz"]:
+    for name in FORMATS[1:] + ["sog/meta.json", "v4.spz", "tree.rad"]:
         splats.append(folder / name if "/" in name else folder / f"base.{name}")
-        extra = ["--spz-version", "4"] if name == "v4.spz" else []
+        extra = {"v4.spz": ["--spz-version", "4"], "tree.rad": ["--levels", "3"]}.get(name, [])
         subprocess.run([ewa, "convert", base, splats[-1], "--quiet", *extra], check=True)
     splats += [*sorted(SEEDS.glob("read_ksplat/*")), *sorted(SEEDS.glob("read_sog/*"))]
     for file in splats:
-        name = "SOG, unpacked" if file.name == "meta.json" else file.name.split(".", 1)[1].replace("v4.", "")
+        name = "SOG, unpacked" if file.name == "meta.json" else file.name.split(".", 1)[1].replace("v4.", "").replace("tree.", "")
         if file.name == "meta.json":
             cases.append(Case(name, file.parent, [c.replace("{}", "{}/meta.json") for c in read + to_any],
                               [f.name for f in file.parent.iterdir()]))

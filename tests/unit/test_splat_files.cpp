@@ -67,6 +67,12 @@ const SplatFileCase kSplatFileCases[] = {
      3,
      {6 * 0.5001 * 3.6 / 65535, 0.0083, 9.0 / 256, 1.001 / 510, 3.0 / 256, 1.8 / 256},
      true,
+     true},
+    // Half a step of an octahedron's map, where it is widest, and of the half angle.
+    {"a.rad",
+     3,
+     {0, 0.0145, 0.5001 * 9 / 254, 1.001 / 510, 1.001 / 510 / 0.282, 0.5001 * 0.9 / 127},
+     true,
      true}};
 
 TEST(SplatFormats, RoundTripWithinTheQuantum) {
@@ -112,7 +118,7 @@ TEST(SplatFormats, SaysWhatIsLost) {
         std::string::npos);
     EXPECT_NE(all("a.splat", g, {.comments = {"x"}}).find("comments are dropped"), std::string::npos);
     EXPECT_NE(all("a.glb", g, {.antialiased = true}).find("anti-aliased is dropped"), std::string::npos);
-    for (const char* name : {"a.spz", "a.compressed.ply", "a.sog", "meta.json"}) {
+    for (const char* name : {"a.spz", "a.compressed.ply", "a.sog", "meta.json", "a.rad"}) {
         EXPECT_EQ(all(name, g, {.antialiased = true}).find("anti-aliased"), std::string::npos) << name;
         EXPECT_TRUE(read_splats(folder / name).antialiased) << name;
     }
@@ -124,7 +130,7 @@ TEST(SplatFormats, SaysWhatIsLost) {
               std::string::npos);
     g.means[0] = NAN;
     g.quaternions[7] = g.quaternions[6] = g.quaternions[5] = g.quaternions[4] = 0;
-    for (const char* name : {"a.splat", "a.spz", "a.glb", "a.gltf", "a.compressed.ply", "a.sog"}) {
+    for (const char* name : {"a.splat", "a.spz", "a.glb", "a.gltf", "a.compressed.ply", "a.sog", "a.rad"}) {
         EXPECT_NE(all(name, g, {}).find("2 splats have a value that is not finite"), std::string::npos)
             << name;
         EXPECT_EQ(load_splats(folder / name).size(), 8u) << name;
@@ -140,7 +146,8 @@ TEST(SplatFormats, AbsentDegreesStayAbsent) {
     const size_t stride = g.sh_stride();
     for (size_t i = 0; i < g.size(); ++i) std::fill_n(&g.sh[stride * i + 12], stride - 12, 0.0f);
     ASSERT_EQ(sh_degree_present(g), 1);
-    for (const char* name : {"a.ply", "a.compressed.ply", "a.spz", "a.glb", "a.gltf", "a.sog", "meta.json"}) {
+    for (const char* name :
+         {"a.ply", "a.compressed.ply", "a.spz", "a.glb", "a.gltf", "a.sog", "meta.json", "a.rad"}) {
         save_splats(folder / name, g);
         const Gaussians back = load_splats(folder / name);
         EXPECT_EQ(sh_degree_present(back), 1) << name;
@@ -152,7 +159,7 @@ TEST(SplatFormats, NoSplats) {
     TempFolder folder;
     Gaussians none;
     none.sh_degree = 1;
-    for (const char* name : {"a.ply", "a.splat", "a.spz", "a.compressed.ply", "a.sog"}) {
+    for (const char* name : {"a.ply", "a.splat", "a.spz", "a.compressed.ply", "a.sog", "a.rad"}) {
         save_splats(folder / name, none);
         EXPECT_EQ(load_splats(folder / name).size(), 0u) << name;
     }
@@ -164,7 +171,7 @@ TEST(SplatFormats, NoSplats) {
 TEST(SplatFormats, FoundByTheirFirstBytes) {
     TempFolder folder;
     const Gaussians g = storable_splats(1, 40, 1);
-    for (const char* name : {"a.ply", "a.compressed.ply", "a.spz", "a.glb", "a.sog"}) {
+    for (const char* name : {"a.ply", "a.compressed.ply", "a.spz", "a.glb", "a.sog", "a.rad"}) {
         save_splats(folder / name, g);
         for (const char* other : {"b", "b.ply", "b.spz", "b.gltf", "b.data"}) {
             std::filesystem::copy_file(folder / name, folder / other,
