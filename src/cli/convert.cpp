@@ -144,11 +144,11 @@ void check_files(const ConvertArguments& arguments) {
         inputs.push_back({"an input", arguments.files[i]});
         if (names_tileset(out) || arguments.unbundled ||
             core::lower(out.filename().string()) == "lod-meta.json")
-            check_not_a_part(out, arguments.files[i]);
+            check_not_a_part(arguments.unbundled ? levels_of_page(out) : out, arguments.files[i]);
         for (const fs::path& values : values_of(arguments.files[i]))
             inputs.push_back({"values of an input", values});
     }
-    if (arguments.unbundled) outputs.push_back({"the levels of OUT", out.parent_path() / "lod-meta.json"});
+    if (arguments.unbundled) outputs.push_back({"the levels of OUT", levels_of_page(out)});
     check_command_outputs(outputs, inputs);
     if (names_page(out) || names_tileset(out)) return;
     const SplatFormat format = format_of_name(out);
@@ -364,8 +364,8 @@ Action add_convert(CLI::App& app) {
         ->type_name("N");
     app.add_flag(
         "--unbundled", arguments->unbundled,
-        "Write the scene of a page beside it, as a lod-meta.json, of which a web server gives the browser "
-        "what a view needs");
+        "Write the scene of a page NAME.html beside it, as NAME-levels/lod-meta.json, of which a web server "
+        "gives the browser what a view needs");
     app.add_option(
            "--geo", arguments->geo,
            "Where a tileset.json puts the scene, in degrees (WGS 84) and metres: x points east, z to the "

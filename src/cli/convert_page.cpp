@@ -14,7 +14,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kLevels = "lod-meta.json";
+/// Each page of a folder has levels of its own. Relative to it.
+fs::path levels_beside(const fs::path& page) {
+    return fs::path(page.stem().string() + "-levels") / "lod-meta.json";
+}
+
 constexpr int kStartWidth = 1280, kStartHeight = 720;
 
 /// The cameras of the run's dataset, in the order of their names. Empty, with a remark, where they cannot be read.
@@ -32,6 +36,10 @@ Dataset cameras_of(const live::Run& run, std::vector<std::string>& remarks) {
 bool names_page(const fs::path& path) {
     const std::string extension = core::lower(path.extension().string());
     return extension == ".html" || extension == ".htm";
+}
+
+fs::path levels_of_page(const fs::path& page) {
+    return page.parent_path() / levels_beside(page);
 }
 
 std::vector<std::string> write_page(const fs::path& path, Gaussians gaussians, const SaveOptions& options,
@@ -56,8 +64,8 @@ std::vector<std::string> write_page(const fs::path& path, Gaussians gaussians, c
     page.target = framing.target;
     page.up = framing.up;
     if (unbundled) {
-        page.levels = kLevels;
-        for (std::string& remark : save_levels(path.parent_path() / kLevels, std::move(gaussians), options))
+        page.levels = levels_beside(path).generic_string();
+        for (std::string& remark : save_levels(levels_of_page(path), std::move(gaussians), options))
             remarks.push_back(std::move(remark));
     } else {
         page.sog = sog_bytes(path, gaussians, options, remarks);

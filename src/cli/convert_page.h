@@ -14,7 +14,10 @@ namespace ewa::cli {
 /// Whether the name is that of a page: .html or .htm.
 bool names_page(const std::filesystem::path& path);
 
-/// Writes the page with the scene inside, or unbundled with a lod-meta.json of options.levels beside it. run: its dataset's cameras become the
+/// The levels of an unbundled NAME.html: NAME-levels/lod-meta.json beside it.
+std::filesystem::path levels_of_page(const std::filesystem::path& page);
+
+/// Writes the page with the scene inside, or unbundled with levels_of_page(), of options.levels. run: its dataset's cameras become the
 /// views of the page, and its background is the page's; empty: none. Returns a line for each thing that the page does not have. Throws
 /// InputError, RunError.
 std::vector<std::string> write_page(const std::filesystem::path& path, Gaussians gaussians,

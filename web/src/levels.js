@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // A scene in levels of detail: a lod-meta.json and its chunks beside the page (src/io/splats/levels.h describes the layout).
+import {Heap} from "./heap.js";
 import {decodeSog} from "./sog.js";
 
-const kMostLoads = 2;  // at once
-const kKept = 3;       // budgets of splats that stay loaded beside those on the screen
+const kMostLoads = 2;               // at once
+const kKept = 2;                    // budgets of splats in memory; more only if they are on the screen or of the coarsest level
+const kPauses = [500, 2000, 8000];  // ms before a chunk that failed to load is asked for again
 
 /// The leaves of the tree: {middle, radius, rows}. rows[level] is {file, offset, count}, or missing where the leaf has no splats.
 export function leavesOf(meta) {
@@ -46,39 +48,58 @@ export function chooseLevels(leaves, eye, forward, budget) {
         const removed = Math.max(0, errorOf(leaf, chosen[i]) - errorOf(leaf, finer));
         return {i, finer, added, value: seen * (leaf.radius / distance) ** 2 * removed / added};
     };
-    const steps = leaves.map((leaf, i) => stepOf(i)).filter((step) => step);
-    while (steps.length > 0) {
-        let best = 0;
-        for (let k = 1; k < steps.length; ++k) if (steps[k].value > steps[best].value) best = k;
-        const {i, finer, added} = steps[best];
-        if (added > left) break;
-        left -= added;
-        chosen[i] = finer;
-        const next = stepOf(i);
-        if (next) steps[best] = next;
-        else steps.splice(best, 1);
+    const steps = new Heap((a, b) => a.value > b.value || (a.value === b.value && a.i < b.i));
+    leaves.forEach((leaf, i) => steps.add(stepOf(i)));
+    for (let best = steps.take(); best && best.added <= left; best = steps.take()) {
+        left -= best.added;
+        chosen[best.i] = best.finer;
+        steps.add(stepOf(best.i));
     }
     return chosen;
 }
 
 async function fetched(url) {
-    const answer = await fetch(url);
+    const answer = await fetch(url).catch(() => { throw new Error(`${url} cannot be reached`); });
     if (!answer.ok) throw new Error(`${url} is missing (${answer.status})`);
     return answer;
 }
 
 export class LevelScene {
-    /// changed() is called when other splats can be shown; failed(error) when a part cannot be loaded.
-    constructor(gl, meta, budget, changed, failed) {
-        Object.assign(this, {gl, budget, changed, failed, leaves: leavesOf(meta), files: meta.filenames});
-        this.chunks = new Map();  // by file: {scene, used}; scene is null while it loads
-        this.chosen = this.leaves.map((leaf) => leaf.rows.length - 1);
+    /// changed() is called when other splats can be shown, and when a chunk is given up; failed(error) when no chunk is left.
+    /// folder: the address of the lod-meta.json's folder, empty or with its slash.
+    constructor(gl, meta, folder, budget, changed, failed) {
+        Object.assign(this, {gl, folder, budget, changed, failed, leaves: leavesOf(meta), files: meta.filenames});
+        // Each chunk on the screen takes a layer of a texture, and three rows of another.
+        this.mostChunks = Math.min(gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS), Math.floor(gl.getParameter(gl.MAX_TEXTURE_SIZE) / 3));
+        this.chunks = new Map();  // by file: {scene, used, failures, idle}; scene is null until it is loaded
+        this.lost = new Set();    // files of chunks that were given up
+        this.view = null;
+        this.degree = 0;
         this.loads = this.time = 0;
+        this.chosen = this.suited();
         this.load();
     }
 
+    /// The levels that suit the last view. Leaves far away stay at their coarsest where the device takes no more chunks.
+    suited() {
+        const coarsest = this.leaves.map((leaf) => leaf.rows.length - 1);
+        const fileOf = (i, level) => this.leaves[i].rows[level].file, files = new Set(coarsest.map((level, i) => fileOf(i, level)));
+        if (files.size > this.mostChunks)
+            throw new Error(`its coarsest level has ${files.size} chunks, and this device takes ${this.mostChunks}`);
+        if (!this.view) return coarsest;
+        const {eye, forward} = this.view, chosen = chooseLevels(this.leaves, eye, forward, this.budget);
+        const far = this.leaves.map(({middle}) => Math.hypot(...middle.map((v, k) => v - eye[k])));
+        for (const i of [...chosen.keys()].sort((a, b) => far[a] - far[b])) {
+            const file = fileOf(i, chosen[i]);
+            if (files.size < this.mostChunks || files.has(file)) files.add(file);
+            else chosen[i] = coarsest[i];
+        }
+        return chosen;
+    }
+
     choose(eye, forward) {
-        const chosen = chooseLevels(this.leaves, eye, forward, this.budget);
+        this.view = {eye: [...eye], forward: [...forward]};
+        const chosen = this.suited();
         if (chosen.every((level, i) => level === this.chosen[i])) return;
         this.chosen = chosen;
         this.load();
@@ -101,34 +122,64 @@ export class LevelScene {
     load() {
         for (const file of this.wanted()) {
             if (this.loads >= kMostLoads) return;
-            if (this.chunks.has(file)) continue;
-            this.chunks.set(file, {scene: null, used: 0});
+            const chunk = this.chunks.get(file) ?? {scene: null, used: 0, failures: 0, idle: true};
+            if (!chunk.idle) continue;
+            this.chunks.set(file, chunk);
+            chunk.idle = false;
             ++this.loads;
-            this.open(file).then((scene) => {
-                this.chunks.get(file).scene = scene;
+            this.open(file).then((scene) => { chunk.scene = scene; }, (error) => this.miss(file, chunk, error)).then(() => {
                 --this.loads;
                 this.load();
-                this.changed();
+                if (chunk.scene || this.lost.has(file)) this.changed();
             }).catch(this.failed);
         }
     }
 
     async open(file) {
-        const name = this.files[file], folder = name.slice(0, name.lastIndexOf("/") + 1);
-        return decodeSog(this.gl, async (part) => new Uint8Array(await (await fetched(folder + part)).arrayBuffer()), () => {});
+        const name = this.files[file], folder = this.folder + name.slice(0, name.lastIndexOf("/") + 1);
+        const scene = await decodeSog(this.gl, async (part) => new Uint8Array(await (await fetched(folder + part)).arrayBuffer()),
+                                      () => {});
+        if (scene.palette && this.degree > 0 && scene.degree !== this.degree)
+            throw new Error(`${name} differs in its SH degree from the chunks before it`);
+        this.degree = Math.max(this.degree, scene.degree);
+        return scene;
+    }
+
+    /// Asks for a chunk that failed to load once more, after a pause, or gives it up.
+    miss(file, chunk, error) {
+        const pause = kPauses[chunk.failures++];
+        if (pause === undefined) return this.lose(file, error);
+        setTimeout(() => {
+            chunk.idle = true;
+            this.load();
+        }, pause);
+    }
+
+    /// Goes on without a chunk: leaves have the levels of the others.
+    lose(file, error) {
+        this.lost.add(file);
+        for (const {rows} of this.leaves) {
+            rows.forEach((row, level) => { if (row.file === file) delete rows[level]; });
+            while (rows.length > 0 && !rows[rows.length - 1]) --rows.length;
+        }
+        this.leaves = this.leaves.filter(({rows}) => rows.length > 0);
+        this.chosen = this.suited();
+        if (this.leaves.length === 0) this.failed(error);
     }
 
     /// The rows to show: of each leaf the chosen level, or the nearest coarser one that is loaded, or else a finer one.
     shown() {
-        const parts = [];
+        const parts = [], files = new Set(this.wanted());
         ++this.time;
         this.leaves.forEach((leaf, i) => {
             const levels = [];
             for (let level = this.chosen[i]; level < leaf.rows.length; ++level) levels.push(level);
             for (let level = this.chosen[i] - 1; level >= 0; --level) levels.push(level);
-            const level = levels.find((one) => leaf.rows[one] && this.chunks.get(leaf.rows[one].file)?.scene);
-            if (level === undefined) return;
-            const {file, offset, count} = leaf.rows[level], chunk = this.chunks.get(file);
+            const row = leaf.rows[levels.find((level) => this.chunks.get(leaf.rows[level]?.file)?.scene &&
+                                                         (files.size < this.mostChunks || files.has(leaf.rows[level].file)))];
+            if (!row) return;
+            files.add(row.file);
+            const {file, offset, count} = row, chunk = this.chunks.get(file);
             chunk.used = this.time;
             parts.push({chunk: chunk.scene, offset, count});
         });
@@ -136,14 +187,17 @@ export class LevelScene {
         return parts;
     }
 
+    /// Drops the chunks that have not been on the screen for longest.
     forget() {
         const coarse = new Set(this.leaves.map((leaf) => leaf.rows[leaf.rows.length - 1].file));
-        const spare = [...this.chunks].filter(([file, {scene, used}]) => scene && used < this.time && !coarse.has(file));
-        spare.sort((a, b) => b[1].used - a[1].used);
-        let count = 0;
+        const loaded = [...this.chunks].filter(([, {scene}]) => scene);
+        const spare = loaded.filter(([file, {used}]) => used < this.time && !coarse.has(file));
+        let count = loaded.reduce((sum, [, {scene}]) => sum + scene.count, 0);
+        spare.sort((a, b) => a[1].used - b[1].used);
         for (const [file, {scene}] of spare) {
-            count += scene.count;
-            if (count > kKept * this.budget) this.chunks.delete(file);
+            if (count <= kKept * this.budget) return;
+            count -= scene.count;
+            this.chunks.delete(file);
         }
     }
 }
@@ -152,7 +206,6 @@ export class LevelScene {
 export function joined(parts) {
     const chunks = [...new Set(parts.map(({chunk}) => chunk))];
     const degree = Math.max(0, ...chunks.map((chunk) => chunk.degree));
-    if (chunks.some((chunk) => chunk.palette && chunk.degree !== degree)) throw new Error("its chunks differ in their SH degree");
     const count = parts.reduce((sum, part) => sum + part.count, 0);
     const packed = new Uint32Array(8 * count), positions = new Float32Array(3 * count);
     let at = 0;
@@ -169,8 +222,10 @@ export function joined(parts) {
             palettes: degree > 0 ? chunks.map((chunk) => chunk.palette) : [], chunks: chunks.length};
 }
 
+/// {meta, folder} of a lod-meta.json beside the page.
 export async function openLevels(name) {
     if (location.protocol === "file:")
         throw new Error("its levels come from a web server; in its folder, python3 -m http.server is one");
-    return (await fetched(name)).json();
+    const address = name.split("/").map(encodeURIComponent).join("/");
+    return {meta: await (await fetched(address)).json(), folder: address.slice(0, address.lastIndexOf("/") + 1)};
 }

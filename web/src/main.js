@@ -74,30 +74,44 @@ class Page {
     }
 
     /// Shows the levels of a lod-meta.json that suit the view.
-    stream(meta) {
-        const wanted = Number(new URLSearchParams(location.hash.slice(1)).get("budget"));
-        this.levels = new LevelScene(this.gl, meta, wanted > 0 ? wanted : this.settings.budget, () => {
-            const parts = this.levels.shown();
-            state.levels = this.levels.chosen.join();
-            if (parts.length > 0) this.show(joined(parts));
-        }, fail);
+    stream({meta, folder}) {
+        this.levels = new LevelScene(this.gl, meta, folder, this.budget(), () => attempt(() => this.refresh()), fail);
         this.rest();
+    }
+
+    budget() {
+        const wanted = Number(new URLSearchParams(location.hash.slice(1)).get("budget"));
+        return wanted > 0 ? wanted : this.settings.budget;
+    }
+
+    /// Shows what is loaded of the levels, and says what cannot be.
+    refresh() {
+        const parts = this.levels.shown(), lost = this.levels.lost.size, all = this.levels.files.length;
+        state.levels = this.levels.chosen.join();
+        byId("lost").hidden = lost === 0;
+        byId("lost").textContent = `${lost} of ${all} parts of the scene could not be loaded. Reload the page to try again.`;
+        if (parts.length > 0) this.show(joined(parts));
+        else this.request();
     }
 
     /// Chooses levels once the view has stayed for a moment.
     rest() {
         clearTimeout(this.timer);
-        this.timer = setTimeout(() => {
+        this.timer = setTimeout(() => attempt(() => {
             this.timer = null;
             this.levels.choose(this.camera.eye, this.camera.forward);
             this.request();
-        }, kRest);
+        }), kRest);
     }
 
-    /// The view that the address names: #camera=3, #camera=NAME, #light.
+    /// The view that the address names: #camera=3, #camera=NAME, #light, #budget=N.
     jump() {
         const wanted = new URLSearchParams(location.hash.slice(1));
         this.light = wanted.has("light");
+        if (this.levels) {
+            this.levels.budget = this.budget();
+            this.rest();
+        }
         if (!wanted.has("camera")) return;
         const name = wanted.get("camera"), found = this.settings.cameras.findIndex((one) => `/${one.name}`.endsWith(`/${name}`));
         this.view(found >= 0 ? found : Number(name) || 0);
@@ -122,7 +136,10 @@ class Page {
             event.preventDefault();
             commands[keys[event.code]]();
         });
-        addEventListener("hashchange", () => this.jump());
+        addEventListener("hashchange", () => {
+            this.jump();
+            this.request();
+        });
         const none = this.settings.cameras.length === 0;
         for (const id of ["previous", "next", "where"]) byId(id).hidden = none;
     }
@@ -173,7 +190,7 @@ class Page {
         this.waiting = true;
         requestAnimationFrame(() => {
             this.waiting = false;
-            this.draw();
+            attempt(() => this.draw());
         });
     }
 
@@ -204,6 +221,14 @@ function fail(error) {
     say(`The scene cannot be shown: ${error.message}`);
 }
 
+function attempt(action) {
+    try {
+        action();
+    } catch (error) {
+        fail(error);
+    }
+}
+
 async function start() {
     const canvas = byId("view"), gl = canvas.getContext("webgl2", {antialias: false, alpha: false, preserveDrawingBuffer: true});
     if (!gl) {
@@ -217,8 +242,8 @@ async function start() {
         const settings = JSON.parse(byId("settings").textContent), text = byId("scene").textContent.trim();
         byId("scene").remove();
         if (settings.levels) {
-            const meta = await openLevels(settings.levels);
-            return new Page(gl, settings).stream(meta);
+            const opened = await openLevels(settings.levels);
+            return new Page(gl, settings).stream(opened);
         }
         const files = openArchive(bytesOf(text));
         const scene = await decodeSog(gl, (name) => files.get(name), (part) => { byId("progress").value = part; });

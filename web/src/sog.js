@@ -24,6 +24,8 @@ class PixelReader {
         gl.deleteTexture(texture);
         return {data, width, height};
     }
+
+    close() { this.gl.deleteFramebuffer(this.frame); }
 }
 
 function positionsOf(meta, low, high) {
@@ -46,13 +48,17 @@ function positionsOf(meta, low, high) {
 /// open(name) gives the bytes of a file of the SOG, at once or later. progress(0..1) is called on the way.
 export async function decodeSog(gl, open, progress) {
     const meta = JSON.parse(new TextDecoder().decode(await open("meta.json")));
-    const reader = new PixelReader(gl);
     const names = [...meta.means.files, ...meta.quats.files, ...meta.scales.files, ...meta.sh0.files,
                    ...(meta.shN ? meta.shN.files : [])];
+    const reader = new PixelReader(gl);
     const images = new Map();
-    for (const name of names) {
-        images.set(name, await reader.read(await open(name)));
-        progress(images.size / (names.length + 1));
+    try {
+        for (const name of names) {
+            images.set(name, await reader.read(await open(name)));
+            progress(images.size / (names.length + 1));
+        }
+    } finally {
+        reader.close();
     }
     const pixels = (part, i = 0) => images.get(meta[part].files[i]).data;
     const positions = positionsOf(meta, pixels("means", 0), pixels("means", 1));
