@@ -171,7 +171,7 @@ void check_not_empty(const ConvertArguments& arguments, size_t read, size_t left
 
 Json output_json(const ConvertArguments& arguments, const SceneSize& size) {
     const fs::path& out = arguments.files.back();
-    const std::vector<fs::path> values = values_of(out);
+    const std::vector<fs::path> values = parts_of(out, arguments.unbundled);
     Json json = {{"file", out.string()},
                  {"format", format_text(out)},
                  {"splats", size.splats},
@@ -272,7 +272,7 @@ int run(const ConvertArguments& arguments) {
 
     if (!arguments.quiet) {
         fmt::print("{}\n", described(out, format_text(out), "", size));
-        const std::vector<fs::path> values = values_of(out);
+        const std::vector<fs::path> values = parts_of(out, arguments.unbundled);
         if (!values.empty())
             fmt::print("{}{}: the values of this {}, {}\n", core::one_line(values[0].string()),
                        values.size() > 1
@@ -353,8 +353,7 @@ Action add_convert(CLI::App& app) {
                  "Pack the splats of a .glb or .gltf as SPZ (KHR_gaussian_splatting_compression_spz_2)");
     app.add_option("--levels", arguments->levels,
                    "Levels of a lod-meta.json, .rad, tileset.json or --unbundled page, each with half of the "
-                   "splats of the one "
-                   "before [until one "
+                   "splats of the one before; fewer where a tile would have less than 1,000 [until one "
                    "has at most a million, or a tile 100,000; none in a .rad]")
         ->transform(in_range(1, 32))
         ->type_name("N");

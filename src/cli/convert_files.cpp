@@ -7,6 +7,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 #include "io/splats/formats.h"
+#include "io/splats/tileset.h"
 
 namespace ewa::cli {
 
@@ -16,7 +17,16 @@ std::vector<fs::path> values_of(const fs::path& path) {
     const std::string name = core::lower(path.filename().string());
     if (name.ends_with(".gltf")) return io::gltf_values(path);
     if (name == "lod-meta.json") return io::level_files(path);
+    if (names_tileset(path)) return io::tile_files(path);
     return name == "meta.json" ? io::sog_images(path) : std::vector<fs::path>();
+}
+
+std::vector<fs::path> parts_of(const fs::path& out, bool unbundled) {
+    if (!unbundled) return values_of(out);
+    const fs::path levels = levels_of_page(out);
+    std::vector<fs::path> files = values_of(levels);
+    files.insert(files.begin(), levels);
+    return files;
 }
 
 uint64_t bytes_of(const std::vector<fs::path>& files) {
@@ -30,7 +40,7 @@ void check_not_a_part(const fs::path& out, const fs::path& input) {
     const std::string name = folder.filename().string();
     const bool chunk =
         name.find('_') != std::string::npos && name.find_first_not_of("0123456789_") == std::string::npos;
-    if ((names_tileset(out) ? name == "tiles" : chunk) &&
+    if ((names_tileset(out) ? io::names_tile_folder(name) : chunk) &&
         folder.parent_path() == fs::weakly_canonical(out).parent_path())
         throw InputError(core::one_line(out.string()) + ": would replace its parts, of which an input, " +
                          core::one_line(input.string()) + ", is one; write to another folder");

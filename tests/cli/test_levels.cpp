@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <filesystem>
 
 #include "cli/expect.h"
 #include "ewa/splat_files.h"
@@ -40,6 +41,27 @@ TEST(ConvertLevels, WrongUse) {
     expect_failure(run_ewa({"convert", folder / "s.ply", folder / "lod-meta.json", "--check"}), 2, "--check");
     expect_failure(run_ewa({"convert", levels, levels}), 2, "lod-meta.json");
     expect_failure(run_ewa({"convert", folder / "lod/0_0/meta.json", levels}), 2, "another folder");
+}
+
+TEST(ConvertLevels, TheJsonCountsTheBytesOfAllFiles) {
+    const Folder folder;
+    ewa::save_splats(folder / "s.ply", storable_splats(4, 4000, 0));
+    for (const std::string name : {"tileset.json", "page.html", "lod-meta.json"}) {
+        SCOPED_TRACE(name);
+        const std::string out = folder / name.substr(0, name.find('.')) + "/" + name;
+        std::vector<std::string> arguments = {"convert", folder / "s.ply", out, "--levels", "2",
+                                              "--json",  folder / "o.json"};
+        if (name == "page.html") arguments.push_back("--unbundled");
+        const Outcome outcome = run_ewa(arguments);
+        expect_success(outcome);
+        EXPECT_NE(outcome.out.find("the values of this"), std::string::npos) << outcome.out;
+        size_t all = 0;
+        for (const auto& entry :
+             std::filesystem::recursive_directory_iterator(std::filesystem::path(out).parent_path()))
+            if (entry.is_regular_file()) all += entry.file_size();
+        const auto written = read_json(folder / "o.json")["output"];
+        EXPECT_EQ(written["bytes"].get<size_t>() + written["values"]["bytes"].get<size_t>(), all);
+    }
 }
 
 TEST(ConvertLevels, SplatTransformReadsThem) {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <glm/glm.hpp>
@@ -24,40 +25,77 @@ json read_tileset(const test::TempFolder& folder) {
     return json::parse(std::ifstream(folder / "tileset.json"));
 }
 
-void visit_tiles(const json& tile, int depth, const std::function<void(const json&, int)>& visit) {
-    visit(tile, depth);
+/// visit(tile, depth, matrix): from the tile's frame to the world's.
+using Visit = std::function<void(const json&, int, const glm::dmat4&)>;
+
+void visit_tiles(const json& tile, int depth, const glm::dmat4& above, const Visit& visit) {
+    glm::dmat4 matrix(1);
+    if (tile.contains("transform"))
+        for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = tile["transform"][size_t(i)];
+    matrix = above * matrix;
+    visit(tile, depth, matrix);
     if (!tile.contains("children")) return;
     for (const json& child : tile["children"]) {
         EXPECT_LE(child["geometricError"], tile["geometricError"]);
-        visit_tiles(child, depth + 1, visit);
+        visit_tiles(child, depth + 1, matrix, visit);
     }
+}
+
+/// The centres of a tile's splats in its frame, where z is up.
+std::vector<glm::dvec3> centres_of(const test::TempFolder& folder, const json& tile) {
+    const Gaussians part = load_splats(folder / tile["content"]["uri"].get<std::string>());
+    std::vector<glm::dvec3> centres;
+    // A reader of glTF turns the older profile's values by 180 degrees about y.
+    for (size_t i = 0; i < part.size(); ++i)
+        centres.emplace_back(-part.means[3 * i], -part.means[3 * i + 2], -part.means[3 * i + 1]);
+    return centres;
+}
+
+/// The distance of each splat of the scene to the nearest one of the finest tiles, at most.
+double farthest_of_scene(const test::TempFolder& folder, const Gaussians& scene) {
+    std::vector<glm::dvec3> found;
+    visit_tiles(read_tileset(folder)["root"], 0, glm::dmat4(1),
+                [&](const json& tile, int, const glm::dmat4& matrix) {
+                    if (tile["geometricError"] > 0) return;
+                    for (const glm::dvec3& centre : centres_of(folder, tile))
+                        found.push_back(matrix * glm::dvec4(centre, 1));
+                });
+    EXPECT_EQ(found.size(), scene.size());
+    double farthest = 0;
+    for (size_t i = 0; i < scene.size(); ++i) {
+        const glm::dvec3 ply = scene.world_mean(i), place(ply.x, ply.z, -ply.y);
+        double nearest = 1e300;
+        for (const glm::dvec3& one : found) nearest = std::min(nearest, glm::distance(one, place));
+        farthest = std::max(farthest, nearest);
+    }
+    return farthest;
+}
+
+std::vector<std::string> write(const test::TempFolder& folder, const Gaussians& scene, int levels) {
+    return io::write_tileset(folder / "tileset.json", scene, {.save = {.levels = levels}, .earth = {}});
 }
 
 TEST(Tileset, EachLevelIsTheWholeScene) {
     const test::TempFolder folder;
     const Gaussians scene = test::storable_splats(5, 4000, 1);
-    io::write_tileset(folder / "tileset.json", scene, {.save = {.levels = 3}, .earth = {}});
+    write(folder, scene, 3);
     const json top = read_tileset(folder);
     EXPECT_EQ(top["asset"]["version"], "1.1");
     EXPECT_EQ(top["extensions"]["3DTILES_content_gltf"]["extensionsUsed"],
               json({"KHR_gaussian_splatting", "KHR_gaussian_splatting_compression_spz_2"}));
     EXPECT_EQ(top["root"]["refine"], "REPLACE");
-    EXPECT_FALSE(top["root"].contains("transform"));
     EXPECT_GE(top["geometricError"], top["root"]["geometricError"]);
     std::vector<size_t> counts(3), tiles(3);
     glm::dvec3 sum(0);
-    visit_tiles(top["root"], 0, [&](const json& tile, int depth) {
-        const Gaussians part = load_splats(folder / tile["content"]["uri"].get<std::string>());
-        counts[size_t(depth)] += part.size();
+    visit_tiles(top["root"], 0, glm::dmat4(1), [&](const json& tile, int depth, const glm::dmat4& matrix) {
+        const std::vector<glm::dvec3> centres = centres_of(folder, tile);
+        counts[size_t(depth)] += centres.size();
         ++tiles[size_t(depth)];
         const json& box = tile["boundingVolume"]["box"];
-        for (size_t i = 0; i < part.size(); ++i) {
-            // A reader of glTF turns the older profile's values by 180 degrees about y. Up is z in a tile.
-            const glm::dvec3 ply(-part.means[3 * i], part.means[3 * i + 1], -part.means[3 * i + 2]);
-            const glm::dvec3 place(ply.x, ply.z, -ply.y);
+        for (const glm::dvec3& centre : centres) {
             for (int k = 0; k < 3; ++k)
-                ASSERT_LE(std::abs(place[k] - box[k].get<double>()), box[3 + 4 * k].get<double>() + 1e-3);
-            if (depth == 2) sum += ply;
+                ASSERT_LE(std::abs(centre[k] - box[k].get<double>()), box[3 + 4 * k].get<double>() + 1e-3);
+            if (depth == 2) sum += glm::dvec3(matrix * glm::dvec4(centre, 1));
         }
         EXPECT_EQ(tile["geometricError"] == 0, depth == 2);
     });
@@ -65,7 +103,7 @@ TEST(Tileset, EachLevelIsTheWholeScene) {
     EXPECT_EQ(tiles, (std::vector<size_t>{1, 2, 4}));
     glm::dvec3 expected(0);
     for (size_t i = 0; i < scene.size(); ++i) expected += scene.world_mean(i);
-    EXPECT_LT(glm::distance(sum, expected) / 4000, 1e-3);
+    EXPECT_LT(glm::distance(sum, glm::dvec3(expected.x, expected.z, -expected.y)) / 4000, 1e-3);
 }
 
 TEST(Tileset, TheSceneIsAtItsPlace) {
@@ -98,6 +136,88 @@ TEST(Tileset, TheSceneIsAtItsPlace) {
     const glm::dvec3 middle = transform * glm::dvec4(box[0], box[1], box[2], 1);
     EXPECT_LT(glm::distance(middle, 0.5 * (low + high)), 3);
     EXPECT_EQ(read_tileset(folder)["root"]["children"].size(), 0u);
+}
+
+TEST(Tileset, SplatsFarFromTheOriginKeepTheirPlaces) {
+    const test::TempFolder folder;
+    // Two groups 100 km apart: one SPZ of both would have steps of 1/64.
+    Gaussians scene = test::storable_splats(6, 2000, 0);
+    for (size_t i = 0; i < 1000; ++i) scene.means[3 * i] += 65536;
+    write(folder, scene, 2);
+    EXPECT_LT(farthest_of_scene(folder, scene), 0.01);  // float32 has steps of 1/128 there
+}
+
+TEST(Tileset, TellsWhatAllTilesLose) {
+    const test::TempFolder folder;
+    Gaussians scene = test::storable_splats(7, 4000, 0);
+    // The first tiles alone have colours outside SPZ's range.
+    for (size_t i = 0; i < scene.size(); ++i)
+        if (scene.means[3 * i] < 0) scene.sh[3 * i] = 30;
+    std::string all;
+    for (const std::string& remark : write(folder, scene, 1)) all += remark + "\n";
+    size_t expected = 0;
+    for (size_t i = 0; i < scene.size(); ++i) expected += scene.means[3 * i] < 0;
+    EXPECT_NE(all.find(std::to_string(expected) + " scales, colours"), std::string::npos) << all;
+    for (const std::string& remark : write(folder, scene, 2))
+        if (remark.find("are clamped") != std::string::npos) {
+            EXPECT_GT(std::stoul(remark), expected);
+            return;
+        }
+    ADD_FAILURE() << "no remark on clamped values";
+}
+
+TEST(Tileset, TilesHaveAThousandSplats) {
+    const test::TempFolder folder;
+    const std::vector<std::string> remarks = write(folder, test::storable_splats(5, 5000, 0), 20);
+    EXPECT_EQ(remarks.at(0), "7 tiles of levels with 5000, 2500, 1250 splats");
+    EXPECT_EQ(remarks.at(1), "3 of 20 levels: more would have tiles of fewer than 1000 splats");
+    visit_tiles(
+        read_tileset(folder)["root"], 0, glm::dmat4(1),
+        [&](const json& tile, int, const glm::dmat4&) { EXPECT_GE(centres_of(folder, tile).size(), 1000u); });
+}
+
+TEST(Tileset, AnEarlierOneIsReplacedAtOnce) {
+    namespace fs = std::filesystem;
+    const test::TempFolder folder;
+    const Gaussians first = test::storable_splats(5, 4000, 0), second = test::storable_splats(6, 1000, 0);
+    write(folder, first, 3);
+    const std::vector<fs::path> before = io::tile_files(folder / "tileset.json");
+    EXPECT_EQ(before.size(), 7u);
+    std::ofstream(folder / "tiles/mine.txt") << "somebody's";
+
+    // While it cannot be finished, the earlier one is whole.
+    Gaussians broken = second;
+    broken.means[0] = 3e7f;
+    broken.means[3] = -3e7f;
+    EXPECT_THROW(write(folder, broken, 1), InputError);
+    EXPECT_EQ(io::tile_files(folder / "tileset.json"), before);
+    EXPECT_FALSE(fs::exists(folder / "tiles-2"));
+    EXPECT_LT(farthest_of_scene(folder, first), 1e-3);
+
+    write(folder, second, 1);
+    EXPECT_LT(farthest_of_scene(folder, second), 1e-3);
+    for (const fs::path& tile : before) EXPECT_FALSE(fs::exists(tile)) << tile;
+    EXPECT_TRUE(fs::exists(folder / "tiles/mine.txt"));
+    EXPECT_TRUE(fs::exists(folder / "tiles-2"));
+    fs::remove_all(folder / "tiles");
+    write(folder, second, 1);
+    EXPECT_TRUE(fs::exists(folder / "tiles"));
+    EXPECT_FALSE(fs::exists(folder / "tiles-2"));
+}
+
+TEST(Tileset, LeavesFilesOfOthersAlone) {
+    namespace fs = std::filesystem;
+    const test::TempFolder folder;
+    fs::create_directories(folder / "models");
+    std::ofstream(folder / "models/0_0.glb") << "somebody's";
+    std::ofstream(folder / "tileset.json")
+        << R"({"root": {"content": {"uri": "models/0_0.glb"}, "children": [{"content": {"uri": "../0_0.glb"}}, 7]}})";
+    EXPECT_EQ(io::tile_files(folder / "tileset.json").size(), 1u);
+    write(folder, test::storable_splats(5, 10, 0), 1);
+    EXPECT_TRUE(fs::exists(folder / "models/0_0.glb"));
+    std::ofstream(folder / "tileset.json") << "{";
+    write(folder, test::storable_splats(5, 10, 0), 1);
+    EXPECT_EQ(io::tile_files(folder / "tileset.json").size(), 1u);
 }
 
 TEST(Tileset, WithoutSplatsThereIsNone) {

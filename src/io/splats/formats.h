@@ -65,9 +65,19 @@ SplatScene read_spz(core::FileReader& reader);
 std::vector<std::string> write_spz(const std::filesystem::path& path, const Gaussians& gaussians,
                                    const SaveOptions& options);
 
-/// The bytes that write_spz would write to `path`, which errors name.
+/// What packing as SPZ cost.
+struct SpzLoss {
+    int version = 0, sh_degree = 0;
+    int fractional_bits = 24;  // of positions
+    uint64_t clamped = 0;      // values outside their range
+
+    void add(const SpzLoss& other);
+    std::vector<std::string> remarks() const;
+};
+
+/// The bytes that write_spz would write to `path`, which errors name. Adds to `loss`.
 std::string pack_spz(const std::filesystem::path& path, const Gaussians& gaussians,
-                     const SaveOptions& options, std::vector<std::string>& remarks);
+                     const SaveOptions& options, SpzLoss& loss);
 
 /// glTF with KHR_gaussian_splatting. Reads every primitive with the extension that the scene's nodes reach,
 /// in the order of the nodes, into one scene. Accepts float32 and the quantised component types, with or

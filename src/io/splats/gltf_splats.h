@@ -7,6 +7,7 @@
 
 #include "ewa/splat_scene.h"
 #include "io/gltf/document.h"
+#include "io/splats/formats.h"
 
 namespace ewa::io {
 
@@ -20,8 +21,9 @@ inline std::string sh_name(int degree, int coefficient) {
     return kSplatPrefix + "SH_DEGREE_" + std::to_string(degree) + "_COEF_" + std::to_string(coefficient);
 }
 
-/// Writes the content of a tile of 3D Tiles: a .glb with an SPZ, in Cesium's older profile. Otherwise as write_gltf_splats.
-std::vector<std::string> write_cesium_tile(const std::filesystem::path& path, const Gaussians& gaussians,
-                                           const SaveOptions& options);
+/// Writes the content of a tile of 3D Tiles: a .glb with an SPZ, in Cesium's older profile. Otherwise as write_gltf_splats. Adds to
+/// `loss`.
+void write_cesium_tile(const std::filesystem::path& path, const Gaussians& gaussians,
+                       const SaveOptions& options, SpzLoss& loss);
 
 }  // namespace ewa::io

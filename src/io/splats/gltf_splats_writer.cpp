@@ -186,12 +186,11 @@ void write_document(const std::filesystem::path& path, const Json& root, uint64_
 }
 
 /// An SPZ in place of the accessors' values. cesium: in Cesium's older profile. See gltf_splats.cpp.
-std::vector<std::string> write_packed(const std::filesystem::path& path, const Gaussians& gaussians,
-                                      const SaveOptions& options, bool cesium) {
+void write_packed(const std::filesystem::path& path, const Gaussians& gaussians, const SaveOptions& options,
+                  bool cesium, SpzLoss& loss) {
     SaveOptions packing = options;
     packing.spz_version = kSpzVersionOfGltf;
-    std::vector<std::string> remarks;
-    std::string packed = pack_spz(path, gaussians, packing, remarks);
+    std::string packed = pack_spz(path, gaussians, packing, loss);
     const size_t bytes = packed.size();
     packed.resize((bytes + 3) / 4 * 4, '\0');
     std::vector<Attribute> attributes = attributes_of(gaussians);
@@ -216,7 +215,6 @@ std::vector<std::string> write_packed(const std::filesystem::path& path, const G
     root["nodes"] = {{{"mesh", 0}}};
     write_document(path, root, packed.size(),
                    [&](core::AtomicFile& file) { file.write(packed.data(), packed.size()); });
-    return remarks;
 }
 
 }  // namespace
@@ -224,7 +222,11 @@ std::vector<std::string> write_packed(const std::filesystem::path& path, const G
 std::vector<std::string> write_gltf_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                            const SaveOptions& options) {
     if (gaussians.size() == 0) throw InputError(path.string() + ": glTF cannot store a scene without splats");
-    if (options.gltf_spz) return write_packed(path, gaussians, options, false);
+    if (options.gltf_spz) {
+        SpzLoss loss;
+        write_packed(path, gaussians, options, false, loss);
+        return loss.remarks();
+    }
     const std::vector<Attribute> attributes = attributes_of(gaussians);
     uint64_t bytes = 0;
     for (const Attribute& attribute : attributes) bytes += uint64_t(attribute.bytes) * gaussians.size();
@@ -233,9 +235,9 @@ std::vector<std::string> write_gltf_splats(const std::filesystem::path& path, co
     return {};
 }
 
-std::vector<std::string> write_cesium_tile(const std::filesystem::path& path, const Gaussians& gaussians,
-                                           const SaveOptions& options) {
-    return write_packed(path, gaussians, options, true);
+void write_cesium_tile(const std::filesystem::path& path, const Gaussians& gaussians,
+                       const SaveOptions& options, SpzLoss& loss) {
+    write_packed(path, gaussians, options, true, loss);
 }
 
 }  // namespace ewa::io

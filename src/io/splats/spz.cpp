@@ -415,9 +415,9 @@ void write_streams(const Packer::Sink& sink, std::vector<std::byte> head, const 
     sink(packed.data(), packed.size());
 }
 
-/// Passes the bytes of the file to the sink, and returns the remarks.
-std::vector<std::string> write_to(const Packer::Sink& sink, const std::filesystem::path& path,
-                                  const Gaussians& gaussians, const SaveOptions& options) {
+/// Passes the bytes of the file to the sink.
+SpzLoss write_to(const Packer::Sink& sink, const std::filesystem::path& path, const Gaussians& gaussians,
+                 const SaveOptions& options) {
     if (options.spz_version < 2 || options.spz_version > 4)
         throw InputError("SPZ version " + std::to_string(options.spz_version) +
                          " cannot be written; write 2, 3 or 4");
@@ -432,19 +432,30 @@ std::vector<std::string> write_to(const Packer::Sink& sink, const std::filesyste
     else
         write_streams(sink, head, sizes, encoder, gaussians.size(), options);
 
-    std::vector<std::string> remarks = {"positions are rounded to 1/" + std::to_string(1 << bits) +
-                                        ", scales to 1/16 of their logarithm, colours and opacities to 8 "
-                                        "bits, rotations to " +
-                                        (options.spz_version < 3 ? "8" : "10") + " bits per component"};
-    if (gaussians.sh_degree > 0)
-        remarks.push_back("SH coefficients have 5 bits (degree 1) and 4 bits (others), clamped to -1..1");
-    if (encoder.clamped() > 0)
-        remarks.push_back(std::to_string(encoder.clamped()) +
-                          " scales, colours and SH coefficients are outside SPZ's range and are clamped");
-    return remarks;
+    return {options.spz_version, gaussians.sh_degree, bits, encoder.clamped()};
 }
 
 }  // namespace
+
+void SpzLoss::add(const SpzLoss& other) {
+    version = other.version;
+    sh_degree = std::max(sh_degree, other.sh_degree);
+    fractional_bits = std::min(fractional_bits, other.fractional_bits);
+    clamped += other.clamped;
+}
+
+std::vector<std::string> SpzLoss::remarks() const {
+    std::vector<std::string> lines = {"positions are rounded to 1/" + std::to_string(1 << fractional_bits) +
+                                      ", scales to 1/16 of their logarithm, colours and opacities to 8 "
+                                      "bits, rotations to " +
+                                      (version < 3 ? "8" : "10") + " bits per component"};
+    if (sh_degree > 0)
+        lines.push_back("SH coefficients have 5 bits (degree 1) and 4 bits (others), clamped to -1..1");
+    if (clamped > 0)
+        lines.push_back(std::to_string(clamped) +
+                        " scales, colours and SH coefficients are outside SPZ's range and are clamped");
+    return lines;
+}
 
 SplatScene read_spz(core::FileReader& reader) {
     if (reader.size() < 2) reader.fail("this is not an SPZ file: it has less than 2 bytes");
@@ -461,18 +472,17 @@ SplatScene read_spz(const std::filesystem::path& path) {
 std::vector<std::string> write_spz(const std::filesystem::path& path, const Gaussians& gaussians,
                                    const SaveOptions& options) {
     core::AtomicFile file(path);
-    std::vector<std::string> remarks =
+    const SpzLoss loss =
         write_to([&](const void* bytes, size_t n) { file.write(bytes, n); }, path, gaussians, options);
     file.commit();
-    return remarks;
+    return loss.remarks();
 }
 
 std::string pack_spz(const std::filesystem::path& path, const Gaussians& gaussians,
-                     const SaveOptions& options, std::vector<std::string>& remarks) {
+                     const SaveOptions& options, SpzLoss& loss) {
     std::string packed;
-    remarks =
-        write_to([&](const void* bytes, size_t n) { packed.append(static_cast<const char*>(bytes), n); },
-                 path, gaussians, options);
+    loss.add(write_to([&](const void* bytes, size_t n) { packed.append(static_cast<const char*>(bytes), n); },
+                      path, gaussians, options));
     return packed;
 }
 

@@ -5,10 +5,13 @@
 #include <array>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <glm/gtc/matrix_transform.hpp>
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
 #include "core/folders.h"
+#include "core/json.h"
+#include "core/sandboxed_path.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "io/splats/formats.h"
@@ -21,10 +24,11 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr size_t kMostOfATile = 100'000;
+constexpr size_t kMostOfATile = 100'000, kFewestOfATile = 1'000;
 constexpr double kReach = 3;  // standard deviations that viewers draw; they cull by the box
 constexpr int kDeepest = 31;
 constexpr const char* kFolder = "tiles";
+constexpr core::JsonLimits kTilesetLimits = {.depth = 512};
 /// CesiumJS replaces a tile whose error covers more than 16 px. Splats that are 2 px wide then suffice.
 constexpr double kErrorPerWidth = 8;
 
@@ -34,8 +38,9 @@ const glm::dmat4 kUp({1, 0, 0, 0}, {0, 0, -1, 0}, {0, 1, 0, 0}, {0, 0, 0, 1});
 struct Tile {
     int depth = 0;
     size_t level = 0, splats = 0;
-    double error = 0;  // world units
-    Bound bound;       // in the frame of a PLY, relative to the scene's origin
+    double error = 0;      // world units
+    Bound bound;           // in the frame of a PLY, relative to the scene's origin
+    glm::dvec3 origin{0};  // of its coordinates, in the same frame
     std::string file;
 };
 
@@ -52,16 +57,59 @@ double usual_width(const Gaussians& g) {
     return 2 * std::exp(double(*middle));
 }
 
+bool is_number(std::string_view text) {
+    return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
+}
+
+/// Whether write_tileset has made this tile for a tileset.json in the folder.
+bool is_own_tile(const std::filesystem::path& tile, const std::filesystem::path& folder) {
+    const std::string name = tile.stem().string();
+    const size_t middle = name.find('_');
+    return tile.extension() == ".glb" && middle != std::string::npos && is_number(name.substr(0, middle)) &&
+           is_number(name.substr(middle + 1)) && tile.parent_path().parent_path() == folder &&
+           names_tile_folder(tile.parent_path().filename().string());
+}
+
+/// A new folder beside the tileset.json. The destructor removes it, unless it was kept.
+class NewFolder {
+  public:
+    explicit NewFolder(const std::filesystem::path& above) {
+        core::make_folder(above);
+        for (int number = 1;; ++number) {
+            name_ = kFolder;
+            if (number > 1) name_.append("-").append(std::to_string(number));
+            path_ = above / name_;
+            std::error_code error;
+            if (std::filesystem::create_directory(path_, error)) return;
+            if (error && error != std::errc::file_exists)
+                throw RunError("cannot make the folder " + path_.string() + ": " + error.message());
+        }
+    }
+    ~NewFolder() {
+        std::error_code ignored;
+        if (!kept_) std::filesystem::remove_all(path_, ignored);
+    }
+    NewFolder(const NewFolder&) = delete;
+    NewFolder& operator=(const NewFolder&) = delete;
+
+    const std::string& name() const { return name_; }
+    void keep() { kept_ = true; }
+
+  private:
+    std::string name_;
+    std::filesystem::path path_;
+    bool kept_ = false;
+};
+
 class TilesetWriter {
   public:
     TilesetWriter(const std::filesystem::path& path, const TilesetOptions& options)
-        : path_(path), options_(options) {}
+        : path_(path), options_(options), folder_(path.parent_path()) {}
 
     std::vector<std::string> write(Gaussians g) {
         const glm::dvec3 origin = g.origin;
         g.origin = glm::dvec3(0);
         plan(g);
-        core::make_folder(path_.parent_path() / kFolder);
         const size_t levels = size_t(deepest_) + 1;
         std::vector<size_t> sizes(1, g.size());
         for (size_t level = 0; level < levels; ++level) {
@@ -72,21 +120,40 @@ class TilesetWriter {
             write_level(g, level);
         }
         join();
-        core::AtomicFile file(path_);
-        file.write(structure(origin).dump(1) + "\n");
-        file.commit();
+        replace(structure(origin).dump(1) + "\n");
         std::string text = std::to_string(written_) + " tiles of levels with ";
         for (size_t level = 0; level < levels; ++level)
             text.append(level == 0 ? "" : ", ").append(std::to_string(sizes[level]));
         std::vector<std::string> remarks(1, text + " splats");
-        remarks.insert(remarks.end(), lost_.begin(), lost_.end());
+        if (size_t(options_.save.levels) > levels)
+            remarks.push_back(std::to_string(levels) + " of " + std::to_string(options_.save.levels) +
+                              " levels: more would have tiles of fewer than " +
+                              std::to_string(kFewestOfATile) + " splats");
+        const std::vector<std::string> lost = loss_.remarks();
+        remarks.insert(remarks.end(), lost.begin(), lost.end());
         return remarks;
     }
 
   private:
+    /// Replaces the tileset.json, and with it all tiles at once.
+    void replace(const std::string& text) {
+        const std::vector<std::filesystem::path> before = tile_files(path_);
+        core::AtomicFile file(path_);
+        file.write(text);
+        file.commit();
+        folder_.keep();
+        std::error_code ignored;
+        for (const std::filesystem::path& tile : before) {
+            if (!is_own_tile(tile, path_.parent_path())) continue;
+            std::filesystem::remove(tile, ignored);
+            std::filesystem::remove(tile.parent_path(), ignored);  // works once it is empty
+        }
+    }
+
     void plan(const Gaussians& g) {
         const int levels = options_.save.levels;
-        nodes_ = build_tree(g, {.most = levels > 0 ? size_t(1) : kMostOfATile,
+        // A half of a node with more has at least as many as a tile should.
+        nodes_ = build_tree(g, {.most = levels > 0 ? 2 * kFewestOfATile - 1 : kMostOfATile,
                                 .longest = 0,
                                 .few = 0,
                                 .depth = levels > 0 ? levels - 1 : kDeepest});
@@ -116,19 +183,22 @@ class TilesetWriter {
             Gaussians part = rows_of(g, splats[at]);
             splats[at] = {};
             select_splats(part, morton_order(part));
-            write_tile(part, tiles_[at]);
+            write_tile(std::move(part), tiles_[at]);
         }
     }
 
-    void write_tile(const Gaussians& part, Tile& tile) {
+    void write_tile(Gaussians part, Tile& tile) {
         for (size_t i = 0; i < part.size(); ++i) tile.bound.add(bound_of_splat(part, i, kReach));
+        tile.origin = 0.5 * (tile.bound.low + tile.bound.high);
+        for (size_t i = 0; i < part.means.size(); ++i)
+            part.means[i] = float(double(part.means[i]) - tile.origin[int(i % 3)]);
         tile.splats = part.size();
         tile.error = tile.level == 0 ? 0 : kErrorPerWidth * usual_width(part);
-        tile.file = std::string(kFolder) + "/" + std::to_string(tile.level) + "_" +
-                    std::to_string(written_++) + ".glb";
+        tile.file =
+            folder_.name() + "/" + std::to_string(tile.level) + "_" + std::to_string(written_++) + ".glb";
         SaveOptions options = options_.save;
         options.progress = {};
-        lost_ = write_cesium_tile(path_.parent_path() / tile.file, part, options);
+        write_cesium_tile(path_.parent_path() / tile.file, part, options, loss_);
     }
 
     /// Boxes and errors of parents are those of their children too. Children follow their parents.
@@ -142,20 +212,26 @@ class TilesetWriter {
         }
     }
 
-    static ordered_json box_of(const Bound& bound) {
-        const glm::dvec3 middle = kUp * glm::dvec4(0.5 * (bound.low + bound.high), 1);
+    /// origin: of the tile.
+    static ordered_json box_of(const Bound& bound, const glm::dvec3& origin) {
+        const glm::dvec3 middle = kUp * glm::dvec4(0.5 * (bound.low + bound.high) - origin, 1);
         const glm::dvec3 half = 0.5 * (bound.high - bound.low);
         return {{"box", {middle.x, middle.y, middle.z, half.x, 0, 0, 0, half.z, 0, 0, 0, half.y}}};
     }
 
-    ordered_json tile_of(size_t at) const {
+    /// above: from the frame of a PLY with the parent's origin to that of the parent's children, as 3D Tiles has it.
+    ordered_json tile_of(size_t at, const glm::dmat4& above, const glm::dvec3& origin_above) const {
         const Tile& tile = tiles_[at];
-        ordered_json value = {{"boundingVolume", box_of(tile.bound)}, {"geometricError", tile.error}};
+        const glm::dvec3 origin = tile.file.empty() ? origin_above : tile.origin;
+        ordered_json value = {{"boundingVolume", box_of(tile.bound, origin)}, {"geometricError", tile.error}};
+        const glm::dmat4 move = glm::translate(above, origin - origin_above) * glm::inverse(kUp);
+        if (move != glm::dmat4(1))
+            for (int i = 0; i < 16; ++i) value["transform"].push_back(move[i / 4][i % 4]);
         if (!tile.file.empty()) value["content"]["uri"] = tile.file;
         if (nodes_[at].axis >= 0)
             for (const size_t child : {nodes_[at].first, nodes_[at].second})
                 if (tiles_[child].bound.low.x <= tiles_[child].bound.high.x)
-                    value["children"].push_back(tile_of(child));
+                    value["children"].push_back(tile_of(child, kUp, origin));
         return value;
     }
 
@@ -168,14 +244,8 @@ class TilesetWriter {
         const Bound& all = tiles_[0].bound;
         // What a viewer misses that shows nothing at all.
         value["geometricError"] = std::max(glm::length(all.high - all.low), tiles_[0].error);
-        value["root"] = tile_of(0);
+        value["root"] = tile_of(0, glm::translate(options_.earth.value_or(kUp), origin), glm::dvec3(0));
         value["root"]["refine"] = "REPLACE";
-        glm::dmat4 move(1.0);
-        move[3] = glm::dvec4(origin, 1);
-        if (options_.earth || origin != glm::dvec3(0)) {
-            const glm::dmat4 root = (options_.earth ? *options_.earth : kUp) * move * glm::inverse(kUp);
-            for (int i = 0; i < 16; ++i) value["root"]["transform"].push_back(root[i / 4][i % 4]);
-        }
         return value;
     }
 
@@ -183,7 +253,8 @@ class TilesetWriter {
     const TilesetOptions& options_;
     std::vector<TreeNode> nodes_;
     std::vector<Tile> tiles_;
-    std::vector<std::string> lost_;
+    NewFolder folder_;
+    SpzLoss loss_;
     int deepest_ = 0;
     size_t written_ = 0;
 };
@@ -204,6 +275,39 @@ glm::dmat4 earth_of_place(const Place& place) {
     const glm::dvec3 forward = std::cos(heading) * north + std::sin(heading) * east;
     const glm::dvec3 right = glm::cross(forward, up);
     return {glm::dvec4(right, 0), glm::dvec4(-up, 0), glm::dvec4(forward, 0), glm::dvec4(at, 1)};
+}
+
+bool names_tile_folder(const std::string& name) {
+    const std::string start = kFolder;
+    return name == start ||
+           (name.starts_with(start + "-") && is_number(std::string_view(name).substr(start.size() + 1)));
+}
+
+std::vector<std::filesystem::path> tile_files(const std::filesystem::path& tileset) try {
+    std::vector<std::filesystem::path> files;
+    if (!core::is_file(tileset)) return files;
+    const auto all = core::read_json_file<nlohmann::json>(tileset, kTilesetLimits);
+    std::vector<const nlohmann::json*> tiles;
+    const auto visit = [&](const nlohmann::json& object, const char* key) {
+        if (object.is_object() && object.contains(key)) tiles.push_back(&object[key]);
+    };
+    visit(all, "root");
+    for (size_t at = 0; at < tiles.size(); ++at) {
+        const nlohmann::json& tile = *tiles[at];
+        if (tile.is_array())
+            for (const nlohmann::json& child : tile) tiles.push_back(&child);
+        visit(tile, "children");
+        if (!tile.is_object() || !tile.contains("content")) continue;
+        const nlohmann::json& content = tile["content"];
+        if (!content.is_object() || !content.contains("uri") || !content["uri"].is_string()) continue;
+        const auto name = core::name_inside(content["uri"].get_ref<const std::string&>());
+        if (name && core::links_stay_inside(tileset.parent_path(), *name) &&
+            core::is_file(tileset.parent_path() / *name))
+            files.push_back(tileset.parent_path() / *name);
+    }
+    return files;
+} catch (const InputError&) {
+    return {};
 }
 
 std::vector<std::string> write_tileset(const std::filesystem::path& path, Gaussians gaussians,
