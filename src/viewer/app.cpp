@@ -154,10 +154,10 @@ void App::handle_mouse() {
     if (state_.settings.measure) {
         const bool inside =
             at.x >= 0 && at.y >= 0 && at.x < places.rendering.width && at.y < places.rendering.height;
-        if (clicked && inside) shown_.ask_measured(at);
+        if (clicked && inside) shown_.ask_point(at, PointUse::measure);
         return;
     }
-    if (ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left)) return shown_.ask_point(at);
+    if (ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left)) return shown_.ask_point(at, PointUse::look_at);
     if (navigation_.pointed_camera && clicked) navigation_.go_to_camera(*navigation_.pointed_camera);
 }
 
@@ -200,7 +200,7 @@ void App::draw_overlays() {
     if (settings.cameras && scene.dataset)
         navigation_.pointed_camera = draw_cameras({*scene.dataset, shown_.camera(), places.rendering,
                                                    navigation_.camera_size, navigation_.at_camera});
-    if (!settings.measure) shown_.measurement = {};
+    shown_.set_measuring(settings.measure);
     draw_measurement(shown_.measurement, shown_.camera(), places.rendering);
     if (shown_.comparing()) draw_comparison(settings.comparison, places, settings.wipe);
     const Rectangle area = state_.picture_area();

@@ -67,7 +67,7 @@ int fail(const std::string& what, int status) {
 Size parse_size(const std::string& text) {
     const auto size = core::parse_size(text, kLargestSide);
     if (!size)
-        throw InputError("--size: '" + text + "' is not a size such as 1280x720, of at most " +
+        throw InputError("--size: '" + text + "' is not a size such as 1280x720 or 4k, of at most " +
                          std::to_string(kLargestSide) + " a side");
     return {size->width, size->height};
 }
@@ -114,7 +114,7 @@ OpenedScene open_what(const Arguments& arguments, Startup& startup) {
                               live::parse_address(arguments.connect.address),
                               live::find_token(arguments.connect.token, arguments.connect.token_file)};
         const std::filesystem::path& what = arguments.path.empty() ? arguments.cameras : arguments.path;
-        OpenedScene scene = what.empty() ? OpenedScene() : open_scene(what, {});
+        OpenedScene scene = what.empty() ? OpenedScene() : open_scene(what, {}, arguments.budget);
         scene.title = arguments.connect.address;
         return scene;
     }
@@ -173,6 +173,7 @@ void prepare_outputs(const Arguments& arguments, const Startup& startup) {
 
 Startup open(const Arguments& arguments) {
     Startup startup = arguments.startup;
+    startup.budget = arguments.budget;
     if (!arguments.size.empty()) startup.size = parse_size(arguments.size);
     if (!arguments.picture.empty()) {
         if (core::lower(arguments.picture.extension().string()) != ".png")

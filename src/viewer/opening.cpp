@@ -135,24 +135,33 @@ OpenedScene open_run(const live::Run& run, const fs::path& cameras) {
     return scene;
 }
 
-/// The finest level of a lod-meta.json that has at most `budget` splats, or else the last one. Null where level 0, of `splats`
-/// splats, is such a level.
-std::shared_ptr<const Gaussians> level_within(const fs::path& path, size_t splats, size_t budget) {
+/// The finest level of a lod-meta.json that has splats, at most `budget` of them, and is not damaged; or else the last one. Null where
+/// level 0, of `splats` splats, is such a level, and where there is no other. Adds damage to the remark.
+std::shared_ptr<const Gaussians> level_within(const fs::path& path, size_t splats, size_t budget,
+                                              std::string& remark) {
     if (splats <= budget || format_of_file(path) != SplatFormat::sog_levels) return nullptr;
-    const std::vector<size_t> counts = level_counts(path);
-    size_t level = 0;
-    while (level + 1 < counts.size() && counts[level] > budget) ++level;
-    if (level == 0) return nullptr;
-    return std::make_shared<const Gaussians>(read_splat_level(path, level).gaussians);
+    std::vector<size_t> counts = level_counts(path);
+    while (!counts.empty() && counts.back() == 0) counts.pop_back();
+    for (size_t level = 1; level < counts.size(); ++level) {
+        const bool fits = counts[level] > 0 && counts[level] <= budget;
+        if (!fits && level + 1 < counts.size()) continue;
+        try {
+            return std::make_shared<const Gaussians>(read_splat_level(path, level).gaussians);
+        } catch (const InputError& error) {
+            remark += remark.empty() ? "" : "; ";
+            remark += "level " + std::to_string(level) + " is not shown: " + error.what();
+        }
+    }
+    return nullptr;
 }
 
 OpenedScene open_splats(const fs::path& path, const fs::path& cameras, size_t budget) {
     OpenedScene scene;
     SplatScene splats = read_splats(path);
-    scene.coarse = level_within(path, splats.gaussians.size(), budget);
     if (splats.antialiased) scene.look.kernel = Footprint::antialias;
     const bool density = splats.gaussians.density;
     if (!splats.remarks.empty()) scene.remark = splats.remarks.front();
+    scene.coarse = level_within(path, splats.gaussians.size(), budget, scene.remark);
     scene.gaussians = std::make_shared<const Gaussians>(std::move(splats.gaussians));
     if (scene.gaussians->size() == 0) scene.remark = scene_title(path) + " is empty: it has no splats";
     if (!cameras.empty()) scene.dataset = load_cameras(cameras, {}, false);
@@ -238,7 +247,7 @@ OpenedScene with_cameras(const OpenedScene& splats, const OpenedScene& cameras) 
     return scene;
 }
 
-OpenedScene open_dropped(const std::vector<fs::path>& paths, const OpenedScene& shown) {
+OpenedScene open_dropped(const std::vector<fs::path>& paths, const OpenedScene& shown, size_t budget) {
     const auto dataset = std::find_if(paths.begin(), paths.end(), is_dataset);
     const auto splats = std::find_if_not(paths.begin(), paths.end(), is_dataset);
     std::vector<fs::path> opened;
@@ -246,7 +255,7 @@ OpenedScene open_dropped(const std::vector<fs::path>& paths, const OpenedScene& 
     if (dataset != paths.end() && splats != paths.end()) {
         const OpenedScene cameras = open_scene(*dataset, {});
         if (!cameras.photos.empty()) return cameras;
-        scene = with_cameras(open_scene(*splats, {}), cameras);
+        scene = with_cameras(open_scene(*splats, {}, budget), cameras);
         opened = {*splats, *dataset};
     } else if (dataset != paths.end()) {
         scene = open_scene(*dataset, {});
@@ -257,7 +266,7 @@ OpenedScene open_dropped(const std::vector<fs::path>& paths, const OpenedScene& 
             scene.remark += "; drop it again to open the dataset itself";
         }
     } else {
-        scene = open_scene(*splats, {});
+        scene = open_scene(*splats, {}, budget);
         opened = {*splats};
         const bool camera_less = !scene.dataset && scene.run.empty();
         if (camera_less && shown.points && shown.dataset && shown.run.empty() && scene.gaussians->size() > 0)

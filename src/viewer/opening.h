@@ -52,19 +52,20 @@ bool is_dataset(const std::filesystem::path& path);
 /// metrics.jsonl). A run, and the splats.ply of a run, come with the cameras of the run's dataset, if that is
 /// found. cameras: the dataset to use instead; empty: none. Photos without cameras, or a video, only set `photos` and
 /// the title. Throws InputError.
-/// budget: splats of OpenedScene::coarse, at most unless all levels have more.
+/// budget: splats of OpenedScene::coarse, at most unless all levels have more. A damaged level is no error, but a remark.
 OpenedScene open_scene(const std::filesystem::path& path, const std::filesystem::path& cameras,
                        size_t budget = kUsualBudget);
 
 /// The splats of `splats` with the cameras of `cameras`, and a remark that says so. Both are scenes as opened.
 OpenedScene with_cameras(const OpenedScene& splats, const OpenedScene& cameras);
 
-/// Opens what was dropped on the window, where `shown` is. Throws InputError.
+/// Opens what was dropped on the window, where `shown` is. budget: as of open_scene(). Throws InputError.
 /// - Photos or a video go before all else: only they are opened.
 /// - A dataset gives its cameras to the splats that are shown, unless it has done so before: then it is opened itself.
 /// - A splat file takes the cameras of a dataset that is shown without splats.
 /// - Among several files, splats and a dataset belong together. The remark names the skipped ones.
-OpenedScene open_dropped(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown);
+OpenedScene open_dropped(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown,
+                         size_t budget = kUsualBudget);
 
 /// Converts points to small opaque splats.
 Gaussians splats_of_points(const PointCloud& points);

@@ -72,9 +72,11 @@ void RenderThread::ask(const RenderRequest& request) {
     wake_.notify_one();
 }
 
-uint64_t RenderThread::ask_point(const Camera& camera, const glm::dvec2& pixel, bool exact) {
+uint64_t RenderThread::ask_point(const Camera& camera, const glm::dvec2& pixel, PointUse use) {
     const std::lock_guard lock(mutex_);
-    next_.probe = Probe{camera, pixel, exact, ++probes_};
+    if (use == PointUse::look_at)
+        std::erase_if(probes_waiting_, [](const Probe& probe) { return probe.use == PointUse::look_at; });
+    probes_waiting_.push_back({camera, pixel, use, ++probes_});
     wake_.notify_one();
     return probes_;
 }
@@ -90,6 +92,7 @@ RenderThread::News RenderThread::take_news() {
     const std::lock_guard lock(mutex_);
     News news = news_;
     news_.written.clear();
+    news_.points.clear();
     return news;
 }
 
@@ -103,12 +106,16 @@ void RenderThread::report(const std::function<void(News&)>& change) {
 
 bool RenderThread::next(const std::stop_token& stop, Work& work) {
     std::unique_lock lock(mutex_);
-    wake_.wait(lock, stop, [this] { return next_.probe || next_.full || !waiting_.empty() || next_.scene; });
+    wake_.wait(lock, stop,
+               [this] { return !probes_waiting_.empty() || next_.full || !waiting_.empty() || next_.scene; });
     if (stop.stop_requested()) return false;
     work.scene = std::exchange(next_.scene, nullptr);
     work.coarse = std::exchange(next_.coarse, nullptr);
     work.scene_number = next_.scene_number;
-    work.probe = std::exchange(next_.probe, std::nullopt);
+    if (!probes_waiting_.empty()) {
+        work.probe = probes_waiting_.front();
+        probes_waiting_.erase(probes_waiting_.begin());
+    }
     if (!waiting_.empty()) {
         work.request = waiting_.front();
         waiting_.erase(waiting_.begin());
@@ -157,15 +164,16 @@ void RenderThread::fit_to(const Look& look) {
     if (!look.points && densities != densities_are_up_) upload(densities);
 }
 
-void RenderThread::carry_out(const Work& work) {
+void RenderThread::answer(const Probe& probe, const std::optional<glm::dvec3>& place) {
+    report([&](News& news) { news.points.push_back({probe.number, probe.use, place}); });
+}
+
+void RenderThread::carry_out(Work& work) {
     prepare(work);
     if (!renderer_) return;
     if (work.probe) {
-        const std::optional<glm::dvec3> point = point_at(*work.probe);
-        report([&](News& news) {
-            news.point = point;
-            news.points = work.probe->number;
-        });
+        answer(*work.probe, point_at(*work.probe));
+        work.probe.reset();  // it is not answered again if what follows fails
     }
     if (work.full) {
         fit_to(work.full->look);
@@ -213,7 +221,8 @@ std::shared_ptr<const RenderedFrame> RenderThread::draw(const RenderRequest& req
 
 std::optional<glm::dvec3> RenderThread::point_at(const Probe& probe) {
     const Camera& full = probe.camera;
-    const int divisor = probe.exact ? 1 : std::max(1, std::min(full.width, full.height) / kProbeSide);
+    const int divisor =
+        probe.use == PointUse::measure ? 1 : std::max(1, std::min(full.width, full.height) / kProbeSide);
     const Camera camera = downscale(full, divisor);
     DrawOptions options{{}, Drawing::median_depth, 1};
     if (densities_are_up_) options.render.kernel = Footprint::density;
@@ -226,11 +235,8 @@ std::optional<glm::dvec3> RenderThread::point_at(const Probe& probe) {
 
 /// Reports the exception that is being handled.
 void RenderThread::fail(const Work& work) {
-    report([&](News& news) {
-        news.failure = std::current_exception();
-        news.point.reset();
-        if (work.probe) news.points = work.probe->number;
-    });
+    report([&](News& news) { news.failure = std::current_exception(); });
+    if (work.probe) answer(*work.probe, std::nullopt);
 }
 
 void RenderThread::work(const std::stop_token& stop) {

@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "viewer/byte_image.h"
 
@@ -35,6 +36,16 @@ struct RenderRequest {
     bool coarse = false;  // of the coarse scene, if there is one
     uint64_t serial = 0;
     std::filesystem::path file;  // written as by `ewa render` with this extension; empty: no file
+};
+
+/// What a point under a pixel is asked for.
+enum class PointUse { look_at, measure };
+
+/// The point on the surface under a pixel.
+struct SurfacePoint {
+    uint64_t number = 0;  // that ask_point() returned
+    PointUse use = PointUse::look_at;
+    std::optional<glm::dvec3> place;  // world; empty where no splat is half opaque, or a render failed
 };
 
 struct RenderedFrame {
@@ -68,9 +79,9 @@ class RenderThread {
                        std::shared_ptr<const Gaussians> coarse = nullptr);
     /// Replaces a waiting request that has no file. The frame that is being rendered is finished first.
     void ask(const RenderRequest& request);
-    /// Asks for the point on the surface at a pixel, by its median depth. News::point has it once News::points is the returned
-    /// number. Only the last of several waiting requests is answered. exact: at full resolution, which takes a frame's time.
-    uint64_t ask_point(const Camera& camera, const glm::dvec2& pixel, bool exact = false);
+    /// Asks for the point on the surface at a pixel, by its median depth. News::points has it with the returned number. Points to
+    /// measure are all answered, at full resolution, which takes a frame's time. A point to look at replaces a waiting one.
+    uint64_t ask_point(const Camera& camera, const glm::dvec2& pixel, PointUse use);
 
     /// Asks for the colours of a camera at its own size. News::full has them once its number is the returned one. Only
     /// the last of several waiting requests is answered.
@@ -80,8 +91,7 @@ class RenderThread {
         std::shared_ptr<const RenderedFrame> picture;  // the last complete frame, or null
         std::exception_ptr failure;                    // why the last request failed, if it did
         std::optional<std::string> device;             // its name, once it is open
-        uint64_t points = 0;                           // number of the last answered ask_point()
-        std::optional<glm::dvec3> point;               // world; empty where no splat is half opaque
+        std::vector<SurfacePoint> points;              // in order, since the last take_news()
         std::shared_ptr<const FullRender> full;        // the last one, or null
         std::vector<std::filesystem::path> written;    // files, since the last take_news()
     };
@@ -91,7 +101,7 @@ class RenderThread {
     struct Probe {
         Camera camera;
         glm::dvec2 pixel{0};
-        bool exact = false;
+        PointUse use = PointUse::look_at;
         uint64_t number = 0;
     };
     struct Full {
@@ -108,13 +118,14 @@ class RenderThread {
     };
     void work(const std::stop_token& stop);
     bool next(const std::stop_token& stop, Work& work);
-    void carry_out(const Work& work);
+    void carry_out(Work& work);
     void fail(const Work& work);
     void prepare(const Work& work);
     void upload(bool densities);
     void fit_to(const Look& look);
     std::shared_ptr<const RenderedFrame> draw(const RenderRequest& request, uint64_t scene);
     std::optional<glm::dvec3> point_at(const Probe& probe);
+    void answer(const Probe& probe, const std::optional<glm::dvec3>& place);
     void report(const std::function<void(News&)>& change);
 
     OpenDevice open_;
@@ -129,7 +140,8 @@ class RenderThread {
     mutable std::mutex mutex_;
     std::condition_variable_any wake_;
     std::vector<RenderRequest> waiting_;  // in order; only the last may have no file
-    Work next_;                           // but for `request`
+    std::vector<Probe> probes_waiting_;   // in order
+    Work next_;                           // but for `request` and `probe`
     uint64_t probes_ = 0, fulls_ = 0;
     News news_;
     std::jthread thread_;

@@ -132,13 +132,14 @@ uint64_t Renders::write(const Camera& camera, const Look& look, const std::files
     return asked_.serial;
 }
 
-void Renders::ask_point(const Camera& camera, const glm::dvec2& pixel, bool exact) {
-    points_asked_ = thread_.ask_point(camera, pixel, exact);
+void Renders::ask_point(const Camera& camera, const glm::dvec2& pixel, PointUse use) {
+    points_asked_ = thread_.ask_point(camera, pixel, use);
 }
 
 Renders::News Renders::take() {
     News news{thread_.take_news()};
-    news.point_answered = std::exchange(points_, news.points) < news.points;
+    if (!news.points.empty()) points_ = news.points.back().number;
+    std::erase_if(news.points, [&](const SurfacePoint& point) { return point.number <= points_forgotten_; });
     news.frame = news.picture != shown_;
     if (news.frame) {
         shown_ = news.picture;

@@ -85,8 +85,10 @@ class Renders {
     void ask(const Camera& camera, const Look& look, bool full);
     /// Renders the view and writes it to a file. Returns the serial of the request.
     uint64_t write(const Camera& camera, const Look& look, const std::filesystem::path& file);
-    /// Asks for the point under a pixel; News::point has the answer.
-    void ask_point(const Camera& camera, const glm::dvec2& pixel, bool exact);
+    /// Asks for the point under a pixel, as RenderThread::ask_point(); News::points has the answer.
+    void ask_point(const Camera& camera, const glm::dvec2& pixel, PointUse use);
+    /// News has no answers to what was asked before.
+    void forget_points() { points_forgotten_ = points_asked_; }
 
     /// Asks for the colours of a camera at its own size, as RenderThread::ask_full().
     uint64_t ask_full(const Camera& camera, const Look& look) { return thread_.ask_full(camera, look); }
@@ -94,8 +96,7 @@ class Renders {
     uint64_t scene() const { return scene_; }
 
     struct News : RenderThread::News {
-        bool frame = false;           // shown() is another one
-        bool point_answered = false;  // since the last take()
+        bool frame = false;  // shown() is another one
     };
     News take();
 
@@ -115,7 +116,7 @@ class Renders {
     RenderRequest asked_;
     Clock::time_point changed_;  // last change of the requested view
     std::shared_ptr<const RenderedFrame> shown_;
-    uint64_t points_ = 0, points_asked_ = 0;  // answered and requested points
+    uint64_t points_ = 0, points_asked_ = 0, points_forgotten_ = 0;  // numbers of the last ones
     Pace pace_;
     RenderThread thread_;
 };

@@ -30,7 +30,7 @@ Shown::Shown(ViewState& state, Navigation& navigation)
 void Shown::enter_scene() {
     renders.set_scene(state_.scene.gaussians, state_.scene.coarse);
     images_.forget_scene();
-    measurement = {};
+    forget_points();
     quality_.forget();
 }
 
@@ -42,38 +42,43 @@ void Shown::take_renders() {
         navigation_.film.reset();
         if (state_.message.note != reason(news.failure)) state_.say(reason(news.failure));
     }
-    if (news.point_answered) take_point(news.point);
+    for (const SurfacePoint& point : news.points) take_point(point);
     for (const auto& file : news.written)
         if (!navigation_.film) state_.say("wrote " + std::filesystem::absolute(file).string());
     quality_.take(news.full);
     if (news.frame) state_.redraw();
 }
 
-void Shown::take_point(const std::optional<glm::dvec3>& point) {
+void Shown::forget_points() {
+    measurement = {};
+    renders.forget_points();
+}
+
+void Shown::set_measuring(bool on) {
+    if (measuring_ && !on) forget_points();
+    measuring_ = on;
+}
+
+void Shown::take_point(const SurfacePoint& point) {
     state_.redraw(Loop::kRedraws);
-    if (!point) {
-        state_.say(measuring_ ? "no splat is opaque enough here to measure"
-                              : "no splat is opaque enough here to look at");
-    } else if (measuring_) {
-        measurement.add(*point);
+    const bool measured = point.use == PointUse::measure;
+    if (!point.place) {
+        state_.say(measured ? "no splat is opaque enough here to measure"
+                            : "no splat is opaque enough here to look at");
+    } else if (measured) {
+        measurement.add(*point.place);
         if (!measurement.complete()) return;
         state_.say(measurement.text());
         std::puts(measurement.text().c_str());  // to be copied
         std::fflush(stdout);
     } else {
-        navigation_.view.focus(*point);
+        navigation_.view.focus(*point.place);
         navigation_.leave_camera();
     }
 }
 
-void Shown::ask_point(const glm::dvec2& pixel) {
-    measuring_ = false;
-    renders.ask_point(camera(), pixel, false);
-}
-
-void Shown::ask_measured(const glm::dvec2& pixel) {
-    measuring_ = true;
-    renders.ask_point(camera(), pixel, true);
+void Shown::ask_point(const glm::dvec2& pixel, PointUse use) {
+    renders.ask_point(camera(), pixel, use);
 }
 
 void Shown::take_comparison(Presenter& presenter) {

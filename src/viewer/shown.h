@@ -26,9 +26,10 @@ class Shown {
     void take_comparison(Presenter& presenter);
     /// Asks for the view, unless the window is minimised, or a film has cameras of its own.
     void ask();
-    void ask_point(const glm::dvec2& pixel);
-    /// The point becomes one of `measurement`.
-    void ask_measured(const glm::dvec2& pixel);
+    /// Looks at the point, or makes it one of `measurement`.
+    void ask_point(const glm::dvec2& pixel, PointUse use);
+    /// Forgets what was measured, and what is still asked for, where measuring ends.
+    void set_measuring(bool on);
     /// Writes the render alone, in floating point.
     void write_exr();
 
@@ -61,7 +62,8 @@ class Shown {
     Measurement measurement;
 
   private:
-    void take_point(const std::optional<glm::dvec3>& point);
+    void take_point(const SurfacePoint& point);
+    void forget_points();
     std::optional<Camera> requested_camera() const;
     std::optional<ComparisonRequest> comparison_wanted() const;
     bool full_colours() const;  // the last frame shows them, as asked
@@ -70,7 +72,7 @@ class Shown {
     Navigation& navigation_;
     std::shared_ptr<const ByteImage> picture_;  // the presenter's: a render or a difference
     bool difference_ = false;
-    bool measuring_ = false;      // the point that is asked for is to be measured
+    bool measuring_ = false;
     std::optional<double> psnr_;  // in the panel
     ImageComparison images_;
     ViewQuality quality_;

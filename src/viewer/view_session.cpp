@@ -57,9 +57,9 @@ void ViewSession::open(const std::vector<std::filesystem::path>& paths, const Op
     if (opening_.valid()) return state_.say("another file is being opened");
     if (search.running()) return state_.say("cameras of photos are being found; Esc stops that");
     state_.say("opening " + core::one_line(paths.front().string()));
-    opening_ = std::async(std::launch::async, [this, paths, shown] {
+    opening_ = std::async(std::launch::async, [this, paths, shown, budget = state_.startup.budget] {
         const Wake at_end{state_.wake};
-        return open_dropped(paths, shown);
+        return open_dropped(paths, shown, budget);
     });
 }
 

@@ -40,6 +40,7 @@ struct Startup {
     std::optional<std::filesystem::path> picture;  // write this screenshot, then exit
     std::optional<std::filesystem::path> film;     // write a film through `views` into this folder, then exit
     std::vector<io::NamedView> views;
+    size_t budget = kUsualBudget;  // as of open_scene(), for what is dropped on the window
     PanelSettings settings;
     OpenDevice open_device;
     struct {

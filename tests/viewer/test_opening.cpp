@@ -100,6 +100,35 @@ TEST(Opening, AViewThatChangesGetsALevelWithinTheBudget) {
     EXPECT_EQ(open_scene(folder / "s.ply", {}, 10).coarse, nullptr) << "no levels";
 }
 
+TEST(Opening, ALevelThatIsDamagedOrEmptyIsLeftOut) {
+    const test::Folder folder;
+    test::make_splats(folder / "s.ply", 1000);
+    const std::string levels = folder / "l/lod-meta.json";
+    test::expect_success(test::run_ewa({"convert", folder / "s.ply", levels, "--levels", "3"}));
+    test::write_file(folder / "l/1_0/means_l.webp", "damaged");
+    OpenedScene scene = open_scene(levels, {}, 600);
+    EXPECT_EQ(scene.gaussians->size(), 1000u);
+    ASSERT_TRUE(scene.coarse);
+    EXPECT_EQ(scene.coarse->size(), 250u);
+    EXPECT_NE(scene.remark.find("level 1 is not shown: "), std::string::npos) << scene.remark;
+    EXPECT_NE(scene.remark.find("means_l.webp"), std::string::npos) << scene.remark;
+    test::write_file(folder / "l/2_0/means_l.webp", "damaged");
+    scene = open_scene(levels, {}, 600);
+    EXPECT_EQ(scene.gaussians->size(), 1000u);
+    EXPECT_FALSE(scene.coarse);
+
+    // A fourth level without rows.
+    test::expect_success(test::run_ewa({"convert", folder / "s.ply", levels, "--levels", "3"}));
+    std::string text = test::read_file(levels);
+    const std::string before = "\"lodLevels\":3";
+    ASSERT_NE(text.find(before), std::string::npos);
+    text.replace(text.find(before), before.size(), "\"lodLevels\":4");
+    test::write_file(levels, text);
+    scene = open_scene(levels, {}, 100);
+    ASSERT_TRUE(scene.coarse);
+    EXPECT_EQ(scene.coarse->size(), 250u);
+}
+
 TEST(Opening, AnEmptyFileSaysSo) {
     const test::Folder folder;
     test::make_splats(folder / "none.ply", 0, 0);
@@ -153,6 +182,17 @@ TEST_F(Dropping, OfSeveralFilesEachIsSpokenOf) {
     const OpenedScene first = open_dropped({splats_, folder_ / "more.ply"}, {});
     EXPECT_EQ(first.gaussians->size(), 50u);
     EXPECT_EQ(first.remark, "one scene is shown at a time: more.ply is left out");
+}
+
+TEST_F(Dropping, LevelsKeepToTheBudget) {
+    const std::string levels = folder_ / "l/lod-meta.json";
+    test::expect_success(test::run_ewa({"convert", splats_, levels, "--levels", "3"}));
+    for (const std::vector<std::filesystem::path>& paths :
+         {std::vector<std::filesystem::path>{levels}, {levels, dataset_}}) {
+        ASSERT_TRUE(open_dropped(paths, {}, 20).coarse);
+        EXPECT_EQ(open_dropped(paths, {}, 20).coarse->size(), 13u);
+        EXPECT_FALSE(open_dropped(paths, {}, 50).coarse);
+    }
 }
 
 TEST(Opening, SettingsThatAreNoneLeaveTheSplats) {

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <future>
 
 #include "cli/program.h"
 #include "ewa/error.h"
@@ -42,6 +43,16 @@ std::shared_ptr<const Gaussians> red_splat() {
 
 using test::soon;
 
+/// What is answered up to this number.
+std::vector<SurfacePoint> points_of(RenderThread& thread, uint64_t number) {
+    std::vector<SurfacePoint> points;
+    EXPECT_TRUE(soon([&] {
+        for (const SurfacePoint& point : thread.take_news().points) points.push_back(point);
+        return !points.empty() && points.back().number == number;
+    }));
+    return points;
+}
+
 TEST(RenderThread, DrawsTheSceneItWasGivenLast) {
     RenderThread thread([] { return open_device({}); }, [] {});
     EXPECT_EQ(thread.set_scene(std::make_shared<const Gaussians>()), 1u);
@@ -59,26 +70,80 @@ TEST(RenderThread, DrawsTheSceneItWasGivenLast) {
     EXPECT_GT(picture->picture.rgba[middle], 200);
     EXPECT_LT(picture->picture.rgba[middle + 1], 30);
 
-    EXPECT_EQ(thread.ask_point(request(0).camera, {20.5, 15.5}), 1u);
-    ASSERT_TRUE(soon([&] { return thread.take_news().points == 1; }));
-    ASSERT_TRUE(thread.take_news().point);
-    EXPECT_NEAR(thread.take_news().point->z, 0, 1e-3);
-    EXPECT_EQ(thread.ask_point(request(0).camera, {1, 1}), 2u);
-    ASSERT_TRUE(soon([&] { return thread.take_news().points == 2; }));
-    EXPECT_FALSE(thread.take_news().point) << "there is nothing in the corner";
+    const Camera small = request(0).camera;
+    EXPECT_EQ(thread.ask_point(small, {20.5, 15.5}, PointUse::look_at), 1u);
+    std::vector<SurfacePoint> points = points_of(thread, 1);
+    ASSERT_TRUE(points.size() == 1 && points[0].place);
+    EXPECT_NEAR(points[0].place->z, 0, 1e-3);
+    EXPECT_EQ(thread.ask_point(small, {1, 1}, PointUse::look_at), 2u);
+    points = points_of(thread, 2);
+    ASSERT_EQ(points.size(), 1u);
+    EXPECT_FALSE(points[0].place) << "there is nothing in the corner";
     // Of a large image, a point is exact or that of a smaller one.
     Camera large = request(0).camera;
     for (int* side : {&large.width, &large.height}) *side *= 30;
     for (double* length : {&large.fx, &large.fy, &large.cx, &large.cy}) *length *= 30;
     double x[2];
-    for (const bool exact : {false, true}) {
-        const uint64_t number = thread.ask_point(large, {600.2, 450.2}, exact);
-        ASSERT_TRUE(soon([&] { return thread.take_news().points == number; }));
-        ASSERT_TRUE(thread.take_news().point);
-        x[exact] = thread.take_news().point->x;
+    for (const PointUse use : {PointUse::look_at, PointUse::measure}) {
+        points = points_of(thread, thread.ask_point(large, {600.2, 450.2}, use));
+        ASSERT_TRUE(points.size() == 1 && points[0].place);
+        EXPECT_EQ(points[0].use, use);
+        x[int(use)] = points[0].place->x;
     }
     EXPECT_NEAR(x[1], 4 * 0.5 / 1200, 1e-6);
     EXPECT_GT(x[0], 2 * x[1]);
+}
+
+/// Clicks come faster than answers.
+TEST(RenderThread, AnswersAllPointsToMeasure) {
+    std::promise<void> opened;
+    RenderThread thread(
+        [&] {
+            opened.get_future().wait();
+            return open_device({});
+        },
+        [] {});
+    thread.set_scene(red_splat());
+    thread.ask(request(1));  // the thread takes it, and waits for the device
+    const Camera camera = request(0).camera;
+    thread.ask_point(camera, {1, 1}, PointUse::measure);
+    thread.ask_point(camera, {1, 1}, PointUse::look_at);
+    thread.ask_point(camera, {20.5, 15.5}, PointUse::measure);
+    const uint64_t last = thread.ask_point(camera, {20.5, 15.5}, PointUse::look_at);
+    opened.set_value();
+    const std::vector<SurfacePoint> points = points_of(thread, last);
+    std::vector<uint64_t> numbers;
+    for (const SurfacePoint& point : points) numbers.push_back(point.number);
+    EXPECT_EQ(numbers, (std::vector<uint64_t>{1, 3, 4}));
+    for (const SurfacePoint& point : points) {
+        EXPECT_EQ(point.use, point.number % 2 == 1 ? PointUse::measure : PointUse::look_at);
+        EXPECT_EQ(bool(point.place), point.number > 2);
+    }
+}
+
+/// Answers to what was asked of an earlier scene must not count in the next.
+TEST(Renders, ForgetPoints) {
+    std::promise<void> opened;
+    Renders renders(
+        [&] {
+            opened.get_future().wait();
+            return open_device({});
+        },
+        [] {});
+    renders.set_scene(red_splat());
+    const Camera camera = request(0).camera;
+    renders.ask_point(camera, {20.5, 15.5}, PointUse::measure);
+    renders.forget_points();
+    renders.ask_point(camera, {20.5, 15.5}, PointUse::measure);
+    opened.set_value();
+    std::vector<SurfacePoint> points;
+    renders.ask(camera, {}, true);
+    ASSERT_TRUE(soon([&] {
+        for (const SurfacePoint& point : renders.take().points) points.push_back(point);
+        return renders.settled();
+    }));
+    ASSERT_EQ(points.size(), 1u);
+    EXPECT_EQ(points[0].number, 2u);
 }
 
 TEST(RenderThread, FitsOpacitiesToTheKernel) {
