@@ -110,8 +110,14 @@ fs::path find_ffmpeg() {
         "as -o, its frames are written as PNG files");
 }
 
-std::string find_encoder(const std::string& codec) {
+std::string find_encoder(const std::string& codec, const fs::path& file) {
     if (codec.empty()) return {};
+    // What ffmpeg's muxers take; .mp4 and .mkv take all four.
+    const std::string extension = core::lower(file.extension().string());
+    const bool modern = codec == "av1" || codec == "vp9";
+    if ((extension == ".webm" && !modern) || (extension == ".mov" && modern))
+        throw InputError("--codec " + codec + ": a " + extension + " has none of it, but " +
+                         (modern ? "h264 or hevc" : "av1 or vp9") + "; an .mp4 and an .mkv have all");
     std::string listed;
     core::run_program({.command = {find_ffmpeg().string(), "-hide_banner", "-loglevel", "error", "-encoders"},
                        .environment = {},

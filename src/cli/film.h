@@ -20,9 +20,9 @@ bool is_film_name(const std::filesystem::path& path);
 /// The program ffmpeg in $PATH. Throws RunError that says what to install, and that a folder of PNGs needs none.
 std::filesystem::path find_ffmpeg();
 
-/// ffmpeg's encoder for h264, hevc, av1 or vp9. Empty: for an empty codec, of which ffmpeg chooses one by the file's name. Throws RunError if
-/// ffmpeg has none.
-std::string find_encoder(const std::string& codec);
+/// ffmpeg's encoder for h264, hevc, av1 or vp9. Empty: for an empty codec, of which ffmpeg chooses one by the file's name. Throws InputError
+/// if a film of that name cannot have the codec, RunError if ffmpeg has no encoder.
+std::string find_encoder(const std::string& codec, const std::filesystem::path& file);
 
 /// A film that is being written. ffmpeg runs as a process of its own, without a shell, and gets the frames on its
 /// standard input. It writes into a temporary folder; finish() moves the film to its place. The destructor ends an

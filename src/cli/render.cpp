@@ -67,23 +67,28 @@ void note_skipped(Progress& progress, uint32_t skipped) {
         progress.note("skipped " + core::counted(skipped, "splat") + " with a value that is not finite");
 }
 
-/// Renders the cameras into the files. appearances: of each, or none. path: whether the cameras are moments of one motion. Returns the exit status.
-int write_images(const RenderArguments& arguments, Renderer& renderer, std::vector<Camera> cameras,
-                 const std::vector<fs::path>& files, const std::vector<Appearance>& appearances, bool path,
+/// Renders the views into the files. appearances: of each, or none. Returns the exit status.
+int write_images(const RenderArguments& arguments, Renderer& renderer, Footprint kernel, ViewPath views,
+                 const std::vector<fs::path>& files, const std::vector<Appearance>& appearances,
                  Progress& progress) {
     std::optional<ContactSheet> sheet;
     if (arguments.contact_sheet) {
-        std::ranges::transform(cameras, cameras.begin(), thumbnail_of);
-        sheet.emplace(cameras);
+        std::ranges::transform(views.cameras, views.cameras.begin(), thumbnail_of);
+        if (views.at) views.at = [at = views.at](double time) { return thumbnail_of(at(time)); };
+        sheet.emplace(views.cameras);
     }
+    const std::vector<Camera> cameras = views.cameras;
     RenderOutput output({arguments.mode, arguments.format, arguments.picture.transparent}, files, progress,
                         std::move(sheet));
-    PictureTaker taker(arguments.picture, renderer, drawing_of(arguments.mode), path);
+    PictureTaker taker(arguments.picture, renderer, drawing_of(arguments.mode), kernel, std::move(views));
     for (size_t i = 0; i < cameras.size(); ++i) {
         if (interrupted()) return kInterruptedStatus;
-        std::vector<Rendering> eyes = taker.take(cameras, i);
+        std::vector<Rendering> eyes = taker.take(i);
         if (!appearances.empty() && arguments.mode == "color")
-            for (Rendering& eye : eyes) eye.color = with_appearance(std::move(eye.color), appearances[i]);
+            for (Rendering& eye : eyes)
+                eye.color = arguments.picture.transparent
+                                ? with_appearance_over_black(eye, appearances[i])
+                                : with_appearance(std::move(eye.color), appearances[i]);
         const bool panorama = eyes.size() == 1 && scene::shows_all_around(cameras[i]);
         output.add(i, joined_eyes(std::move(eyes), arguments.picture.stereo), panorama);
         if (cameras.size() > 1) progress.update(int(i) + 1);
@@ -182,7 +187,8 @@ int render_dataset_views(RenderArguments arguments) {
     Renderer renderer(open_device(arguments.device), gaussians, options);
     const InterruptWatch watch;
     Progress progress("rendered", static_cast<int>(frames.size()), "frames", arguments.quiet);
-    return write_images(arguments, renderer, std::move(cameras), files, appearances, false, progress);
+    return write_images(arguments, renderer, options.kernel, {std::move(cameras)}, files, appearances,
+                        progress);
 }
 
 /// The dataset of the run, if it can be read. Else the scene is framed as one of which nothing is known.
@@ -202,15 +208,16 @@ scene::FramingHints hints_of(const std::optional<Dataset>& dataset) {
 
 /// The film of these views. Returns the exit status.
 int write_film(const RenderArguments& arguments, Renderer& renderer, const RenderOptions& options,
-               const std::vector<Camera>& cameras, const std::string& encoder, Progress& progress) {
+               const ViewPath& views, const std::string& encoder, Progress& progress) {
     const PictureArguments& picture = arguments.picture;
+    const std::vector<Camera>& cameras = views.cameras;
     Film film(arguments.output, cameras[0].width * (picture.stereo == "side-by-side" ? 2 : 1),
               cameras[0].height * (picture.stereo == "top-bottom" ? 2 : 1), encoder);
-    PictureTaker taker(picture, renderer, Drawing::color, true);
+    PictureTaker taker(picture, renderer, Drawing::color, options.kernel, views);
     for (size_t i = 0; i < cameras.size(); ++i) {
         if (interrupted()) return kInterruptedStatus;
         if (picture.several())
-            film.add(screen_bytes(joined_eyes(taker.take(cameras, i), picture.stereo).color));
+            film.add(screen_bytes(joined_eyes(taker.take(i), picture.stereo).color));
         else
             film.add(renderer.render_bytes(cameras[i], {.render = options}));
         progress.update(int(i) + 1);
@@ -234,7 +241,7 @@ int render_free_views(RenderArguments arguments) {
     check_picture(arguments.picture, arguments.mode, path,
                   output == ViewsOutput::folder ? "." + arguments.format
                                                 : core::lower(arguments.output.extension().string()));
-    const std::string encoder = film ? find_encoder(arguments.codec) : std::string();
+    const std::string encoder = film ? find_encoder(arguments.codec, arguments.output) : std::string();
     if (film) find_ffmpeg();
     if (one_image) arguments.format = core::lower(arguments.output.extension().string()).substr(1);
     const std::optional<Dataset> dataset = dataset_of_run(arguments);
@@ -247,11 +254,11 @@ int render_free_views(RenderArguments arguments) {
         for (const Frame& frame : dataset->frames) sum += frame.camera.position();
         arguments.views.inside = sum / double(dataset->frames.size());
     }
-    const std::vector<Camera> cameras = views_of(arguments.views, gaussians, hints_of(dataset),
-                                                 arguments.contact_sheet ? ViewsOutput::folder : output);
+    const ViewPath views = views_of(arguments.views, gaussians, hints_of(dataset),
+                                    arguments.contact_sheet ? ViewsOutput::folder : output);
     if (output == ViewsOutput::folder) {
         files.clear();
-        for (size_t i = 0; i < cameras.size(); ++i)
+        for (size_t i = 0; i < views.cameras.size(); ++i)
             files.push_back(arguments.output / fmt::format("{:05}.{}", i, arguments.format));
         check_renders(arguments, files, known);
     }
@@ -259,9 +266,9 @@ int render_free_views(RenderArguments arguments) {
 
     Renderer renderer(open_device(arguments.device), gaussians, options);
     const InterruptWatch watch;
-    Progress progress("rendered", int(cameras.size()), "views", arguments.quiet);
-    if (film) return write_film(arguments, renderer, options, cameras, encoder, progress);
-    return write_images(arguments, renderer, cameras, files, {}, path, progress);
+    Progress progress("rendered", int(views.cameras.size()), "views", arguments.quiet);
+    if (film) return write_film(arguments, renderer, options, views, encoder, progress);
+    return write_images(arguments, renderer, options.kernel, views, files, {}, progress);
 }
 
 /// Completes the arguments by the run that SPLATS may name, and chooses whose cameras are used.

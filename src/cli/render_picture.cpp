@@ -116,9 +116,8 @@ Rendering PictureTaker::render(const Camera& camera) {
     return rendering;
 }
 
-double PictureTaker::focus_of(const Camera& camera) {
-    if (arguments_.focus > 0) return arguments_.focus;
-    if (path_ && found_ > 0) return found_;
+/// The depth of the surface in the middle of the image. Where none is opaque, the mean of what the middle shows. 0: nothing.
+double PictureTaker::depth_of_middle(const Camera& camera) {
     // The middle pixel of a small image of a tenth of the view.
     constexpr int kSide = 33;
     constexpr double kShown = 0.1;
@@ -129,24 +128,39 @@ double PictureTaker::focus_of(const Camera& camera) {
     middle.fy *= scale;
     middle.cx = 0.5 * kSide + scale * (camera.cx - 0.5 * camera.width);
     middle.cy = 0.5 * kSide + scale * (camera.cy - 0.5 * camera.height);
-    const Rendering seen = renderer_.render(middle, DrawOptions{.render = {}, .drawing = Drawing::depth});
+    // Other integrators draw no surfaces.
+    DrawOptions options{.render = {.kernel = kernel_}, .drawing = Drawing::median_depth};
+    const float surface = *renderer_.render(middle, options).median_depth.at(kSide / 2, kSide / 2);
+    if (surface > 0) return surface;
+    options.drawing = Drawing::depth;
+    const Rendering seen = renderer_.render(middle, options);
     constexpr float kThere = 0.1f;
-    found_ = *seen.alpha.at(kSide / 2, kSide / 2) > kThere ? *seen.depth.at(kSide / 2, kSide / 2) : 0;
+    return *seen.alpha.at(kSide / 2, kSide / 2) > kThere ? *seen.depth.at(kSide / 2, kSide / 2) : 0;
+}
+
+double PictureTaker::focus_of(size_t i) {
+    if (arguments_.focus > 0) return arguments_.focus;
+    if (views_.at && found_ > 0) return found_;
+    if (const double depth = depth_of_middle(views_.cameras[i]); depth > 0) return found_ = depth;
+    // A view whose middle is empty has the distance of another one.
+    for (size_t k = 0; k < views_.cameras.size() && !(found_ > 0); ++k)
+        if (scene::has_movable_eye(views_.cameras[k])) found_ = depth_of_middle(views_.cameras[k]);
     if (!(found_ > 0)) throw InputError("--focus is needed: the middle of the image shows no splat");
     return found_;
 }
 
-Rendering PictureTaker::averaged(const std::vector<Camera>& views, size_t i, double eye, double focus) {
+Rendering PictureTaker::averaged(size_t i, double eye, double focus) {
+    const Camera& view = views_.cameras[i];
     const int count = arguments_.blurs() ? arguments_.blur_samples : 1;
-    if (count == 1) return render(eye == 0 ? views[i] : scene::moved_eye(views[i], {eye, 0}, focus));
+    if (count == 1) return render(eye == 0 ? view : scene::moved_eye(view, {eye, 0}, focus));
     // Light adds up in a camera, so colours are averaged in linear light. Programs that put a transparent image over another one
     // blend stored values, as splats are blended.
     const bool linear = !arguments_.transparent;
     Rendering sum;
     for (int k = 0; k < count; ++k) {
-        Camera camera = arguments_.shutter > 0
-                            ? along_path(views, double(i) + arguments_.shutter * scene::even_share(k))
-                            : views[i];
+        Camera camera = arguments_.shutter > 0 && views_.at
+                            ? views_.at(double(i) + arguments_.shutter * scene::even_share(k))
+                            : view;
         const glm::dvec2 place = 0.5 * arguments_.aperture * scene::disc_point(k, count);
         if (arguments_.aperture > 0 || eye != 0)
             camera = scene::moved_eye(camera, place + glm::dvec2(eye, 0), focus);
@@ -169,22 +183,24 @@ Rendering PictureTaker::all_around(const Camera& camera, double eye) {
     return whole;
 }
 
-std::vector<Rendering> PictureTaker::take(const std::vector<Camera>& views, size_t i) {
-    const Camera& camera = views[i];
+std::vector<Rendering> PictureTaker::take(size_t i) {
+    const Camera& camera = views_.cameras[i];
     const bool stereo = !arguments_.stereo.empty(), around = scene::shows_all_around(camera);
     if ((arguments_.aperture > 0 && !scene::has_movable_eye(camera)) ||
         (stereo && !around && !scene::has_movable_eye(camera)) || (around && arguments_.blurs()))
         throw InputError(around ? "--aperture and --shutter: a 360° image has neither"
                                 : "--aperture and --stereo need a pinhole: --lens undistort");
+    if (around && arguments_.focus > 0)
+        throw InputError("--focus: a 360° image has no distance of focus; leave it out");
     double focus = 1, half = 0.5 * arguments_.eye_distance;
-    if (arguments_.aperture > 0 || (stereo && !around)) focus = focus_of(camera);
+    if (arguments_.aperture > 0 || (stereo && !around)) focus = focus_of(i);
     if (stereo && half == 0) {
         if (around) throw InputError("--eye-distance is needed: a 360° image has no distance of focus");
         half = 0.5 * kEyesPerFocus * focus;
     }
     std::vector<Rendering> eyes;
     for (const double eye : stereo ? std::vector{-half, half} : std::vector{0.0})
-        eyes.push_back(around && stereo ? all_around(camera, eye) : averaged(views, i, eye, focus));
+        eyes.push_back(around && stereo ? all_around(camera, eye) : averaged(i, eye, focus));
     return eyes;
 }
 
@@ -198,12 +214,27 @@ Rendering joined_eyes(std::vector<Rendering> eyes, const std::string& stereo) {
     return std::move(first);
 }
 
-Image transparent_image(const Rendering& rendering) {
+namespace {
+
+/// The colours of a render over black, not multiplied by alpha.
+Image straight_colors(const Rendering& rendering) {
     Image color = rendering.color;
     for (size_t i = 0; i < rendering.alpha.pixels.size(); ++i)
         if (const float alpha = rendering.alpha.pixels[i]; alpha > 0)
             for (size_t c = 0; c < 3; ++c) color.pixels[3 * i + c] /= alpha;
-    return with_alpha(color, rendering.alpha);
+    return color;
+}
+
+}  // namespace
+
+Image with_appearance_over_black(const Rendering& rendering, const Appearance& appearance) {
+    Image color = with_appearance(straight_colors(rendering), appearance);
+    for (size_t i = 0; i < color.pixels.size(); ++i) color.pixels[i] *= rendering.alpha.pixels[i / 3];
+    return color;
+}
+
+Image transparent_image(const Rendering& rendering) {
+    return with_alpha(straight_colors(rendering), rendering.alpha);
 }
 
 std::vector<uint8_t> screen_bytes(const Image& color) {

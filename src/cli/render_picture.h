@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "cli/render_views.h"
+#include "ewa/appearance.h"
 #include "ewa/camera.h"
 #include "ewa/renderer.h"
 
@@ -34,32 +36,42 @@ void check_picture(const PictureArguments& arguments, const std::string& mode, b
 /// Takes pictures of views. It keeps the distance of focus that it has found for the first of a path.
 class PictureTaker {
   public:
-    /// path: whether the views are moments of one motion.
-    PictureTaker(const PictureArguments& arguments, Renderer& renderer, Drawing drawing, bool path)
-        : arguments_(arguments), renderer_(renderer), drawing_(drawing), path_(path) {}
+    /// kernel: of the renderer's options.
+    PictureTaker(const PictureArguments& arguments, Renderer& renderer, Drawing drawing, Footprint kernel,
+                 ViewPath views)
+        : arguments_(arguments),
+          renderer_(renderer),
+          drawing_(drawing),
+          kernel_(kernel),
+          views_(std::move(views)) {}
 
     /// What each eye sees in view i: one or two images. With a shutter, while the camera moves to the next view.
-    /// Throws InputError where the options do not go with the lens of a camera, or nothing is in focus.
-    std::vector<Rendering> take(const std::vector<Camera>& views, size_t i);
+    /// Throws InputError where the options do not go with the lens of a camera, or no view has anything in focus.
+    std::vector<Rendering> take(size_t i);
 
     uint32_t skipped() const { return skipped_; }  // the most splats of a render that were not finite
 
   private:
     Rendering render(const Camera& camera);
-    Rendering averaged(const std::vector<Camera>& views, size_t i, double eye, double focus);
+    Rendering averaged(size_t i, double eye, double focus);
     Rendering all_around(const Camera& camera, double eye);
-    double focus_of(const Camera& camera);
+    double focus_of(size_t i);
+    double depth_of_middle(const Camera& camera);
 
     const PictureArguments& arguments_;
     Renderer& renderer_;
     Drawing drawing_;
-    bool path_;
+    Footprint kernel_;
+    ViewPath views_;
     double found_ = 0;  // distance of focus
     uint32_t skipped_ = 0;
 };
 
 /// Both eyes in one image, as --stereo names it. One eye stays as it is.
 Rendering joined_eyes(std::vector<Rendering> eyes, const std::string& stereo);
+
+/// The colours as a camera of this appearance shows them. The rendering is over black, and stays so.
+Image with_appearance_over_black(const Rendering& rendering, const Appearance& appearance);
 
 /// RGBA whose colour is not multiplied by alpha, from a render over black.
 Image transparent_image(const Rendering& rendering);

@@ -58,19 +58,29 @@ std::optional<glm::dvec3> parse_up(const std::string& text) {
     return up;
 }
 
-std::vector<Camera> along_views(const std::vector<Camera>& keys, double seconds) {
+/// The cameras at whole times, for a motion of so many frames.
+ViewPath moments_of(std::function<Camera(double)> at, int count) {
+    ViewPath views;
+    for (int i = 0; i < count; ++i) views.cameras.push_back(at(i));
+    if (count > 1) views.at = std::move(at);
+    return views;
+}
+
+ViewPath along_views(const std::vector<Camera>& keys, double seconds) {
     const double frames = double(keys.size() - 1) * kFilmRate * seconds + 1;
     if (frames > kMostFrames)
         throw InputError(fmt::format("--film-seconds: a film of more than {} frames", kMostFrames));
     const int count = std::max(1, int(std::lround(frames)));
-    std::vector<Camera> cameras;
-    for (int i = 0; i < count; ++i)
-        cameras.push_back(
-            along_path(keys, count > 1 ? double(i) * double(keys.size() - 1) / (count - 1) : 0));
-    return cameras;
+    const double last = count - 1, parts = double(keys.size() - 1);
+    // After the last frame, the camera goes back: that frame has the blur of the motion that led to it.
+    return moments_of(
+        [=](double time) {
+            return along_path(keys, last > 0 ? parts * (time <= last ? time : 2 * last - time) / last : 0);
+        },
+        count);
 }
 
-std::vector<Camera> saved_views(const ViewsArguments& arguments, ViewsOutput output) {
+ViewPath saved_views(const ViewsArguments& arguments, ViewsOutput output) {
     std::vector<Camera> cameras;
     for (const io::NamedView& view : io::read_views(arguments.views)) cameras.push_back(view.camera);
     if (cameras.empty()) throw InputError(arguments.views.string() + ": has no views");
@@ -80,16 +90,26 @@ std::vector<Camera> saved_views(const ViewsArguments& arguments, ViewsOutput out
         if (!arguments.size.empty()) size = size_of(arguments.size);
         for (Camera& camera : cameras) camera = scene::fitted(camera, size.width, size.height);
     }
-    if (!path) return cameras;
+    if (!path) return {cameras};
     return along_views(cameras, arguments.film_seconds > 0 ? arguments.film_seconds : kSecondsBetweenViews);
 }
 
-std::vector<Camera> around(const scene::Framing& framing, int count) {
-    std::vector<Camera> cameras;
-    for (int i = 0; i < count; ++i)
-        cameras.push_back(
-            scene::orbited(framing.camera, framing.target, framing.up, 2 * std::numbers::pi * i / count));
-    return cameras;
+ViewPath around(const scene::Framing& framing, int count) {
+    return moments_of(
+        [=](double time) {
+            return scene::orbited(framing.camera, framing.target, framing.up,
+                                  2 * std::numbers::pi * time / count);
+        },
+        count);
+}
+
+/// The same views through a lens.
+ViewPath seen_through(const LensArgument& lens, ViewPath views, const glm::dvec3& up,
+                      const glm::dvec3& middle) {
+    const auto seen = [=](const Camera& camera) { return through(lens, camera, up, middle); };
+    std::ranges::transform(views.cameras, views.cameras.begin(), seen);
+    if (views.at) views.at = [seen, at = views.at](double time) { return seen(at(time)); };
+    return views;
 }
 
 }  // namespace
@@ -172,8 +192,8 @@ Camera through(const LensArgument& lens, const Camera& camera, const glm::dvec3&
 namespace {
 
 /// The views round the scene or from a given eye.
-std::vector<Camera> framed_views(const ViewsArguments& arguments, const Gaussians& gaussians,
-                                 const scene::FramingHints& hints, int count) {
+ViewPath framed_views(const ViewsArguments& arguments, const Gaussians& gaussians,
+                      const scene::FramingHints& hints, int count) {
     const bool all_around = arguments.lens && arguments.lens->lens.lens == Lens::equirectangular;
     core::PixelSize size = !arguments.size.empty() ? size_of(arguments.size)
                            : all_around            ? kPanoramaSize
@@ -197,37 +217,35 @@ std::vector<Camera> framed_views(const ViewsArguments& arguments, const Gaussian
         framing.target = target;
         framing.camera = scene::look_at(eye, target, framing.up, size.width, size.height);
     }
-    std::vector<Camera> cameras = around(framing, count);
-    if (arguments.lens)
-        for (Camera& camera : cameras) camera = through(*arguments.lens, camera, framing.up, framing.target);
-    return cameras;
+    ViewPath views = around(framing, count);
+    if (!arguments.lens) return views;
+    return seen_through(*arguments.lens, std::move(views), framing.up, framing.target);
 }
 
 }  // namespace
 
-std::vector<Camera> views_of(const ViewsArguments& arguments, const Gaussians& gaussians,
-                             const scene::FramingHints& hints, ViewsOutput output) {
+ViewPath views_of(const ViewsArguments& arguments, const Gaussians& gaussians,
+                  const scene::FramingHints& hints, ViewsOutput output) {
     const bool film = output == ViewsOutput::film;
-    std::vector<Camera> cameras;
+    ViewPath views;
     if (!arguments.views.empty()) {
-        cameras = saved_views(arguments, output);
+        views = saved_views(arguments, output);
         if (arguments.lens) {
             const auto given = parse_up(arguments.up);
             const glm::dvec3 up = given ? *given : hints.up ? *hints.up : scene::guessed_up(gaussians);
             const glm::dvec3 middle = scene::framed_box(gaussians).center();
-            for (Camera& camera : cameras)
-                camera = through(*arguments.lens, camera, glm::normalize(up), middle);
+            views = seen_through(*arguments.lens, std::move(views), glm::normalize(up), middle);
         }
     } else {
         const int count = arguments.orbit > 0 ? arguments.orbit : film ? kOrbitFrames : 1;
-        cameras = framed_views(arguments, gaussians, hints, count);
+        views = framed_views(arguments, gaussians, hints, count);
     }
-    if (output == ViewsOutput::image && cameras.size() > 1)
+    if (output == ViewsOutput::image && views.cameras.size() > 1)
         throw InputError(
             fmt::format("--output names one image, and there are {} views; name a folder, or a film such "
                         "as film.mp4",
-                        cameras.size()));
-    return cameras;
+                        views.cameras.size()));
+    return views;
 }
 
 }  // namespace ewa::cli

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 
 #include <filesystem>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <optional>
 #include <string>
@@ -45,9 +46,15 @@ void check_views(const ViewsArguments& arguments);
 Camera through(const LensArgument& lens, const Camera& camera, const glm::dvec3& up,
                const glm::dvec3& middle);
 
+struct ViewPath {
+    std::vector<Camera> cameras;
+    /// Where they are moments of one motion, the camera at a time: cameras[i] at i, for times from 0 to size(). Else empty.
+    std::function<Camera(double)> at = {};
+};
+
 /// At least one camera, all of one size for a film. hints: what is known of the scene; --up has precedence. Throws
 /// InputError, also if an image should hold several views.
-std::vector<Camera> views_of(const ViewsArguments& arguments, const Gaussians& gaussians,
-                             const scene::FramingHints& hints, ViewsOutput output);
+ViewPath views_of(const ViewsArguments& arguments, const Gaussians& gaussians,
+                  const scene::FramingHints& hints, ViewsOutput output);
 
 }  // namespace ewa::cli

@@ -144,6 +144,24 @@ TEST_F(Runs, EvalAndRenderUseTheExposures) {
     const Image without = view("none", "0.png");
     EXPECT_EQ(view(folder / "white.json", "0.png").pixels, without.pixels);
     for (const float value : view(folder / "white.json", "1.png").pixels) EXPECT_EQ(value, 1);
+    // The colours of a transparent image have the exposure, whatever their alpha.
+    write_file(folder / "redder.json", R"({"images/1.png": [[1, 0, 0, 0.25], [0, 1, 0, 0], [0, 0, 1, 0]]})");
+    const auto clear = [&](const std::string& exposures) {
+        const std::string file = folder / "clear.png";
+        expect_success(run_ewa({"render", run, "--frames", "1.png", "--exposures", exposures, "--transparent",
+                                "-o", file, "--quiet"}));
+        return load_image(file);
+    };
+    const Image plain = clear("none"), redder = clear(folder / "redder.json");
+    size_t edges = 0;
+    for (size_t i = 0; i < plain.pixels.size(); i += 4) {
+        EXPECT_EQ(redder.pixels[i + 3], plain.pixels[i + 3]);
+        if (plain.pixels[i + 3] < 0.02f || plain.pixels[i] == 0) continue;
+        edges += plain.pixels[i + 3] < 0.7f;
+        EXPECT_NEAR(redder.pixels[i], std::min(1.0f, plain.pixels[i] + 0.25f), 1.5 / 255);
+        EXPECT_EQ(redder.pixels[i + 1], plain.pixels[i + 1]);
+    }
+    EXPECT_GT(edges, 10u);
     expect_success(run_ewa({"render", run, "-o", folder / "auto"}));
     expect_success(run_ewa({"render", run, "--exposures", run + "/exposures.json", "-o", folder / "file"}));
     EXPECT_EQ(read_file(folder / "auto/1.png"), read_file(folder / "file/1.png"));

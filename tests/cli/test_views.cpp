@@ -230,6 +230,10 @@ TEST_F(Views, LookAtIsTheSameAsASavedView) {
     EXPECT_EQ(files_below(folder / "film").size(), 4u);
     EXPECT_TRUE(same_pixels(folder / "film/00000.png", folder / "saved/00000.png"));
     EXPECT_TRUE(same_pixels(folder / "film/00003.png", folder / "saved/00001.png"));
+    // Motion blur is also in the last of them.
+    expect_success(render({"--views", views, "--film-seconds", "0.1", "-o", folder / "blurred", "--shutter",
+                           "1", "--blur-samples", "2"}));
+    EXPECT_FALSE(same_pixels(folder / "blurred/00003.png", folder / "film/00003.png"));
 }
 
 TEST_F(Views, AFilmGoesToFfmpegFrameByFrame) {
