@@ -43,7 +43,7 @@ struct ConvertArguments {
     std::string scale_to, crop, decimate, sort, geo;
     Edits edits;
     Cleaning cleaning;
-    int spz_version = 3, levels = 0, level = 0;
+    int spz_version = 0, levels = 0, level = 0;  // 0: not given
     bool gltf_spz = false, unbundled = false;
     fs::path json;
     bool bake_sky = false, check = false, allow_empty = false, quiet = false;
@@ -224,6 +224,8 @@ int run(const ConvertArguments& arguments) {
     if (!levels && !rad && !tiles && !arguments.unbundled && arguments.levels > 0)
         throw InputError(
             "--levels: only a lod-meta.json, a .rad, a tileset.json and an --unbundled page have levels");
+    if (arguments.spz_version > 0 && (tiles || arguments.gltf_spz))
+        throw InputError("--spz-version: a glTF and tiles hold SPZ 2; only an .spz has a version to choose");
     if (arguments.gltf_spz && format != SplatFormat::glb && format != SplatFormat::gltf)
         throw InputError("--gltf-spz: only a .glb or .gltf can hold an SPZ");
     // Report wrong use before the inputs are read: they may be large.
@@ -244,7 +246,10 @@ int run(const ConvertArguments& arguments) {
     Work work = read_all(arguments);
     const size_t read = work.gaussians.size();
     const bool in_place = edits.transform == glm::dmat4(1);
-    place_splats(work.gaussians, edits.transform, "--transform");
+    place_splats(work.gaussians, edits.transform,
+                 arguments.scale_to.empty()    ? "--transform"
+                 : arguments.transform.empty() ? "--scale-to"
+                                               : "--transform and --scale-to");
     edits.transform = glm::dmat4(1);
     if (arguments.cleaning.any() && clean_scene(arguments, work, in_place)) return 0;
     for (std::string& remark : apply_edits(work.gaussians, edits, format))
@@ -257,7 +262,7 @@ int run(const ConvertArguments& arguments) {
     constexpr size_t kShowFrom = 500'000;
     Progress progress("written", static_cast<int>(std::min<size_t>(count, 1u << 30)), "splats",
                       arguments.quiet || count < kShowFrom);
-    work.save.spz_version = arguments.spz_version;
+    if (arguments.spz_version > 0) work.save.spz_version = arguments.spz_version;
     work.save.gltf_spz = arguments.gltf_spz;
     work.save.levels = arguments.levels;
     work.save.progress = [&](uint64_t done, uint64_t) { progress.update(static_cast<int>(done)); };
@@ -275,10 +280,10 @@ int run(const ConvertArguments& arguments) {
         const std::vector<fs::path> values = parts_of(out, arguments.unbundled);
         if (!values.empty())
             fmt::print("{}{}: the values of this {}, {}\n", core::one_line(values[0].string()),
-                       values.size() > 1
-                           ? fmt::format(" and {} other {}", values.size() - 1, levels ? "files" : "images")
-                           : "",
-                       name_of(format), core::bytes_text(bytes_of(values)));
+                       values.size() > 1 ? fmt::format(" and {} other {}", values.size() - 1,
+                                                       format == SplatFormat::sog_meta ? "images" : "files")
+                                         : "",
+                       format_text(out), core::bytes_text(bytes_of(values)));
         for (const std::string& remark : remarks) fmt::print("  {}\n", core::one_line(remark));
     }
     Json json = {{"inputs", work.inputs}, {"output", output_json(arguments, size)}, {"remarks", remarks}};
@@ -345,10 +350,9 @@ Action add_convert(CLI::App& app) {
     add_editing_options(app, *arguments);
     add_cleaning_options(app, arguments->cleaning);
     app.add_option("--spz-version", arguments->spz_version,
-                   "SPZ version: 3 (every reader supports it) or 4 (newer, smaller files)")
+                   "SPZ version of an .spz: 3 (every reader supports it) or 4 (newer, smaller files) [3]")
         ->transform(one_of({"3", "4"}))
-        ->type_name("3|4")
-        ->capture_default_str();
+        ->type_name("3|4");
     app.add_flag("--gltf-spz", arguments->gltf_spz,
                  "Pack the splats of a .glb or .gltf as SPZ (KHR_gaussian_splatting_compression_spz_2)");
     app.add_option("--levels", arguments->levels,

@@ -24,6 +24,17 @@ struct Exclusion {
     std::string_view reason;
 };
 
+inline bool compares_depth_maps(const TrainOptions& options) {
+    return options.loss.depth > 0;
+}
+
+inline bool compares_point_depths(const TrainOptions& options) {
+    return options.loss.sfm_depth > 0;
+}
+
+inline constexpr std::string_view kDepthReason =
+    "the gradient by the depth of a splat is gathered within the one picture that shows it";
+
 inline constexpr std::array kExclusions{
     Exclusion{"--points",
               [](const TrainOptions& options) { return options.render.points; },
@@ -37,10 +48,8 @@ inline constexpr std::array kExclusions{
               [](const TrainOptions& options) { return options.refine_poses; },
               {true, true, true, true},
               "a camera learns while the splats of its own step are moved"},
-    Exclusion{"--loss depth",
-              [](const TrainOptions& options) { return options.loss.any_depth() > 0; },
-              {true, true, true, true},
-              "the gradient by the depth of a splat is gathered within the one picture that shows it"},
+    Exclusion{"--loss depth", compares_depth_maps, {true, true, true, true}, kDepthReason},
+    Exclusion{"--loss sfm-depth", compares_point_depths, {true, true, true, true}, kDepthReason},
     Exclusion{"--appearance",
               [](const TrainOptions& options) {
                   const AppearanceModel model = appearance_of(options);
@@ -72,21 +81,22 @@ inline constexpr std::array kPointExclusions{
                                   [](const TrainOptions& options) { return options.refine_poses; },
                                   "spheres have no gradient by the camera"}};
 
-inline bool compares_depths(const TrainOptions& options) {
-    return options.loss.any_depth() > 0;
-}
-
-inline constexpr std::array kDepthExclusions{
-    core::Exclusion<TrainOptions>{"--loss depth", compares_depths, core::Relation::excludes, "--points",
-                                  has_points, "the depth of a sphere has no gradient"},
-    core::Exclusion<TrainOptions>{
-        "--loss depth", compares_depths, core::Relation::excludes, "--integrator",
-        [](const TrainOptions& options) { return options.render.integrator != Integrator::splat; },
-        "depths along rays have no gradient"}};
-
 inline bool shoots_rays(const TrainOptions& options) {
     return options.render.integrator != Integrator::splat;
 }
+
+inline constexpr std::string_view kSphereDepthReason = "the depth of a sphere has no gradient",
+                                  kRayDepthReason = "depths along rays have no gradient";
+
+inline constexpr std::array kDepthExclusions{
+    core::Exclusion<TrainOptions>{"--loss depth", compares_depth_maps, core::Relation::excludes, "--points",
+                                  has_points, kSphereDepthReason},
+    core::Exclusion<TrainOptions>{"--loss sfm-depth", compares_point_depths, core::Relation::excludes,
+                                  "--points", has_points, kSphereDepthReason},
+    core::Exclusion<TrainOptions>{"--loss depth", compares_depth_maps, core::Relation::excludes,
+                                  "--integrator", shoots_rays, kRayDepthReason},
+    core::Exclusion<TrainOptions>{"--loss sfm-depth", compares_point_depths, core::Relation::excludes,
+                                  "--integrator", shoots_rays, kRayDepthReason}};
 
 inline constexpr std::array kRayExclusions{
     core::Exclusion<TrainOptions>{"--integrator", shoots_rays, core::Relation::excludes, "--refine-poses",

@@ -165,6 +165,13 @@ TEST(Convert, WrongUse) {
     refuse({"--scale-to", "0,0,0,1,1,1"}, "x,y,z,X,Y,Z,LENGTH");
     refuse({"--scale-to", "0,0,0,0,0,0,1"}, "two points that differ");
     refuse({"--scale-to", "0,0,0,1,0,0,0"}, "a length above 0");
+    refuse({"--scale-to", "0,0,0,1,0,0,1e40"}, ": --scale-to: 50 of 50 splats could not be drawn");
+    refuse({"--transform", "scale=2", "--scale-to", "0,0,0,1,0,0,1e40"},
+           ": --transform and --scale-to: 50 of 50");
+    for (const char* name : {"o.glb", "o.gltf", "tileset.json"})
+        expect_failure(
+            run_ewa({"convert", folder / "s.ply", folder / name, "--spz-version", "4", "--gltf-spz"}), 2,
+            "--spz-version: a glTF and tiles hold SPZ 2");
     refuse({"--crop", "1,2,3"}, "--crop");
     refuse({"--crop", "1,0,0,0,1,1"}, "lower corner");
     refuse({"--min-opacity", "2"}, "min-opacity");

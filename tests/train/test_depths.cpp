@@ -187,13 +187,14 @@ TEST(Depths, SomeImagesMayHaveNone) {
 }
 
 TEST(Depths, ExclusionsAreNamed) {
-    TrainOptions options = quick(4);
-    options.loss.depth = 0.5;
+    const TrainOptions options = quick(4);
     const Dataset& dataset = measured().dataset;
-    const auto refuse = [&](const TrainOptions& asked, const std::string& other) {
-        expect_error<InputError>(
-            [&] { Trainer(device(), dataset, all_frames(dataset), moved_start(), asked); },
-            {"--loss depth", other});
+    const auto refuse = [&](TrainOptions asked, const std::string& other) {
+        const auto start = [&] { Trainer(device(), dataset, all_frames(dataset), moved_start(), asked); };
+        asked.loss.depth = 0.5;
+        expect_error<InputError>(start, {"--loss depth", other});
+        std::swap(asked.loss.depth, asked.loss.sfm_depth);
+        expect_error<InputError>(start, {"--loss sfm-depth", other});
     };
     TrainOptions asked = options;
     asked.batch = 2;

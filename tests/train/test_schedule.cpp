@@ -45,7 +45,8 @@ TEST(Exclusions, AreThoseOfTheDocument) {
             if (row.option == "--integrator") options.render.integrator = Integrator::fast_ray;
             options.sky = row.option == "--background sky";
             if (row.option == "--appearance") options.appearance = AppearanceModel::ppisp;
-            (by % 2 ? options.loss.depth : options.loss.sfm_depth) = row.option == "--loss depth" ? 0.1 : 0;
+            if (row.option == "--loss depth") options.loss.depth = 0.1;
+            if (row.option == "--loss sfm-depth") options.loss.sfm_depth = 0.1;
             EXPECT_TRUE(row.used(options));
             EXPECT_EQ(refusal(options, 1), "");
             if (by == by_batch) options.batch = 2;

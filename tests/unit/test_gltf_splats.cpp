@@ -404,6 +404,64 @@ TEST(GltfSplats, SpzInside) {
     refuse({"b.gltf", "the SPZ", "byte"});
 }
 
+/// An SPZ that many nodes place is unpacked once, however long its bytes are.
+TEST(GltfSplats, ASpzOfManyPlacementsIsUnpackedOnce) {
+    const TempFolder folder;
+    SaveOptions options;
+    options.gltf_spz = true;
+    const Gaussians g = storable_splats(3, 2, 0);
+    save_splats(folder / "a.gltf", g, options);
+    json top = json::parse(test::file_bytes(folder / "a.gltf"));
+    std::string spz = test::file_bytes(folder / "a.bin");
+    // A gzip header may have a file name of any length before the data.
+    const std::string name(2'000'000, 'n');
+    spz[3] |= 8;
+    spz.insert(10, name + '\0');
+    top["buffers"][0]["byteLength"] = spz.size();
+    top["bufferViews"][0]["byteLength"] = spz.size();
+    folder.write("a.bin", spz);
+    constexpr size_t kPlacements = 2000;
+    top["nodes"] = json::array();
+    top["scenes"][0]["nodes"] = json::array();
+    for (size_t i = 0; i < kPlacements; ++i) {
+        top["nodes"].push_back({{"mesh", 0}, {"translation", {i, 0, 0}}});
+        top["scenes"][0]["nodes"].push_back(i);
+    }
+    const std::string file = folder.write("a.gltf", top.dump());
+    const std::clock_t begin = std::clock();
+    const Gaussians all = load_splats(file);
+    EXPECT_LT(double(std::clock() - begin) / CLOCKS_PER_SEC, 1);
+    ASSERT_EQ(all.size(), kPlacements * g.size());
+    for (size_t i = 0; i < kPlacements; ++i)
+        ASSERT_NEAR(all.means[6 * i] + double(i), all.means[0], 1e-3) << i;
+}
+
+/// One splat of SH degree 3 gives all others its coefficients: their memory is bounded too.
+TEST(GltfSplats, ASpzOfAHigherDegreeIsBounded) {
+    const TempFolder folder;
+    SaveOptions options;
+    options.gltf_spz = true;
+    Gaussians many;
+    many.resize(500'000);
+    for (size_t i = 0; i < many.size(); ++i) many.quaternions[4 * i] = 1;
+    save_splats(folder / "many.gltf", many, options);
+    save_splats(folder / "one.gltf", storable_splats(3, 1, 3), options);
+    json top = json::parse(test::file_bytes(folder / "many.gltf"));
+    const json one = json::parse(test::file_bytes(folder / "one.gltf"));
+    const size_t accessors = top["accessors"].size();
+    for (const json& accessor : one["accessors"]) top["accessors"].push_back(accessor);
+    json primitive = one["meshes"][0]["primitives"][0];
+    for (auto& attribute : primitive["attributes"]) attribute = attribute.get<size_t>() + accessors;
+    primitive["extensions"]["KHR_gaussian_splatting"]["extensions"]
+             ["KHR_gaussian_splatting_compression_spz_2"]["bufferView"] = 1;
+    top["meshes"][0]["primitives"].push_back(primitive);
+    top["buffers"].push_back(one["buffers"][0]);
+    top["bufferViews"].push_back(one["bufferViews"][0]);
+    top["bufferViews"][1]["buffer"] = 1;
+    expect_error<InputError>([&] { load_splats(folder.write("both.gltf", top.dump())); },
+                             {"500001 splats of SH degree 3"});
+}
+
 TEST(GltfSplats, GlbChunks) {
     TempFolder folder;
     save_splats(folder / "a.glb", storable_splats(1, 5, 0));

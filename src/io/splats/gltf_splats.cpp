@@ -19,6 +19,7 @@
 #include <cmath>
 #include <functional>
 #include <glm/mat4x4.hpp>
+#include <map>
 #include <optional>
 
 #include "core/file_reader.h"
@@ -51,6 +52,7 @@ class SplatReader {
     explicit SplatReader(const GltfDocument& document) : document_(document), model_(document.model()) {}
 
     SplatScene read() {
+        count_placements();
         // From glTF's world (LUF) to PLY's: 180 degrees about z.
         glm::dmat4 to_ply(1.0);
         to_ply[0][0] = to_ply[1][1] = -1;
@@ -140,6 +142,39 @@ class SplatReader {
         return spz.Get("bufferView").GetNumberAsInt();
     }
 
+    /// How often the nodes place each SPZ; more are refused later.
+    void count_placements() {
+        size_t primitives = 0;
+        visit_nodes(document_, glm::dmat4(1), [&](int index, const glm::dmat4&) {
+            const int mesh = model_.nodes[size_t(index)].mesh;
+            if (mesh < 0 || primitives > kMostPlacedPrimitives) return;
+            for (const tinygltf::Primitive& primitive :
+                 document_.mesh(mesh, "node " + std::to_string(index)).primitives) {
+                const auto extension = primitive.extensions.find(kSplatExtension);
+                if (extension == primitive.extensions.end()) continue;
+                ++primitives;
+                where_ = "mesh " + std::to_string(mesh);
+                if (const auto view = spz_view(extension->second)) ++placements_[*view];
+            }
+        });
+    }
+
+    /// The splats of an SPZ. They stay in memory until the last of the nodes has placed them.
+    SplatScene unpacked(int view) {
+        const bool last = --placements_[view] <= 0;
+        const auto known = unpacked_.find(view);
+        if (known != unpacked_.end()) {
+            SplatScene scene = last ? std::move(known->second) : known->second;
+            if (last) unpacked_.erase(known);
+            return scene;
+        }
+        const std::string name = document_.name() + ": " + where_ + ", the SPZ";
+        core::FileReader reader(name, document_.view_bytes(view, where_ + ", " + kSpzExtension + ": "));
+        SplatScene scene = read_spz(reader);
+        if (!last) unpacked_.emplace(view, scene);
+        return scene;
+    }
+
     Gaussians read_packed(const tinygltf::Primitive& primitive, const tinygltf::Value& extension, int view) {
         if (extension.Has("kernel")) check_kernel(extension);
         const auto position = primitive.attributes.find("POSITION");
@@ -147,14 +182,17 @@ class SplatReader {
             size_t(position->second) >= model_.accessors.size())
             document_.fail(where_ + ", attribute POSITION: is missing");
         const size_t count = model_.accessors[size_t(position->second)].count;
-        require_memory(document_.name(), document_.bytes(), uint64_t(scene_.gaussians.size()) + count,
-                       scene_.gaussians.sh_degree, kPackedExpansion);
-        const std::string name = document_.name() + ": " + where_ + ", the SPZ";
-        core::FileReader reader(name, document_.view_bytes(view, where_ + ", " + kSpzExtension + ": "));
-        SplatScene packed = read_spz(reader);
+        const auto require = [&](int sh_degree) {
+            require_memory(document_.name(), document_.bytes(), uint64_t(scene_.gaussians.size()) + count,
+                           sh_degree, kPackedExpansion);
+        };
+        require(scene_.gaussians.sh_degree);
+        SplatScene packed = unpacked(view);
         if (packed.gaussians.size() != count)
             document_.fail(where_ + ": the SPZ has " + std::to_string(packed.gaussians.size()) +
                            " splats, and POSITION has " + std::to_string(count));
+        // All splats of the scene get the highest degree.
+        require(std::max(packed.gaussians.sh_degree, scene_.gaussians.sh_degree));
         for (const std::string& text : packed.remarks) remark(text);
         scene_.antialiased = scene_.antialiased || packed.antialiased;
         scene_.file_sh_degree = std::max(scene_.file_sh_degree, packed.file_sh_degree);
@@ -247,10 +285,12 @@ class SplatReader {
     const GltfDocument& document_;
     const tinygltf::Model& model_;
     SplatScene scene_;
-    std::string where_;     // the primitive being read, for errors
-    glm::dmat4 turn_{1.0};  // from its values to the node's frame
-    size_t count_ = 0;      // its splats
-    int primitives_ = 0;    // read so far
+    std::string where_;                   // the primitive being read, for errors
+    glm::dmat4 turn_{1.0};                // from its values to the node's frame
+    size_t count_ = 0;                    // its splats
+    int primitives_ = 0;                  // read so far
+    std::map<int, int> placements_;       // of an SPZ by its buffer view, still to come
+    std::map<int, SplatScene> unpacked_;  // by buffer view
 };
 
 }  // namespace

@@ -11,6 +11,8 @@
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
+#include "io/datasets/importers/image_finder.h"
+#include "io/datasets/importers/json_field.h"
 
 namespace ewa::io {
 
@@ -229,6 +231,18 @@ std::vector<fs::path> files_of_folder(const fs::path& folder) {
         if (files.size() < kMostFiles) files.push_back(at->path());
     std::sort(files.begin(), files.end());
     return files;
+}
+
+ImageRecord begin_record(const ImageFinder& images, const std::string& name, const JsonField& camera) {
+    ImageRecord record;
+    const auto found = images.find(name, camera.where());
+    record.name = found.name;
+    record.path = found.path;
+    record.camera.width = camera.side("width");
+    record.camera.height = camera.side("height");
+    record.camera.fx = camera.number("fx");
+    record.camera.fy = camera.number("fy");
+    return record;
 }
 
 void finish_record(ImageRecord& record, const std::string& where) {

@@ -12,6 +12,9 @@
 
 namespace ewa::io {
 
+class ImageFinder;
+class JsonField;
+
 /// What an importer reads.
 struct ImportSource {
     std::filesystem::path file;     // with the cameras; the first one, if each image has a file
@@ -57,6 +60,9 @@ std::string export_advice(const std::filesystem::path& path);
 
 /// The folder's files in the order of names.
 std::vector<std::filesystem::path> files_of_folder(const std::filesystem::path& folder);
+
+/// The record of an image, with the "width", "height" (px), "fx" and "fy" of its camera.
+ImageRecord begin_record(const ImageFinder& images, const std::string& name, const JsonField& camera);
 
 /// Checks the intrinsics and the rotation of a record. `where` begins the errors.
 void finish_record(ImageRecord& record, const std::string& where);

@@ -30,15 +30,8 @@ ImageRecords import_inria(const ImportSource& source) {
     for (size_t i = 0; i < document.size(); ++i) {
         const std::string where = name + ": camera " + std::to_string(i);
         const JsonField field(document[i], where);
-        ImageRecord record;
-        const auto found = images.find(field.text("img_name"), where);
-        record.name = found.name;
-        record.path = found.path;
+        ImageRecord record = begin_record(images, field.text("img_name"), field);
         Camera& camera = record.camera;
-        camera.width = field.side("width");
-        camera.height = field.side("height");
-        camera.fx = field.number("fx");
-        camera.fy = field.number("fy");
         camera.cx = 0.5 * camera.width;
         camera.cy = 0.5 * camera.height;
         const std::vector<double> rows = field.numbers("rotation", 9), p = field.numbers("position", 3);

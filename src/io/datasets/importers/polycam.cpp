@@ -28,15 +28,8 @@ ImageRecord read_polycam_camera(const fs::path& path, const ImageFinder& images)
     const nlohmann::json json = core::read_json_file<nlohmann::json>(path, {.bytes = kMostCameraBytes});
     const JsonField field(json, name);
     if (!json.is_object()) field.fail("is not a JSON object");
-    ImageRecord record;
-    const auto found = images.find(path.stem().string(), name);
-    record.name = found.name;
-    record.path = found.path;
+    ImageRecord record = begin_record(images, path.stem().string(), field);
     Camera& camera = record.camera;
-    camera.width = field.side("width");
-    camera.height = field.side("height");
-    camera.fx = field.number("fx");
-    camera.fy = field.number("fy");
     camera.cx = field.number("cx");
     camera.cy = field.number("cy");
     glm::dmat3 axes;

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// The smaller modules of kernels that see pinholes alone.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "gpu/guarded.h"
+#include "gpu/reference_inputs.h"
+#include "passes/passes.h"
+#include "passes/shader_code.h"
+
+namespace ewa::test {
+namespace {
+
+/// A module for pinholes differs from the whole one in that it is smaller and has no constant of lenses.
+TEST(PinholeCode, HasTheBindingsOfTheWholeModule) {
+    int found = 0;
+    for (const std::string_view name : passes::shader_names())
+        for (const bool texel_buffers : {true, false}) {
+            const std::span<const uint32_t> pinhole = passes::pinhole_code(name, texel_buffers);
+            if (pinhole.empty()) continue;
+            SCOPED_TRACE(name);
+            ++found;
+            const std::span<const uint32_t> whole = passes::shader_code(name, texel_buffers);
+            EXPECT_LT(pinhole.size(), 0.7 * double(whole.size()));
+            const gpu::Reflection a = gpu::reflect(pinhole), b = gpu::reflect(whole);
+            std::vector<uint32_t> expected = b.constants;
+            EXPECT_EQ(std::erase(expected, shared::SPEC_LENSES), 1u);
+            EXPECT_EQ(a.constants, expected);
+            EXPECT_EQ(a.push_constant_bytes, b.push_constant_bytes);
+            EXPECT_EQ(a.uses_subgroups, b.uses_subgroups);
+            ASSERT_EQ(a.bindings.size(), b.bindings.size());
+            for (size_t i = 0; i < a.bindings.size(); ++i) {
+                EXPECT_EQ(a.bindings[i].kind, b.bindings[i].kind);
+                EXPECT_EQ(a.bindings[i].access, b.bindings[i].access);
+            }
+        }
+    EXPECT_EQ(found, 10);
+}
+
+TEST(PinholeCode, IsTakenForPinholesAlone) {
+    passes::PassCache cache(*device());
+    const auto module_of = [&](uint32_t lenses) {
+        passes::Constants variant{
+            {shared::SPEC_SH_DEGREE, 0}, {shared::SPEC_MODE, 0}, {shared::SPEC_KERNEL, 0}};
+        variant.push_back({shared::SPEC_LENSES, lenses});
+        return cache.get<passes::Update>(variant).pipeline.reflection().constants;
+    };
+    const auto has_lenses = [&](uint32_t lenses) {
+        const std::vector<uint32_t> constants = module_of(lenses);
+        return std::ranges::binary_search(constants, shared::SPEC_LENSES);
+    };
+    EXPECT_FALSE(has_lenses(shared::LENSES_PINHOLE));
+    EXPECT_TRUE(has_lenses(shared::LENSES_ANY));
+}
+
+}  // namespace
+}  // namespace ewa::test
