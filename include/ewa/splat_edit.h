@@ -30,7 +30,7 @@ void set_sh_degree(Gaussians& gaussians, int degree);
 
 /// Merges near splats until `target` of them are left, at least one. A merged splat has the mean, the covariance and the colour of
 /// the light that both take, and as much of that light as its opacity allows. Rounds merge the pairs of the least relative error.
-/// Splats that are not drawable are removed first. The same scene gives the same splats. O(n log n) in time; the memory beside
+/// Splats that are not drawable are removed first. The others come in about Morton order. The same scene gives the same splats. O(n log n) in time; the memory beside
 /// the scene is about 110 bytes a splat. progress: called with the number of splats that are left, after each round.
 void decimate_splats(Gaussians& gaussians, size_t target, const std::function<void(size_t)>& progress = {});
 

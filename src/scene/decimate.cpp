@@ -39,6 +39,9 @@ struct Shape {
     double opacity = 0, area = 0;   // area: the integral of all three Gaussians of peak 1
 
     double light() const { return opacity * area; }  // that it takes, without others before it
+    double square() const {
+        return area / 2;
+    }  // the overlap with itself: a Gaussian's square has half its integral
 };
 
 struct View {
@@ -112,13 +115,13 @@ struct Change {
 };
 
 Change change_of(const Shape& a, const Shape& b, double color) {
-    const double aa = overlap(a, a), bb = overlap(b, b), ab = overlap(a, b);
+    const double aa = a.square(), bb = b.square(), ab = overlap(a, b);
     const Merged merged = merge(a, b, ab);
     const Shape& m = merged.shape;
     const double oa = merged.kept * a.opacity, ob = merged.kept * b.opacity;
     const double both = oa * oa * aa + 2 * oa * ob * ab + ob * ob * bb;
-    const double opacity = both + m.opacity * m.opacity * overlap(m, m) -
-                           2 * m.opacity * (oa * overlap(a, m) + ob * overlap(b, m));
+    const double opacity =
+        both + m.opacity * m.opacity * m.square() - 2 * m.opacity * (oa * overlap(a, m) + ob * overlap(b, m));
     const double ca = (1 - merged.share) * a.opacity, cb = merged.share * b.opacity;
     const double colors = color * (ca * ca * aa - 2 * ca * cb * ab + cb * cb * bb);
     return {std::max(colors, 0.0) + kOpacityWeight * std::max(opacity, 0.0), both};
@@ -306,6 +309,24 @@ class Round {
     std::vector<Pair> pairs_;  // kBestOfThem of each splat
 };
 
+/// Moves the values of splat order[i] to splat i.
+void reorder(std::vector<float>& values, size_t stride, const std::vector<uint32_t>& order) {
+    std::vector<bool> moved(order.size());
+    std::vector<float> first(stride);
+    const auto at = [&](size_t i) { return values.begin() + std::ptrdiff_t(i * stride); };
+    for (size_t i = 0; i < order.size(); ++i) {
+        if (moved[i]) continue;
+        std::copy_n(at(i), stride, first.begin());
+        size_t to = i;
+        for (; order[to] != i; to = order[to]) {
+            std::copy_n(at(order[to]), stride, at(to));
+            moved[to] = true;
+        }
+        std::copy_n(first.begin(), stride, at(to));
+        moved[to] = true;
+    }
+}
+
 /// The splats must be drawable, with opacities of 3DGS's kernel.
 void merge_rounds(Gaussians& gaussians, size_t target, const scene::MergeTrace& trace,
                   const std::function<void(size_t)>& progress) {
@@ -326,15 +347,27 @@ void decimate_splats(Gaussians& gaussians, size_t target, const std::function<vo
     keep_splats(gaussians, kept);
     const bool density = gaussians.density;
     fit_opacities(gaussians, false);
+    scene::put_neighbors_together(gaussians);
     merge_rounds(gaussians, target, {}, progress);
     fit_opacities(gaussians, density);
 }
 
 namespace scene {
 
+void put_neighbors_together(Gaussians& gaussians) {
+    const std::vector<uint32_t> order = morton_order(gaussians);
+    const std::array<std::pair<std::vector<float>*, size_t>, 5> all = {
+        {{&gaussians.means, 3},
+         {&gaussians.quaternions, 4},
+         {&gaussians.log_scales, 3},
+         {&gaussians.opacity_logits, 1},
+         {&gaussians.sh, gaussians.sh_stride()}}};
+    core::on_all_cores(all.size(), [&](size_t k) { reorder(*all[k].first, all[k].second, order); });
+}
+
 double squared_light(const Gaussians& gaussians, size_t i) {
     const Shape shape = shape_at(gaussians, i, measured(gaussians, i));
-    return shape.opacity * shape.opacity * overlap(shape, shape);
+    return shape.opacity * shape.opacity * shape.square();
 }
 
 void decimate_traced(Gaussians& gaussians, size_t target, const MergeTrace& trace) {

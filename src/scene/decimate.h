@@ -19,12 +19,17 @@ struct MergeTrace {
     std::vector<float>* errors = nullptr;
 };
 
+/// Reorders the splats by morton_order in place, without memory for a copy. Merging millions of splats in random order takes 1.5 times
+/// as long, as neighbours are far apart in memory.
+void put_neighbors_together(Gaussians& gaussians);
+
 /// The squared opacity of splat i over three views along the axes, of parallel rays, in squared world units. The splat must be
 /// drawable, and its opacity that of 3DGS's kernel.
 double squared_light(const Gaussians& gaussians, size_t i);
 
-/// decimate_splats of splats that are drawable and have opacities of 3DGS's kernel. The error of a merge is the squared difference of
-/// the merged splat to both splats in these views: of their colours, and in part of their opacities.
+/// decimate_splats of splats that are drawable and have opacities of 3DGS's kernel. Those that are left keep their order. The error of
+/// a merge is the squared difference of the merged splat to both splats in these views: of their colours, and in part of their
+/// opacities.
 void decimate_traced(Gaussians& gaussians, size_t target, const MergeTrace& trace);
 
 }  // namespace ewa::scene

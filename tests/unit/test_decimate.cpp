@@ -201,7 +201,13 @@ TEST(DecimateTrace, ErrorsAreThoseOfTheImages) {
 }
 
 TEST(DecimateTrace, FollowsEachSplat) {
-    const Gaussians before = test::storable_splats(5, 4000, 0);
+    Gaussians before = test::storable_splats(5, 4000, 1);
+    Gaussians ordered = before;
+    select_splats(ordered, morton_order(before));
+    scene::put_neighbors_together(before);
+    EXPECT_EQ(before.means, ordered.means);
+    EXPECT_EQ(before.quaternions, ordered.quaternions);
+    EXPECT_EQ(before.sh, ordered.sh);
     Gaussians g = before;
     std::vector<uint32_t> into, second;
     std::vector<float> errors;

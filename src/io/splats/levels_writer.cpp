@@ -62,6 +62,7 @@ class LevelsWriter {
     }
 
     std::vector<std::string> write(Gaussians g) {
+        if (sizes_.size() > 1) scene::put_neighbors_together(g);
         nodes_ = build_tree(g, {.most = kMostOfALeaf, .longest = kLongestLeaf, .few = kFew});
         rows_.resize(nodes_.size());
         for (size_t level = 0; level < sizes_.size(); ++level) {

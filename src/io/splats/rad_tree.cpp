@@ -34,7 +34,9 @@ class Merged {
 class TreeOfLevels {
   public:
     TreeOfLevels(const Gaussians& gaussians, int levels) {
+        finest_ = morton_order(gaussians);
         Gaussians left = gaussians;
+        select_splats(left, finest_);
         const auto halve = [&](size_t target) {
             std::vector<uint32_t> into;
             scene::decimate_traced(left, target, {.into = &into});
@@ -68,12 +70,13 @@ class TreeOfLevels {
     void add(std::vector<std::vector<uint32_t>>& open, size_t level, uint32_t index) {
         while (level > 0 && merged_[level - 1].of(index).size() == 1) index = merged_[--level].of(index)[0];
         open[level].push_back(uint32_t(tree_.nodes.size()));
-        tree_.nodes.push_back({index, 0, 0, uint16_t(level)});
+        tree_.nodes.push_back({level == 0 ? finest_[index] : index, 0, 0, uint16_t(level)});
     }
 
     RadTree tree_;
-    std::vector<Merged> merged_;   // of each level from 1 on
-    std::vector<uint32_t> order_;  // of the root's children
+    std::vector<Merged> merged_;    // of each level from 1 on
+    std::vector<uint32_t> order_;   // of the root's children
+    std::vector<uint32_t> finest_;  // the scene's splats, in the order in which they are merged
 };
 
 }  // namespace
