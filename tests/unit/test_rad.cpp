@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Spark's .rad: what stays when it is written again, its ranges and trees, and damaged files. tests/cli/test_rad.py compares values with
 // another reader and writer.
+#include <glm/common.hpp>
 #include <nlohmann/json.hpp>
 
 #include "core/text.h"
@@ -91,6 +92,9 @@ TEST(Rad, TreesStandForTheScene) {
     EXPECT_EQ(tree.coarser[0].size(), 2500u);
     EXPECT_EQ(tree.coarser[3].size(), 313u);
     EXPECT_EQ(tree.coarser[4].size(), 1u);
+    const auto place_of = [&](const io::RadNode& node) {
+        return (node.level == 0 ? g : tree.coarser[node.level - 1u]).world_mean(node.index);
+    };
     std::vector<int> parents(tree.nodes.size());
     std::vector<uint32_t> leaves;
     size_t inner = 0;
@@ -100,11 +104,18 @@ TEST(Rad, TreesStandForTheScene) {
         if (node.child_count == 0) leaves.push_back(node.index);
         inner += node.child_count > 0;
         EXPECT_NE(node.child_count, 1) << i;
+        glm::dvec3 low(INFINITY), high(-INFINITY);
         for (size_t child = node.child_start; child < size_t(node.child_start) + node.child_count; ++child) {
             ASSERT_GT(child, i);
             ASSERT_LT(child, tree.nodes.size());
             EXPECT_LT(tree.nodes[child].level, node.level);
             ++parents[child];
+            low = glm::min(low, place_of(tree.nodes[child]));
+            high = glm::max(high, place_of(tree.nodes[child]));
+        }
+        for (int axis = 0; axis < 3 && node.child_count > 0; ++axis) {
+            EXPECT_GE(place_of(node)[axis], low[axis] - 1e-5);
+            EXPECT_LE(place_of(node)[axis], high[axis] + 1e-5);
         }
     }
     EXPECT_EQ(parents, [&] {
