@@ -147,24 +147,27 @@ TEST_F(Pictures, TheFocusIsOnASurfaceAndThatOfAnotherViewWhereThereIsNone) {
     g.log_scales = {-2, -2, -2, 0, 0, 0};
     g.quaternions = {1, 0, 0, 0, 1, 0, 0, 0};
     g.opacity_logits = {1, 4};
+    g.sh = {1.5f, 1.5f, 1.5f, -1.5f, -1.5f, -1.5f};
     save_splats(splats, g);
     const auto edge = [&](const Names& more) {
-        Names all{"--size", "90x60", "--mode", "alpha", "--aperture", "0.3", "--blur-samples", "16"};
+        Names all{"--size", "90x60", "--aperture", "1", "--blur-samples", "16"};
         all.insert(all.end(), more.begin(), more.end());
         return image("i.exr", all);
     };
-    EXPECT_LT(compare_images(edge({}), edge({"--focus", "3"})).max_error, 0.02);
+    const Image found = edge({});
+    EXPECT_LT(compare_images(found, edge({"--focus", "3"})).max_error, 0.02);
+    EXPECT_GT(compare_images(found, edge({"--focus", "4"})).max_error, 0.05);
 
     // Views of a batch whose middle is empty do not end it.
     place({{0, 0, 3}});
-    const auto view = [](double turn) {
+    const auto view = [](const char* name, double turn) {
         const double c = std::cos(turn), s = std::sin(turn);
         return nlohmann::json{
-            {"file_path", std::to_string(turn) + ".png"},
+            {"file_path", name},
             {"transform_matrix", {{c, 0, s, 0}, {0, -1, 0, 0}, {s, 0, -c, 0}, {0, 0, 0, 1}}}};
     };
     nlohmann::json dataset = {{"fl_x", 60}, {"fl_y", 60}, {"cx", 40}, {"cy", 30}, {"w", 80}, {"h", 60}};
-    dataset["frames"] = {view(0.3), view(0)};
+    dataset["frames"] = {view("a.png", 0.3), view("b.png", 0)};
     std::filesystem::create_directories(folder / "data");
     write_file(folder / "data/transforms.json", dataset.dump());
     expect_success(run_ewa({"render", splats, "--cameras", folder / "data", "--aperture", "0.3", "--quiet",
