@@ -40,8 +40,9 @@ struct RunOptions {
                        .sh_degree = kAutomaticShDegree,
                        .appearance = AppearanceModel::automatic,
                        .halvings = kAutomaticHalvings};
-    std::string init =
-        "sfm";  // first splats: "sfm" (the dataset's points), "random", or a file of splats or points
+    /// First splats: "sfm" (the dataset's points), "stereo" (points on whose depth the images agree), "random", or a file of
+    /// splats or points.
+    std::string init = "sfm";
     std::filesystem::path
         init_folder;  // that a relative file of `init` is relative to; empty: the current one
     DenseStart dense_start = DenseStart::automatic;  // of first splats that come from points

@@ -77,8 +77,8 @@ class Training {
         if (!given && !init.is_none() && !nb::isinstance<nb::str>(init))
             throw nb::type_error("init is neither Splats nor text");
         const std::string word = given ? "" : init.is_none() ? "sfm" : nb::cast<std::string>(init);
-        if (!given && word != "sfm" && word != "random")
-            throw InputError("init is neither splats nor \"sfm\" nor \"random\"");
+        if (!given && word != "sfm" && word != "stereo" && word != "random")
+            throw InputError("init is neither splats nor \"sfm\", \"stereo\" or \"random\"");
         start_.own_start = given;
         word_ = word;
         const DeviceWork work;

@@ -18,16 +18,23 @@ std::array<uint8_t, 3> color_of(const float* pixel) {
     return color;
 }
 
-/// At most `count` points of a frame, by the random numbers of `index`.
-void add_points(const Frame& frame, uint32_t count, uint64_t seed, uint32_t index, PointCloud& points) {
-    const Image image = load_frame_image(frame);
-    Image depths = load_depth_map(frame);
-    drop_masked(depths, image);
+std::vector<int> frames_with_maps(const Dataset& dataset, const std::vector<int>& frames) {
+    std::vector<int> mapped;
+    for (const int i : frames)
+        if (const Frame& f = dataset.frames[size_t(i)]; !f.depth_path.empty() && takes_depth_map(f))
+            mapped.push_back(i);
+    return mapped;
+}
+
+}  // namespace
+
+void add_points(const ImageWithDepths& from, uint32_t count, uint64_t seed, uint32_t index,
+                PointCloud& points) {
+    const auto& [camera, image, depths] = from;
     std::vector<uint32_t> pixels;
     for (size_t i = 0; i < depths.pixels.size(); ++i)
         if (depths.pixels[i] > 0) pixels.push_back(uint32_t(i));
     const uint32_t taken = uint32_t(std::min<size_t>(count, pixels.size()));
-    const Camera& camera = frame.camera;
     for (uint32_t k = 0; k < taken; ++k) {
         // One of each stretch of equal length, so that they cover the image evenly.
         const double share = core::uniform4({uint32_t(seed), uint32_t(seed >> 32), index, k})[0];
@@ -42,16 +49,6 @@ void add_points(const Frame& frame, uint32_t count, uint64_t seed, uint32_t inde
     }
 }
 
-std::vector<int> frames_with_maps(const Dataset& dataset, const std::vector<int>& frames) {
-    std::vector<int> mapped;
-    for (const int i : frames)
-        if (const Frame& f = dataset.frames[size_t(i)]; !f.depth_path.empty() && takes_depth_map(f))
-            mapped.push_back(i);
-    return mapped;
-}
-
-}  // namespace
-
 bool has_depth_maps(const Dataset& dataset, const std::vector<int>& frames) {
     return !frames_with_maps(dataset, frames).empty();
 }
@@ -62,7 +59,11 @@ PointCloud points_of_depth_maps(const Dataset& dataset, const std::vector<int>& 
     PointCloud points;
     for (size_t k = 0; k < mapped.size(); ++k) {
         const auto part = [&](size_t n) { return uint32_t(uint64_t(count) * n / mapped.size()); };
-        add_points(dataset.frames[size_t(mapped[k])], part(k + 1) - part(k), seed, uint32_t(k), points);
+        const Frame& frame = dataset.frames[size_t(mapped[k])];
+        const Image image = load_frame_image(frame);
+        Image depths = load_depth_map(frame);
+        drop_masked(depths, image);
+        add_points({frame.camera, image, depths}, part(k + 1) - part(k), seed, uint32_t(k), points);
     }
     return points;
 }

@@ -329,11 +329,13 @@ std::vector<Row> rows() {
         {"Quality", "", rolling_shutter_option()},
         {"Quality", "halvings", resolution_schedule_option()},
         {"Data", "",
-         words(
-             "init", "sfm|random|FILE",
-             "First splats. sfm: the dataset's points. Without, points of its depth maps, or random. random: "
-             "where the cameras look. FILE: a splat file, a PLY of points, or the folder of a run",
-             kDecides, [](RunOptions& o) -> std::string& { return o.init; })},
+         words("init", "sfm|stereo|random|FILE",
+               "First splats. sfm: the dataset's points. Without, points of its depth maps, or stereo, or "
+               "random. "
+               "stereo: points on whose depth the images agree. random: where the cameras look. FILE: a "
+               "splat file, "
+               "a PLY of points, or the folder of a run",
+               kDecides, [](RunOptions& o) -> std::string& { return o.init; })},
         {"Data", "dense_start", dense_start_option()},
         {"Data", "init_opacity",
          real(

@@ -23,6 +23,7 @@
 #include "run/depth_points.h"
 #include "run/pose_options.h"
 #include "run/region_option.h"
+#include "run/stereo_points.h"
 #include "scene/dense_points.h"
 #include "scene/lens.h"
 #include "scene/names.h"
@@ -177,18 +178,28 @@ std::optional<std::string> inria_remark(const Dataset& dataset) {
     return std::nullopt;
 }
 
-void add_remarks(RunInput& input) {
+/// What training starts from where the dataset has no points.
+const char* start_without_points(StartsFrom from) {
+    switch (from) {
+        case StartsFrom::depth_maps:
+            return "its depth maps";
+        case StartsFrom::stereo:
+            return "depths on which its images agree";
+        default:
+            return "random splats";
+    }
+}
+
+void add_remarks(RunInput& input, StartsFrom from) {
     const Dataset& dataset = input.dataset;
-    const bool measured = has_depth_maps(dataset, input.split.train);
     settle_depths(input);
     if (const auto remark = idle_ranks_remark(input.options.train, input.options.ranks->size()))
         input.remarks.push_back(*remark);
     if (input.without_view_dependence())
         input.notes.emplace_back("the dataset says that no colour depends on the view: SH degree 0");
     if (input.options.init == "sfm" && dataset.points.positions.empty())
-        input.remarks.emplace_back(measured
-                                       ? "the dataset has no points: training starts from its depth maps"
-                                       : "the dataset has no points: training starts from random splats");
+        input.remarks.push_back(std::string("the dataset has no points: training starts from ") +
+                                start_without_points(from));
     if (const size_t points = dataset.points.positions.size();
         input.options.init == "sfm" && points > 0 && input.start.size() > points)
         input.notes.push_back(
@@ -304,7 +315,11 @@ Gaussians splats_of(const PointCloud& points, const RunOptions& options, const D
 
 }  // namespace
 
-Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames) {
+Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames,
+                         StartsFrom* from) {
+    StartsFrom unused;
+    StartsFrom& source = from ? *from : unused;
+    source = options.init == "random" ? StartsFrom::random : StartsFrom::file;
     const int degree = options.train.sh_degree;
     const std::filesystem::path file = options.init_folder / options.init;
     Gaussians start;
@@ -317,20 +332,30 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
         PointCloud measured;
         if (dataset.points.positions.empty())
             measured = points_of_depth_maps(dataset, frames, first_splats(options), options.train.seed);
+        source = measured.positions.empty() ? StartsFrom::points : StartsFrom::depth_maps;
         const PointCloud& points = measured.positions.empty() ? dataset.points : measured;
         if (!points.positions.empty()) start = splats_of(points, options, dataset, frames);
     }
-    if (options.init == "random" || (options.init == "sfm" && start.size() == 0)) {
+    const bool chosen = options.init == "stereo";
+    if (chosen || (options.init == "sfm" && start.size() == 0)) {
+        const PointCloud points = points_by_stereo(dataset, frames, options.train.render.background,
+                                                   first_splats(options), options.train.seed);
+        if (chosen && points.positions.empty())
+            throw InputError("--init stereo: the images agree on no depths; --init random starts without");
+        source = points.positions.empty() ? StartsFrom::random : StartsFrom::stereo;
+        if (!points.positions.empty()) start = splats_of(points, options, dataset, frames);
+    }
+    if (source == StartsFrom::random) {
         refuse_dense_start(options, options.init == "random" ? "--init random" : "the dataset");
         start = random_gaussians(dataset, frames, int(first_splats(options)), options.train.seed, degree);
-    } else if (options.init != "sfm" && io::is_point_cloud(file)) {
+    } else if (source == StartsFrom::file && io::is_point_cloud(file)) {
         const io::PlyPoints cloud = io::read_points_ply(file);
         if (cloud.dropped.count > 0)
             throw InputError(
                 fmt::format("{}: a coordinate is not finite ({} such points in all); remove them",
                             cloud.dropped.first, cloud.dropped.count));
         start = splats_of(cloud.points, options, dataset, frames);
-    } else if (options.init != "sfm") {
+    } else if (source == StartsFrom::file) {
         refuse_dense_start(options, options.init);
         start = load_splats(file);
         set_sh_degree(start, degree);
@@ -361,7 +386,7 @@ void check_without_dataset(const RunOptions& options) {
         throw InputError("--test-every 1 holds every image out; none is left to train on");
     if (options.init == "random")
         refuse_dense_start(options, "--init random");
-    else if (options.init != "sfm" && !io::is_point_cloud(options.init))
+    else if (!starts_by_word(options.init) && !io::is_point_cloud(options.init))
         initial_splats(options, {}, {});
 }
 
@@ -404,9 +429,10 @@ RunInput load_run(const RunOptions& options) {
     train = resolve(train, input.dataset, input.split.train);
     train.render.sh_degree = train.sh_degree;
     input.options.output = output_folder(options);
-    input.start = initial_splats(input.options, input.dataset, input.split.train);
+    StartsFrom from;
+    input.start = initial_splats(input.options, input.dataset, input.split.train, &from);
     if (input.options.train.region) check_region(input.options.train, input.start);
-    add_remarks(input);
+    add_remarks(input, from);
     return input;
 }
 

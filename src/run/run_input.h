@@ -27,9 +27,19 @@ struct RunInput {
 /// Loads the dataset and the first splats. Throws InputError.
 RunInput load_run(const RunOptions& options);
 
+/// Whether RunOptions::init is a word, and not a file.
+inline bool starts_by_word(const std::string& init) {
+    return init == "sfm" || init == "stereo" || init == "random";
+}
+
+/// Where the first splats come from.
+enum class StartsFrom { points, depth_maps, stereo, random, file };
+
 /// The first splats that the options ask for. frames: indices of the training frames. options: with a concrete
-/// SH degree. Throws InputError (a point that is not finite, a splat file that cannot be read, too many splats).
-Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames);
+/// SH degree. from: tells where they come from. Throws InputError (a point that is not finite, a splat file or an image that
+/// cannot be read, too many splats, --init stereo of images that agree on no depths).
+Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames,
+                         StartsFrom* from = nullptr);
 
 /// Throws InputError for what is wrong with the options on every dataset, the files that they name included. For use before
 /// long work makes the dataset.

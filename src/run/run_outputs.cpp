@@ -24,7 +24,7 @@ const std::filesystem::path& checked_folder(const RunInput& input) {
     if (input.options.robust)
         for (const std::filesystem::path& file : mask_files(input))
             written.push_back({"the run's mask", file});
-    if (input.options.init != "sfm" && input.options.init != "random")
+    if (!starts_by_word(input.options.init))
         read.push_back({"--init", input.options.init_folder / input.options.init});
     read.push_back({"DATASET", input.options.scene});
     read.push_back({"--lpips-weights", input.options.lpips_weights});

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run/stereo_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "core/parallel.h"
+#include "run/depth_points.h"
+#include "run/run_input.h"
+#include "scene/frame_images.h"
+#include "scene/plane_sweep.h"
+
+namespace ewa::train {
+namespace {
+
+using scene::SweepPlanes;
+using scene::SweptDepths;
+using scene::SweptImage;
+
+constexpr size_t kMostViews = 96, kScoutViews = 16, kMostOthers = 4;
+constexpr double kPixels = 20000;  // of an image, about
+constexpr int kLeastSide = 64;     // px
+constexpr double kAngle = 0.12, kLeastAngle = 0.035, kMostAngle = 0.52;  // radians between two views of a point
+constexpr double kNearest = 8;  // largest inverse depth at first, times the distance of what the cameras look at
+constexpr float kClearScore = 0.8f, kLeastScore = 0.6f;
+constexpr double kAgreement = 0.015;  // of the inverse depth
+constexpr size_t kLeastPixels = 500;
+
+struct View {
+    SweptImage image;
+    Image color, weights;
+    double depth = 1;         // along the axis, of what the camera looks at
+    std::vector<int> others;  // views
+    SweptDepths found;
+};
+
+glm::dvec3 axis_of(const Camera& camera) {
+    return glm::transpose(camera.rotation) * glm::dvec3(0, 0, 1);
+}
+
+Image gray_of(const Image& color) {
+    Image gray(color.width, color.height, 1);
+    for (size_t i = 0; i < gray.pixels.size(); ++i)
+        gray.pixels[i] = (color.pixels[3 * i] + color.pixels[3 * i + 1] + color.pixels[3 * i + 2]) / 3;
+    return gray;
+}
+
+View view_of(const Frame& frame, const std::array<float, 3>& background) {
+    TrainingImage loaded = load_training_image(frame, background);
+    const double pixels = double(loaded.image.width) * loaded.image.height;
+    const int factor = std::max(1, int(std::lround(std::sqrt(pixels / kPixels))));
+    View view;
+    view.color = downscale(loaded.image, factor);
+    if (!loaded.weights.pixels.empty()) view.weights = downscale(loaded.weights, factor);
+    view.image = {gray_of(view.color), downscale(frame.camera, factor)};
+    return view;
+}
+
+/// In px; z is the depth.
+glm::dvec3 seen_at(const Camera& camera, const glm::dvec3& point) {
+    const glm::dvec3 p = camera.rotation * point + camera.translation;
+    return {camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy, p.z};
+}
+
+bool shows(const Camera& camera, const glm::dvec3& seen) {
+    return seen.z > 0 && seen.x >= 0 && seen.y >= 0 && seen.x < camera.width && seen.y < camera.height;
+}
+
+/// The views that see what view i looks at from about the angle that is best: a smaller one tells depths less exactly, and with a
+/// larger one things look different.
+std::vector<int> others_of(const std::vector<View>& views, size_t i) {
+    const Camera& own = views[i].image.camera;
+    const glm::dvec3 target = own.position() + views[i].depth * axis_of(own);
+    std::vector<std::pair<double, int>> ranked;
+    for (size_t j = 0; j < views.size(); ++j) {
+        const Camera& other = views[j].image.camera;
+        if (j == i || !shows(other, seen_at(other, target))) continue;
+        const glm::dvec3 a = own.position() - target, b = other.position() - target;
+        const double angle = std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+        if (angle < kLeastAngle || angle > kMostAngle) continue;
+        ranked.emplace_back(std::abs(std::log(angle / kAngle)), int(j));
+    }
+    std::ranges::sort(ranked);
+    std::vector<int> others;
+    for (size_t k = 0; k < std::min(ranked.size(), kMostOthers); ++k) others.push_back(ranked[k].second);
+    return others;
+}
+
+/// So many that a pixel moves by about one from plane to plane.
+SweepPlanes planes_for(const SweptImage& image, const std::vector<const SweptImage*>& others, double most) {
+    double farthest = 0;
+    for (const SweptImage* other : others)
+        farthest = std::max(farthest, glm::distance(other->camera.position(), image.camera.position()));
+    const double moved = most * farthest * std::max(image.camera.fx, image.camera.fy);
+    return {most, int(std::clamp(std::ceil(moved), 24.0, 192.0)) + 1};
+}
+
+SweptDepths sweep(const std::vector<View>& views, size_t i, double most) {
+    std::vector<const SweptImage*> others;
+    for (const int j : views[i].others) others.push_back(&views[size_t(j)].image);
+    if (others.empty()) return {};
+    return scene::sweep_planes(views[i].image, others, planes_for(views[i].image, others, most));
+}
+
+/// The median and the 97th percentile of depth / true depth, of some views; zeros if too few pixels tell.
+std::pair<double, double> scouted(const std::vector<View>& views) {
+    std::vector<View> small;
+    for (const View& view : views) {
+        View half;
+        half.image = {downscale(view.image.gray, 2), downscale(view.image.camera, 2)};
+        half.depth = view.depth;
+        half.others = view.others;
+        small.push_back(std::move(half));
+    }
+    const size_t count = std::min(small.size(), kScoutViews);
+    std::vector<SweptDepths> found(count);
+    core::on_all_cores(count, [&](size_t k) {
+        const size_t i = k * small.size() / count;
+        found[k] = sweep(small, i, kNearest / small[i].depth);
+    });
+    std::vector<double> ratios;
+    for (size_t k = 0; k < count; ++k)
+        for (size_t p = 0; p < found[k].score.size(); ++p)
+            if (found[k].score[p] > kClearScore)
+                ratios.push_back(double(found[k].inverse[p]) * small[k * small.size() / count].depth);
+    if (ratios.size() < kLeastPixels) return {0, 0};
+    std::ranges::sort(ratios);
+    return {ratios[ratios.size() / 2], ratios[ratios.size() * 97 / 100]};
+}
+
+/// The inverse depth at a place of view j, 0 without.
+double inverse_at(const View& view, const glm::dvec3& seen) {
+    if (view.found.inverse.empty()) return 0;
+    const size_t at = size_t(int(seen.y)) * size_t(view.color.width) + size_t(int(seen.x));
+    return view.found.score[at] >= kLeastScore ? double(view.found.inverse[at]) : 0;
+}
+
+/// The depths of view i that other views confirm; 0 elsewhere.
+Image confirmed_depths(const std::vector<View>& views, size_t i) {
+    const View& view = views[i];
+    const Camera& camera = view.image.camera;
+    Image depths(view.color.width, view.color.height, 1);
+    if (view.found.inverse.empty()) return depths;
+    for (int y = 0; y < depths.height; ++y)
+        for (int x = 0; x < depths.width; ++x) {
+            const size_t at = size_t(y) * size_t(depths.width) + size_t(x);
+            const double inverse = double(view.found.inverse[at]);
+            if (view.found.score[at] < kLeastScore || inverse <= 0) continue;
+            if (!view.weights.pixels.empty() && view.weights.pixels[at] < 0.5f) continue;
+            const glm::dvec3 ray((x + 0.5 - camera.cx) / camera.fx, (y + 0.5 - camera.cy) / camera.fy, 1);
+            const glm::dvec3 point = camera.position() + glm::transpose(camera.rotation) * (ray / inverse);
+            size_t agree = 0;
+            for (const int j : view.others) {
+                const View& other = views[size_t(j)];
+                const glm::dvec3 seen = seen_at(other.image.camera, point);
+                if (!shows(other.image.camera, seen)) continue;
+                agree += std::abs(inverse_at(other, seen) * seen.z - 1) <= kAgreement;
+            }
+            if (agree >= std::min<size_t>(2, view.others.size())) depths.pixels[at] = float(1 / inverse);
+        }
+    return depths;
+}
+
+std::vector<View> views_of(const Dataset& dataset, const std::vector<int>& frames,
+                           const std::array<float, 3>& background) {
+    std::vector<const Frame*> usable;
+    for (const Frame* frame : scene::frames_at(dataset, frames))
+        if (!frame->image_path.empty() && frame->camera.distortion.none() && !frame->camera.readout &&
+            std::min(frame->camera.width, frame->camera.height) >= kLeastSide)
+            usable.push_back(frame);
+    std::vector<View> views(std::min(usable.size(), kMostViews));
+    const auto frame_of = [&](size_t i) { return usable[i * usable.size() / views.size()]; };
+    core::on_all_cores(
+        views.size(), [&](size_t i) { views[i] = view_of(*frame_of(i), background); },
+        scene::images_at_once(usable));
+    const Sphere sphere = viewed_sphere(dataset, frames);
+    for (View& view : views) {
+        const Camera& camera = view.image.camera;
+        const double ahead = glm::dot(sphere.center - camera.position(), axis_of(camera));
+        view.depth = ahead > 0.5 * sphere.radius ? ahead : sphere.radius;
+    }
+    return views;
+}
+
+void choose_others(std::vector<View>& views) {
+    for (size_t i = 0; i < views.size(); ++i) views[i].others = others_of(views, i);
+}
+
+}  // namespace
+
+PointCloud points_by_stereo(const Dataset& dataset, const std::vector<int>& frames,
+                            const std::array<float, 3>& background, uint32_t count, uint64_t seed) {
+    std::vector<View> views = views_of(dataset, frames, background);
+    choose_others(views);
+    const auto [median, nearest] = scouted(views);
+    if (median <= 0) return {};
+    std::vector<double> most;
+    for (View& view : views) {
+        most.push_back(1.3 * nearest / view.depth);
+        view.depth /= median;
+    }
+    choose_others(views);
+    core::on_all_cores(views.size(), [&](size_t i) { views[i].found = sweep(views, i, most[i]); });
+    std::vector<Image> depths(views.size());
+    core::on_all_cores(views.size(), [&](size_t i) { depths[i] = confirmed_depths(views, i); });
+    PointCloud points;
+    for (size_t i = 0; i < views.size(); ++i) {
+        const auto part = [&](size_t n) { return uint32_t(uint64_t(count) * n / views.size()); };
+        add_points({views[i].image.camera, views[i].color, depths[i]}, part(i + 1) - part(i), seed, uint32_t(i),
+                   points);
+    }
+    return points;
+}
+
+}  // namespace ewa::train
