@@ -45,10 +45,6 @@ std::array<double, 4> uniform(uint64_t seed, uint32_t index, uint32_t use) {
     return core::uniform4({static_cast<uint32_t>(seed), static_cast<uint32_t>(seed >> 32), index, use});
 }
 
-glm::dvec3 viewing_direction(const Camera& camera) {
-    return glm::normalize(glm::transpose(camera.rotation) * glm::dvec3(0, 0, 1));
-}
-
 glm::dvec3 point_in_sphere(const Sphere& sphere, const std::array<double, 4>& u) {
     const double z = 2 * u[0] - 1;
     const double angle = 2 * std::numbers::pi * u[1];
@@ -229,39 +225,6 @@ void add_remarks(RunInput& input, StartsFrom from) {
 }
 
 }  // namespace
-
-Sphere viewed_sphere(const Dataset& dataset, const std::vector<int>& frames) {
-    glm::dvec3 mean(0.0);
-    for (const int i : frames) mean += dataset.frames[i].camera.position() / double(frames.size());
-
-    // The sum of squared distances from the axes is least where sum(I - d d^T) (p - o) = 0. Positions are
-    // relative to their mean, so a scene far from the origin loses no digits.
-    glm::dmat3 normal(0.0);
-    glm::dvec3 right(0.0);
-    for (const int i : frames) {
-        const glm::dvec3 d = viewing_direction(dataset.frames[i].camera);
-        const glm::dmat3 across = glm::dmat3(1.0) - glm::outerProduct(d, d);
-        normal += across;
-        right += across * (dataset.frames[i].camera.position() - mean);
-    }
-    const double count = double(frames.size());
-    // The determinant is near 0 if the axes are nearly parallel. Its largest value is 8/27 of the cubed count,
-    // for directions in all of space.
-    if (glm::determinant(normal) > 1e-4 * count * count * count) {
-        const glm::dvec3 offset = glm::inverse(normal) * right;
-        double distance = 0, towards = 0;
-        for (const int i : frames) {
-            const glm::dvec3 to_center = mean + offset - dataset.frames[i].camera.position();
-            distance += glm::length(to_center) / count;
-            towards += glm::dot(to_center, viewing_direction(dataset.frames[i].camera));
-        }
-        if (towards > 0.5 * distance * count) return {mean + offset, distance};
-    }
-    double farthest = 0;
-    for (const int i : frames)
-        farthest = std::max(farthest, glm::length(dataset.frames[i].camera.position() - mean));
-    return {mean, farthest > 0 ? 4 * farthest : 1};
-}
 
 Gaussians random_gaussians(const Dataset& dataset, const std::vector<int>& frames, int count, uint64_t seed,
                            int sh_degree) {

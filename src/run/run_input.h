@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "ewa/run_options.h"
+#include "run/viewed_sphere.h"
 
 namespace ewa::train {
 
@@ -48,17 +49,6 @@ void check_without_dataset(const RunOptions& options);
 /// Throws InputError if --downscale leaves too little of an image to learn from. factor: of --downscale. left: the part of it
 /// that is still to be applied to this size.
 void check_downscale(int factor, int left, int width, int height, const std::string& image);
-
-/// The sphere that the cameras look at. Its centre is the point nearest to all optical axes in the
-/// least-squares sense. Its radius is the mean distance of the cameras from it.
-/// There is no such point if the axes are parallel, and it is not seen if the cameras look away from it. Then
-/// the centre is the cameras' mean position, and the radius is four times the distance of the farthest camera
-/// from it (1 if all cameras coincide).
-struct Sphere {
-    glm::dvec3 center{0.0};  // world
-    double radius = 1;       // world units, positive
-};
-Sphere viewed_sphere(const Dataset& dataset, const std::vector<int>& frames);
 
 /// `count` splats, spread evenly over the part of viewed_sphere(frames) that lies in at least one frustum. If
 /// that part is too small to hit, a splat lies on a random ray of a camera, at most the sphere's radius away.

@@ -8,7 +8,7 @@
 
 #include "core/parallel.h"
 #include "run/depth_points.h"
-#include "run/run_input.h"
+#include "run/viewed_sphere.h"
 #include "scene/frame_images.h"
 #include "scene/plane_sweep.h"
 
@@ -22,8 +22,10 @@ using scene::SweptImage;
 constexpr size_t kMostViews = 96, kScoutViews = 16, kMostOthers = 4;
 constexpr double kPixels = 20000;  // of an image, about
 constexpr int kLeastSide = 64;     // px
-constexpr double kAngle = 0.12, kLeastAngle = 0.035, kMostAngle = 0.52;  // radians between two views of a point
-constexpr double kNearest = 8;  // largest inverse depth at first, times the distance of what the cameras look at
+constexpr double kAngle = 0.12, kLeastAngle = 0.035,
+                 kMostAngle = 0.52;  // radians between two views of a point
+constexpr double kNearest =
+    8;  // largest inverse depth at first, times the distance of what the cameras look at
 constexpr float kClearScore = 0.8f, kLeastScore = 0.6f;
 constexpr double kAgreement = 0.015;  // of the inverse depth
 constexpr size_t kLeastPixels = 500;
@@ -35,10 +37,6 @@ struct View {
     std::vector<int> others;  // views
     SweptDepths found;
 };
-
-glm::dvec3 axis_of(const Camera& camera) {
-    return glm::transpose(camera.rotation) * glm::dvec3(0, 0, 1);
-}
 
 Image gray_of(const Image& color) {
     Image gray(color.width, color.height, 1);
@@ -72,7 +70,7 @@ bool shows(const Camera& camera, const glm::dvec3& seen) {
 /// larger one things look different.
 std::vector<int> others_of(const std::vector<View>& views, size_t i) {
     const Camera& own = views[i].image.camera;
-    const glm::dvec3 target = own.position() + views[i].depth * axis_of(own);
+    const glm::dvec3 target = own.position() + views[i].depth * viewing_direction(own);
     std::vector<std::pair<double, int>> ranked;
     for (size_t j = 0; j < views.size(); ++j) {
         const Camera& other = views[j].image.camera;
@@ -178,7 +176,7 @@ std::vector<View> views_of(const Dataset& dataset, const std::vector<int>& frame
     const Sphere sphere = viewed_sphere(dataset, frames);
     for (View& view : views) {
         const Camera& camera = view.image.camera;
-        const double ahead = glm::dot(sphere.center - camera.position(), axis_of(camera));
+        const double ahead = glm::dot(sphere.center - camera.position(), viewing_direction(camera));
         view.depth = ahead > 0.5 * sphere.radius ? ahead : sphere.radius;
     }
     return views;
@@ -208,8 +206,8 @@ PointCloud points_by_stereo(const Dataset& dataset, const std::vector<int>& fram
     PointCloud points;
     for (size_t i = 0; i < views.size(); ++i) {
         const auto part = [&](size_t n) { return uint32_t(uint64_t(count) * n / views.size()); };
-        add_points({views[i].image.camera, views[i].color, depths[i]}, part(i + 1) - part(i), seed, uint32_t(i),
-                   points);
+        add_points({views[i].image.camera, views[i].color, depths[i]}, part(i + 1) - part(i), seed,
+                   uint32_t(i), points);
     }
     return points;
 }

@@ -46,7 +46,8 @@ void smooth(const Plane& scores, int width, int height, Plane& out) {
             int count = 0;
             for (int v = std::max(y - 1, 0); v <= std::min(y + 1, height - 1); ++v)
                 for (int u = std::max(x - 1, 0); u <= std::min(x + 1, width - 1); ++u)
-                    if (const float score = scores[size_t(v * width + u)]; score > kNone) sum += score, ++count;
+                    if (const float score = scores[size_t(v * width + u)]; score > kNone)
+                        sum += score, ++count;
             out[size_t(y * width + x)] = scores[size_t(y * width + x)] > kNone ? sum / float(count) : kNone;
         }
 }
@@ -80,7 +81,8 @@ class Warp {
                 v_[size_t(x)] = (first.y + t * across.y) * scale - 0.5f;
             }
             const size_t row = size_t(y) * size_t(width);
-            for (int x = 0; x < width; ++x) sample(u_[size_t(x)], v_[size_t(x)], values[row + size_t(x)], seen[row + size_t(x)]);
+            for (int x = 0; x < width; ++x)
+                sample(u_[size_t(x)], v_[size_t(x)], values[row + size_t(x)], seen[row + size_t(x)]);
         }
     }
 
@@ -102,8 +104,8 @@ class Warp {
 
     std::vector<float> u_, v_;  // of a row, px
     const Image& image_;
-    glm::dmat3 far_{1.0};     // pixels of the reference to those of the image, for a plane infinitely far away
-    glm::dvec3 near_{0.0};    // what a plane at the depth 1 adds
+    glm::dmat3 far_{1.0};   // pixels of the reference to those of the image, for a plane infinitely far away
+    glm::dvec3 near_{0.0};  // what a plane at the depth 1 adds
 };
 
 class Sweep {
@@ -158,8 +160,8 @@ class Sweep {
     int width_, height_;
     const Plane& own_;
     std::vector<Warp> warps_;
-    Plane own_sum_, own_spread_, values_, squares_, products_, sum_, square_sum_, product_sum_, best_, second_,
-        smoothed_, rows_;
+    Plane own_sum_, own_spread_, values_, squares_, products_, sum_, square_sum_, product_sum_, best_,
+        second_, smoothed_, rows_;
     std::vector<uint8_t> seen_;
 };
 
