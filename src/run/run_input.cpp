@@ -303,10 +303,14 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
     if (chosen || (options.init == "sfm" && start.size() == 0)) {
         const PointCloud points = points_by_stereo(dataset, frames, options.train.render.background,
                                                    first_splats(options), options.train.seed);
+        // Random splats fill any region. Points may all lie outside.
+        const bool enough = std::ranges::any_of(
+            points.positions, [&](const glm::dvec3& point) { return in_region(options.train, point); });
         if (chosen && points.positions.empty())
-            throw InputError("--init stereo: the images agree on no depths; --init random starts without");
-        source = points.positions.empty() ? StartsFrom::random : StartsFrom::stereo;
-        if (!points.positions.empty()) start = splats_of(points, options, dataset, frames);
+            throw InputError(
+                "--init stereo: the images agree on too few depths; --init random starts without");
+        source = chosen || enough ? StartsFrom::stereo : StartsFrom::random;
+        if (source == StartsFrom::stereo) start = splats_of(points, options, dataset, frames);
     }
     if (source == StartsFrom::random) {
         refuse_dense_start(options, options.init == "random" ? "--init random" : "the dataset");

@@ -28,13 +28,15 @@ constexpr double kNearest =
     8;  // largest inverse depth at first, times the distance of what the cameras look at
 constexpr float kClearScore = 0.8f, kLeastScore = 0.6f;
 constexpr double kAgreement = 0.015;  // of the inverse depth
-constexpr size_t kLeastPixels = 500;
+constexpr size_t kLeastPixels = 500, kLeastPoints = 1000;
+constexpr float kOpaque = 0.99f;
 
 struct View {
     SweptImage image;
-    Image color, weights;
-    double depth = 1;         // along the axis, of what the camera looks at
-    std::vector<int> others;  // views
+    Image color;
+    std::vector<uint8_t> counts;  // of each pixel, whether its depth does
+    double depth = 1;             // along the axis, of what the camera looks at
+    std::vector<int> others;      // views
     SweptDepths found;
 };
 
@@ -45,14 +47,18 @@ Image gray_of(const Image& color) {
     return gray;
 }
 
+/// A pixel that is partly masked or transparent does not count: its colour may be the background's.
 View view_of(const Frame& frame, const std::array<float, 3>& background) {
-    TrainingImage loaded = load_training_image(frame, background);
-    const double pixels = double(loaded.image.width) * loaded.image.height;
+    const Image loaded = load_frame_image(frame);
+    const double pixels = double(loaded.width) * loaded.height;
     const int factor = std::max(1, int(std::lround(std::sqrt(pixels / kPixels))));
+    const Image small = downscale(loaded, factor);
     View view;
-    view.color = downscale(loaded.image, factor);
-    if (!loaded.weights.pixels.empty()) view.weights = downscale(loaded.weights, factor);
+    view.color = over_background(small, background);
     view.image = {gray_of(view.color), downscale(frame.camera, factor)};
+    view.counts.assign(view.image.gray.pixels.size(), 1);
+    if (small.channels == 4)
+        for (size_t i = 0; i < view.counts.size(); ++i) view.counts[i] = small.pixels[4 * i + 3] > kOpaque;
     return view;
 }
 
@@ -99,7 +105,10 @@ SweptDepths sweep(const std::vector<View>& views, size_t i, double most) {
     std::vector<const SweptImage*> others;
     for (const int j : views[i].others) others.push_back(&views[size_t(j)].image);
     if (others.empty()) return {};
-    return scene::sweep_planes(views[i].image, others, planes_for(views[i].image, others, most));
+    SweptDepths found = scene::sweep_planes(views[i].image, others, planes_for(views[i].image, others, most));
+    for (size_t p = 0; p < found.score.size(); ++p)
+        if (!views[i].counts[p]) found.score[p] = -1;
+    return found;
 }
 
 /// The median and the 97th percentile of depth / true depth, of some views; zeros if too few pixels tell.
@@ -108,6 +117,9 @@ std::pair<double, double> scouted(const std::vector<View>& views) {
     for (const View& view : views) {
         View half;
         half.image = {downscale(view.image.gray, 2), downscale(view.image.camera, 2)};
+        const size_t width = size_t(half.image.gray.width);
+        for (size_t p = 0; p < half.image.gray.pixels.size(); ++p)
+            half.counts.push_back(view.counts[2 * (p / width) * size_t(view.color.width) + 2 * (p % width)]);
         half.depth = view.depth;
         half.others = view.others;
         small.push_back(std::move(half));
@@ -146,17 +158,17 @@ Image confirmed_depths(const std::vector<View>& views, size_t i) {
             const size_t at = size_t(y) * size_t(depths.width) + size_t(x);
             const double inverse = double(view.found.inverse[at]);
             if (view.found.score[at] < kLeastScore || inverse <= 0) continue;
-            if (!view.weights.pixels.empty() && view.weights.pixels[at] < 0.5f) continue;
             const glm::dvec3 ray((x + 0.5 - camera.cx) / camera.fx, (y + 0.5 - camera.cy) / camera.fy, 1);
             const glm::dvec3 point = camera.position() + glm::transpose(camera.rotation) * (ray / inverse);
-            size_t agree = 0;
+            size_t agree = 0, able = 0;
             for (const int j : view.others) {
                 const View& other = views[size_t(j)];
                 const glm::dvec3 seen = seen_at(other.image.camera, point);
-                if (!shows(other.image.camera, seen)) continue;
+                if (other.found.inverse.empty() || !shows(other.image.camera, seen)) continue;
+                ++able;
                 agree += std::abs(inverse_at(other, seen) * seen.z - 1) <= kAgreement;
             }
-            if (agree >= std::min<size_t>(2, view.others.size())) depths.pixels[at] = float(1 / inverse);
+            if (agree > 0 && agree >= std::min<size_t>(2, able)) depths.pixels[at] = float(1 / inverse);
         }
     return depths;
 }
@@ -186,6 +198,15 @@ void choose_others(std::vector<View>& views) {
     for (size_t i = 0; i < views.size(); ++i) views[i].others = others_of(views, i);
 }
 
+/// Pixels with a depth in the images before each, and in all of them last.
+std::vector<uint64_t> pixels_before(const std::vector<Image>& depths) {
+    std::vector<uint64_t> before{0};
+    for (const Image& each : depths)
+        before.push_back(before.back() +
+                         uint64_t(std::ranges::count_if(each.pixels, [](float z) { return z > 0; })));
+    return before;
+}
+
 }  // namespace
 
 PointCloud points_by_stereo(const Dataset& dataset, const std::vector<int>& frames,
@@ -203,9 +224,11 @@ PointCloud points_by_stereo(const Dataset& dataset, const std::vector<int>& fram
     core::on_all_cores(views.size(), [&](size_t i) { views[i].found = sweep(views, i, most[i]); });
     std::vector<Image> depths(views.size());
     core::on_all_cores(views.size(), [&](size_t i) { depths[i] = confirmed_depths(views, i); });
+    const std::vector<uint64_t> before = pixels_before(depths);
+    if (before.back() < kLeastPoints) return {};
     PointCloud points;
     for (size_t i = 0; i < views.size(); ++i) {
-        const auto part = [&](size_t n) { return uint32_t(uint64_t(count) * n / views.size()); };
+        const auto part = [&](size_t n) { return uint32_t(count * before[n] / before.back()); };
         add_points({views[i].image.camera, views[i].color, depths[i]}, part(i + 1) - part(i), seed,
                    uint32_t(i), points);
     }

@@ -16,7 +16,7 @@ constexpr float kNone = -1;
 
 using Plane = std::vector<float>;
 
-/// Sums over the windows round the pixels, of an image whose border pixels go on outwards. rows: scratch.
+/// Sums over the windows round the pixels, of an image whose border pixels continue outwards. rows: scratch.
 void window_sums(const Plane& values, int width, int height, Plane& rows, Plane& sums) {
     rows.resize(size_t(width));
     for (int y = 0; y < height; ++y) {

@@ -129,6 +129,9 @@ class StereoPoints : public testing::Test {
         }
         return dataset_;
     }
+    PointCloud points(const std::vector<int>& frames = {0, 1, 2, 3, 4, 5}) const {
+        return train::points_by_stereo(dataset_, frames, {}, 2000, 1);
+    }
     const std::vector<int> frames_{0, 1, 2, 3, 4, 5};
     TempFolder folder_;
     Dataset dataset_;
@@ -150,6 +153,46 @@ TEST_F(StereoPoints, LieOnTheWallInItsColours) {
     const PointCloud again = train::points_by_stereo(dataset_, frames_, {}, 2000, 1);
     EXPECT_EQ(again.positions, points.positions);
     EXPECT_NE(train::points_by_stereo(dataset_, frames_, {}, 2000, 2).positions, points.positions);
+}
+
+TEST_F(StereoPoints, NeedTwoImagesFromDifferentPlaces) {
+    photographed({1.8, 0.3});
+    const PointCloud two = points({0, 1});
+    ASSERT_GT(two.positions.size(), 1000u);
+    for (const glm::dvec3& p : two.positions) EXPECT_NEAR(p.z, 1.8 + 0.3 * p.x, 0.1);
+    EXPECT_TRUE(points({0}).positions.empty());
+    for (Frame& frame : dataset_.frames) frame.camera = camera_at(kPlaces[0]);
+    EXPECT_TRUE(points().positions.empty()) << "all from one place";
+}
+
+TEST_F(StereoPoints, LieWhereTheImagesAreOpaque) {
+    photographed({});
+    for (const Frame& frame : dataset_.frames) {
+        const Image color = load_image(frame.image_path);
+        Image alpha(kWidth, kHeight, 1);
+        for (int y = 0; y < kHeight; ++y)
+            for (int x = 0; x < kWidth; ++x) {
+                const glm::dvec3 ray((x + 0.5 - frame.camera.cx) / frame.camera.fx,
+                                     (y + 0.5 - frame.camera.cy) / frame.camera.fy, 1);
+                const glm::dvec3 at =
+                    Wall().hit(frame.camera.position(), glm::transpose(frame.camera.rotation) * ray);
+                *alpha.at(x, y) = at.x > 0 ? 1.0f : 0.0f;
+            }
+        save_image(frame.image_path, with_alpha(color, alpha));
+    }
+    const PointCloud opaque = points();
+    ASSERT_GT(opaque.positions.size(), 1000u);
+    for (const glm::dvec3& p : opaque.positions) EXPECT_GT(p.x, -0.01);
+}
+
+TEST_F(StereoPoints, AreTheSameFarFromTheOrigin) {
+    photographed({1.8, 0.3});
+    const PointCloud here = points();
+    const glm::dvec3 far(5e6, -4e6, 3e5);
+    for (Frame& frame : dataset_.frames) frame.camera.translation -= frame.camera.rotation * far;
+    const PointCloud there = points();
+    EXPECT_NEAR(double(there.positions.size()), double(here.positions.size()), 20);
+    for (const glm::dvec3& p : there.positions) EXPECT_NEAR(p.z - far.z, 1.8 + 0.3 * (p.x - far.x), 0.1);
 }
 
 TEST_F(StereoPoints, AreTheStartOfADatasetWithoutPoints) {
