@@ -253,3 +253,32 @@ class LevelsTest(unittest.TestCase):
         self.assertEqual(files, 8)
         self.assertEqual(near, 40)
         self.assertTrue(complete)
+
+    def test_a_lost_chunk_does_not_ask_for_more_than_the_device_takes(self):
+        row = self.ROW.replace("throw error", "failed = String(error)")
+        row = row.replace("open(file) {", 'open(file) { if (file === 0) return Promise.reject(new Error("gone"));')
+        loads, files, levels, failed = self.evaluated(row + """
+            let failed = "";
+            scene.miss = (file, chunk, error) => scene.lose(file, error);
+            const parts = await look(0);
+            return [scene.loads, new Set(parts.map(({chunk}) => chunk.file)).size, parts.length, failed];""", 30, 8, 100000)
+        self.assertEqual((loads, files, levels, failed), (0, 8, 8, ""))
+
+    def test_an_odd_first_chunk_is_the_one_that_is_left_out(self):
+        # Chunks 0 to 3, of which the first to come has another SH degree.
+        lost, complete, parts, failed = self.evaluated("""
+            const hurried = setTimeout;
+            window.setTimeout = (action, pause) => hurried(action, pause / 50);
+            const meta = {filenames: ["0", "1", "2", "3"], tree: {children: []}};
+            for (let i = 0; i < 4; ++i)
+                meta.tree.children.push({bound: {min: [i, 0, 0], max: [i + 1, 1, 1]}, lods: [{file: i, offset: 0, count: 10}]});
+            class Mixed extends m.LevelScene {
+                async decoded(file) { return {count: 10, degree: file === 0 ? 1 : 3, palette: {}, file}; }
+            }
+            let failed = "";
+            const gl = {getParameter: () => 4096};
+            const scene = new Mixed(gl, meta, "", 1000, () => {}, (error) => { failed = String(error); });
+            for (let i = 0; i < 200 && !(scene.lost.size > 0 && scene.complete()); ++i)
+                await new Promise((resolve) => hurried(resolve, 10));
+            return [[...scene.lost], scene.complete(), scene.shown().map(({chunk}) => chunk.file), failed];""")
+        self.assertEqual((lost, complete, parts, failed), ([0], True, [1, 2, 3], ""))

@@ -73,8 +73,8 @@ export class LevelScene {
         this.mostChunks = Math.min(gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS), Math.floor(gl.getParameter(gl.MAX_TEXTURE_SIZE) / 3));
         this.chunks = new Map();  // by file: {scene, used, failures, idle}; scene is null until it is loaded
         this.lost = new Set();    // files of chunks that were given up
+        this.degrees = new Map(); // of SH, by file, of the chunks that have any
         this.view = null;
-        this.degree = 0;
         this.loads = this.time = 0;
         this.chosen = this.suited();
         this.load();
@@ -127,21 +127,33 @@ export class LevelScene {
             this.chunks.set(file, chunk);
             chunk.idle = false;
             ++this.loads;
-            this.open(file).then((scene) => { chunk.scene = scene; }, (error) => this.miss(file, chunk, error)).then(() => {
-                --this.loads;
+            const missed = (error) => this.miss(file, chunk, error);
+            this.open(file).then((scene) => { chunk.scene = scene; }, missed).finally(() => { --this.loads; }).then(() => {
                 this.load();
                 if (chunk.scene || this.lost.has(file)) this.changed();
             }).catch(this.failed);
         }
     }
 
-    async open(file) {
+    async decoded(file) {
         const name = this.files[file], folder = this.folder + name.slice(0, name.lastIndexOf("/") + 1);
-        const scene = await decodeSog(this.gl, async (part) => new Uint8Array(await (await fetched(folder + part)).arrayBuffer()),
-                                      () => {});
-        if (scene.palette && this.degree > 0 && scene.degree !== this.degree)
-            throw new Error(`${name} differs in its SH degree from the chunks before it`);
-        this.degree = Math.max(this.degree, scene.degree);
+        return decodeSog(this.gl, async (part) => new Uint8Array(await (await fetched(folder + part)).arrayBuffer()), () => {});
+    }
+
+    /// Chunks on the screen have one SH degree: that of most chunks so far, and of the first where there are as many of another.
+    async open(file) {
+        const scene = await this.decoded(file);
+        if (!scene.palette) return scene;
+        this.degrees.set(file, scene.degree);
+        const counts = new Map(), error = (odd) => new Error(`${this.files[odd]} differs in its SH degree from other chunks`);
+        for (const degree of this.degrees.values()) counts.set(degree, (counts.get(degree) ?? 0) + 1);
+        const [degree] = [...counts].reduce((best, next) => (next[1] > best[1] ? next : best));
+        for (const [odd, chunk] of this.chunks) {
+            if (!chunk.scene?.palette || chunk.scene.degree === degree) continue;
+            chunk.scene = null;
+            this.lose(odd, error(odd));
+        }
+        if (scene.degree !== degree) throw error(file);
         return scene;
     }
 
@@ -155,14 +167,24 @@ export class LevelScene {
         }, pause);
     }
 
-    /// Goes on without a chunk: leaves have the levels of the others.
+    /// Goes on without a chunk: leaves have the levels of the others. Those that would need more coarsest chunks than the device takes
+    /// are left out.
     lose(file, error) {
         this.lost.add(file);
-        for (const {rows} of this.leaves) {
+        const coarsest = ({rows}) => rows[rows.length - 1]?.file, kept = [], moved = [];
+        for (const leaf of this.leaves) {
+            const {rows} = leaf, isMoved = coarsest(leaf) === file;
             rows.forEach((row, level) => { if (row.file === file) delete rows[level]; });
             while (rows.length > 0 && !rows[rows.length - 1]) --rows.length;
+            if (rows.length > 0) (isMoved ? moved : kept).push(leaf);
         }
-        this.leaves = this.leaves.filter(({rows}) => rows.length > 0);
+        const files = new Set(kept.map(coarsest));
+        for (const leaf of moved) {
+            if (files.size >= this.mostChunks && !files.has(coarsest(leaf))) continue;
+            files.add(coarsest(leaf));
+            kept.push(leaf);
+        }
+        this.leaves = kept;
         this.chosen = this.suited();
         if (this.leaves.length === 0) this.failed(error);
     }
