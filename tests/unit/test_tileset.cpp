@@ -11,6 +11,7 @@
 #include <glm/glm.hpp>
 #include <nlohmann/json.hpp>
 
+#include "core/folders.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 #include "support/splat_scenes.h"
@@ -203,6 +204,41 @@ TEST(Tileset, AnEarlierOneIsReplacedAtOnce) {
     write(folder, second, 1);
     EXPECT_TRUE(fs::exists(folder / "tiles"));
     EXPECT_FALSE(fs::exists(folder / "tiles-2"));
+}
+
+TEST(Tileset, TilesOfKilledProcessesAreRemoved) {
+    namespace fs = std::filesystem;
+    const test::TempFolder folder;
+    const Gaussians scene = test::storable_splats(6, 10, 0);
+    for (const char* name : {"tiles", "tiles-2", "tiles-3", "tiles-4", "tiles-5", "tiles-old"}) {
+        fs::create_directories(folder / name);
+        std::ofstream(folder / name / "0_0.glb") << "left";
+    }
+    std::ofstream(folder / "tiles-3/mine.txt") << "somebody's";
+    std::ofstream(folder / "kept.json") << R"({"root": {"content": {"uri": "tiles-4/0_0.glb"}}})";
+    {
+        const core::FolderLock used(folder / "tiles-5");
+        write(folder, scene, 1);
+    }
+    for (const char* name : {"tiles", "tiles-2"}) EXPECT_FALSE(fs::exists(folder / name)) << name;
+    for (const char* name : {"tiles-3", "tiles-4", "tiles-5", "tiles-6", "tiles-old"})
+        EXPECT_TRUE(fs::exists(folder / name)) << name;
+    write(folder, scene, 1);
+    EXPECT_TRUE(fs::exists(folder / "tiles/0_0.glb"));
+    for (const char* name : {"tiles-5", "tiles-6"}) EXPECT_FALSE(fs::exists(folder / name)) << name;
+}
+
+TEST(Tileset, FindsTheTilesOfAVeryLargeOne) {
+    const test::TempFolder folder;
+    std::filesystem::create_directories(folder / "tiles");
+    std::ofstream(folder / "tiles/0_0.glb") << "a tile";
+    // Objects and values of 200,000 tiles.
+    std::string text = R"({"root": {"children": [)";
+    for (int i = 0; i < 1'200'000; ++i) text += "{},";
+    text += R"({"content": {"uri": "tiles/0_0.glb"}, "transform": [)";
+    for (int i = 0; i < 4'300'000; ++i) text += "0,";
+    std::ofstream(folder / "tileset.json") << text + "0]}]}}";
+    EXPECT_EQ(io::tile_files(folder / "tileset.json").size(), 1u);
 }
 
 TEST(Tileset, LeavesFilesOfOthersAlone) {

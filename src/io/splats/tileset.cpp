@@ -7,6 +7,8 @@
 #include <glm/glm.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
 
 #include "core/atomic_file.h"
 #include "core/folders.h"
@@ -28,7 +30,13 @@ constexpr size_t kMostOfATile = 100'000, kFewestOfATile = 1'000;
 constexpr double kReach = 3;  // standard deviations that viewers draw; they cull by the box
 constexpr int kDeepest = 31;
 constexpr const char* kFolder = "tiles";
-constexpr core::JsonLimits kTilesetLimits = {.depth = 512};
+/// write_tileset makes so many of half a billion splats. Each tile has two objects besides its box, and fewer than 24 values.
+constexpr size_t kMostTiles = size_t(1) << 20;
+constexpr core::JsonLimits kTilesetLimits = {.bytes = uint64_t(4096) * kMostTiles,
+                                             .depth = 512,
+                                             .objects = 2 * kMostTiles + 1024,
+                                             .values = 24 * kMostTiles + 1024,
+                                             .skipped = "boundingVolume"};
 /// CesiumJS replaces a tile whose error covers more than 16 px. Splats that are 2 px wide then suffice.
 constexpr double kErrorPerWidth = 8;
 
@@ -80,7 +88,10 @@ class NewFolder {
             if (number > 1) name_.append("-").append(std::to_string(number));
             path_ = above / name_;
             std::error_code error;
-            if (std::filesystem::create_directory(path_, error)) return;
+            if (std::filesystem::create_directory(path_, error)) {
+                lock_.emplace(path_);
+                return;
+            }
             if (error && error != std::errc::file_exists)
                 throw RunError("cannot make the folder " + path_.string() + ": " + error.message());
         }
@@ -98,8 +109,43 @@ class NewFolder {
   private:
     std::string name_;
     std::filesystem::path path_;
+    std::optional<core::FolderLock> lock_;  // tells other processes that it is in use
     bool kept_ = false;
 };
+
+/// Whether a folder has tiles alone that write_tileset has made.
+bool is_own_tile_folder(const std::filesystem::path& folder) {
+    std::error_code error;
+    if (std::filesystem::symlink_status(folder, error).type() != std::filesystem::file_type::directory)
+        return false;
+    std::filesystem::directory_iterator entries(folder, error);
+    return !error && std::all_of(begin(entries), end(entries), [&](const auto& entry) {
+        return entry.is_regular_file(error) && is_own_tile(entry.path(), folder.parent_path());
+    });
+}
+
+/// Removes the folders of tiles that killed processes left beside the tileset, unless a .json there names them. own: its folder's name.
+void remove_abandoned_tiles(const std::filesystem::path& above, const std::string& own) {
+    std::vector<std::filesystem::path> folders, texts;
+    std::error_code ignored;
+    for (const auto& entry : std::filesystem::directory_iterator(above.empty() ? "." : above, ignored)) {
+        const std::filesystem::path path = above / entry.path().filename();
+        if (path.extension() == ".json") texts.push_back(path);
+        if (path.filename() == own || !names_tile_folder(path.filename().string())) continue;
+        core::remove_abandoned_files(path);
+        if (is_own_tile_folder(path)) folders.push_back(path);
+    }
+    if (folders.empty()) return;
+    std::set<std::filesystem::path> named;
+    for (const std::filesystem::path& text : texts)
+        for (const std::filesystem::path& tile : tile_files(text)) named.insert(tile.parent_path());
+    for (const std::filesystem::path& folder : folders) try {
+            if (named.contains(folder)) continue;
+            const core::FolderLock unused(folder);
+            std::filesystem::remove_all(folder, ignored);
+        } catch (const RunError&) {  // another process writes it
+        }
+}
 
 class TilesetWriter {
   public:
@@ -148,6 +194,7 @@ class TilesetWriter {
             std::filesystem::remove(tile, ignored);
             std::filesystem::remove(tile.parent_path(), ignored);  // works once it is empty
         }
+        remove_abandoned_tiles(path_.parent_path(), folder_.name());
     }
 
     void plan(const Gaussians& g) {

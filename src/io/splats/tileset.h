@@ -38,8 +38,9 @@ struct TilesetOptions {
     std::optional<glm::dmat4> earth;
 };
 
-/// Writes the tiles, then the tileset.json, and removes the tiles of the one that it replaced. Returns a line for each thing that the format does not store. Throws InputError for a
-/// scene without splats, RunError. The same scene gives the same bytes. Splats must be drawable, with opacities of 3DGS's kernel.
+/// Writes the tiles, then the tileset.json. Removes the tiles of the one that it replaced, and those that killed processes left beside it.
+/// Returns a line for each thing that the format does not store. Throws InputError for a scene without splats, RunError.
+/// The same scene gives the same bytes. Splats must be drawable, with opacities of 3DGS's kernel.
 std::vector<std::string> write_tileset(const std::filesystem::path& path, Gaussians gaussians,
                                        const TilesetOptions& options);
 
