@@ -81,6 +81,11 @@ uint64_t RenderThread::ask_point(const Camera& camera, const glm::dvec2& pixel, 
     return probes_;
 }
 
+void RenderThread::forget_points() {
+    const std::lock_guard lock(mutex_);
+    probes_waiting_.clear();
+}
+
 uint64_t RenderThread::ask_full(const Camera& camera, const Look& look) {
     const std::lock_guard lock(mutex_);
     next_.full = Full{camera, look, ++fulls_};

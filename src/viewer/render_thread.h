@@ -83,6 +83,9 @@ class RenderThread {
     /// measure are all answered, at full resolution, which takes a frame's time. A point to look at replaces a waiting one.
     uint64_t ask_point(const Camera& camera, const glm::dvec2& pixel, PointUse use);
 
+    /// Points that wait are not answered. That which is read just now is.
+    void forget_points();
+
     /// Asks for the colours of a camera at its own size. News::full has them once its number is the returned one. Only
     /// the last of several waiting requests is answered.
     uint64_t ask_full(const Camera& camera, const Look& look);

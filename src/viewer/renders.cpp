@@ -136,6 +136,11 @@ void Renders::ask_point(const Camera& camera, const glm::dvec2& pixel, PointUse 
     points_asked_ = thread_.ask_point(camera, pixel, use);
 }
 
+void Renders::forget_points() {
+    thread_.forget_points();
+    points_forgotten_ = points_asked_;
+}
+
 Renders::News Renders::take() {
     News news{thread_.take_news()};
     if (!news.points.empty()) points_ = news.points.back().number;
@@ -151,7 +156,8 @@ Renders::News Renders::take() {
 
 bool Renders::settled() const {
     return shown_ && shown_->request.serial == asked_.serial && shown_->request.divisor == 1 &&
-           !shown_->request.coarse && shown_->scene == scene_ && points_ == points_asked_;
+           !shown_->request.coarse && shown_->scene == scene_ &&
+           std::max(points_, points_forgotten_) == points_asked_;
 }
 
 }  // namespace ewa::viewer

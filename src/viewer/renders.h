@@ -88,7 +88,7 @@ class Renders {
     /// Asks for the point under a pixel, as RenderThread::ask_point(); News::points has the answer.
     void ask_point(const Camera& camera, const glm::dvec2& pixel, PointUse use);
     /// News has no answers to what was asked before.
-    void forget_points() { points_forgotten_ = points_asked_; }
+    void forget_points();
 
     /// Asks for the colours of a camera at its own size, as RenderThread::ask_full().
     uint64_t ask_full(const Camera& camera, const Look& look) { return thread_.ask_full(camera, look); }

@@ -121,6 +121,28 @@ TEST(RenderThread, AnswersAllPointsToMeasure) {
     }
 }
 
+/// Each point takes a render, which nobody waits for once measuring ends.
+TEST(RenderThread, ForgetsPointsThatWait) {
+    std::promise<void> opening, opened;
+    RenderThread thread(
+        [&] {
+            opening.set_value();
+            opened.get_future().wait();
+            return open_device({});
+        },
+        [] {});
+    thread.set_scene(red_splat());
+    opening.get_future().wait();
+    const Camera camera = request(0).camera;
+    for (int i = 0; i < 3; ++i) thread.ask_point(camera, {20.5, 15.5}, PointUse::measure);
+    thread.forget_points();
+    const uint64_t last = thread.ask_point(camera, {20.5, 15.5}, PointUse::measure);
+    opened.set_value();
+    const std::vector<SurfacePoint> points = points_of(thread, last);
+    ASSERT_EQ(points.size(), 1u);
+    EXPECT_EQ(points[0].number, last);
+}
+
 /// Answers to what was asked of an earlier scene must not count in the next.
 TEST(Renders, ForgetPoints) {
     std::promise<void> opened;
@@ -144,6 +166,9 @@ TEST(Renders, ForgetPoints) {
     }));
     ASSERT_EQ(points.size(), 1u);
     EXPECT_EQ(points[0].number, 2u);
+    for (int i = 0; i < 3; ++i) renders.ask_point(camera, {20.5, 15.5}, PointUse::measure);
+    renders.forget_points();
+    EXPECT_TRUE(renders.settled()) << "no answer is awaited";
 }
 
 TEST(RenderThread, FitsOpacitiesToTheKernel) {
