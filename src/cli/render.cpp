@@ -256,6 +256,8 @@ int render_free_views(RenderArguments arguments) {
     }
     const ViewPath views = views_of(arguments.views, gaussians, hints_of(dataset),
                                     arguments.contact_sheet ? ViewsOutput::folder : output);
+    if (arguments.picture.shutter > 0 && !views.at)
+        throw InputError("--shutter: there is no motion; the film has one frame");
     if (output == ViewsOutput::folder) {
         files.clear();
         for (size_t i = 0; i < views.cameras.size(); ++i)

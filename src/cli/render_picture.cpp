@@ -158,9 +158,8 @@ Rendering PictureTaker::averaged(size_t i, double eye, double focus) {
     const bool linear = !arguments_.transparent;
     Rendering sum;
     for (int k = 0; k < count; ++k) {
-        Camera camera = arguments_.shutter > 0 && views_.at
-                            ? views_.at(double(i) + arguments_.shutter * scene::even_share(k))
-                            : view;
+        Camera camera =
+            arguments_.shutter > 0 ? views_.at(double(i) + arguments_.shutter * scene::even_share(k)) : view;
         const glm::dvec2 place = 0.5 * arguments_.aperture * scene::disc_point(k, count);
         if (arguments_.aperture > 0 || eye != 0)
             camera = scene::moved_eye(camera, place + glm::dvec2(eye, 0), focus);

@@ -36,7 +36,7 @@ void check_picture(const PictureArguments& arguments, const std::string& mode, b
 /// Takes pictures of views. It keeps the distance of focus that it has found for the first of a path.
 class PictureTaker {
   public:
-    /// kernel: of the renderer's options.
+    /// kernel: of the renderer's options. views: moments of one motion for a shutter.
     PictureTaker(const PictureArguments& arguments, Renderer& renderer, Drawing drawing, Footprint kernel,
                  ViewPath views)
         : arguments_(arguments),

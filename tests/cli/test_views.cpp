@@ -234,6 +234,11 @@ TEST_F(Views, LookAtIsTheSameAsASavedView) {
     expect_success(render({"--views", views, "--film-seconds", "0.1", "-o", folder / "blurred", "--shutter",
                            "1", "--blur-samples", "2"}));
     EXPECT_FALSE(same_pixels(folder / "blurred/00003.png", folder / "film/00003.png"));
+    // A film of one view stands still.
+    io::write_views(views, {io::read_views(views)[0]});
+    expect_failure(
+        render({"--views", views, "--film-seconds", "0.1", "-o", folder / "one", "--shutter", "1"}), 2,
+        "no motion");
 }
 
 TEST_F(Views, AFilmGoesToFfmpegFrameByFrame) {
