@@ -67,10 +67,10 @@ SceneSize scene_size(const Gaussians& gaussians) {
 }
 
 std::string described(const fs::path& path, std::string_view format, const std::string& variant,
-                      const SceneSize& size) {
+                      const SceneSize& size, uint64_t bytes) {
     return fmt::format("{}: {}{}, {} splats of SH degree {}, {}", core::one_line(path.string()), format,
                        variant.empty() ? "" : " (" + variant + ")", size.splats, size.sh_degree,
-                       core::bytes_text(fs::file_size(path)));
+                       core::bytes_text(bytes));
 }
 
 /// Adds splats in place of the sky of the file's run.
@@ -94,7 +94,8 @@ Work read_all(const ConvertArguments& arguments) {
         place_splats(scene.gaussians, arguments.placements.at(i), path.string());
         if (!arguments.quiet)
             fmt::print("{}\n",
-                       described(path, name_of(scene.format), scene.variant, scene_size(scene.gaussians)));
+                       described(path, name_of(scene.format), scene.variant, scene_size(scene.gaussians),
+                                 fs::file_size(path) + bytes_of(values_of(path))));
         work.inputs.push_back({{"file", path.string()},
                                {"format", name_of(scene.format)},
                                {"splats", scene.gaussians.size()},
@@ -276,7 +277,7 @@ int run(const ConvertArguments& arguments) {
     remarks.insert(remarks.end(), quantised.begin(), quantised.end());
 
     if (!arguments.quiet) {
-        fmt::print("{}\n", described(out, format_text(out), "", size));
+        fmt::print("{}\n", described(out, format_text(out), "", size, fs::file_size(out)));
         const std::vector<fs::path> values = parts_of(out, arguments.unbundled);
         if (!values.empty())
             fmt::print("{}{}: the values of this {}, {}\n", core::one_line(values[0].string()),

@@ -329,6 +329,15 @@ class RadTest(unittest.TestCase):
         (self.folder / "1-2.radc").unlink()
         self.assertIn("1-2.radc", run("info", self.folder / "1.rad", status=2))
 
+    def test_chunk_files_belong_to_their_input(self):
+        write_rad(self.folder / "s.rad", self.rows, PLAIN, chunk_size=150, files=True)
+        chunk = self.folder / "s-0.radc"
+        before = chunk.read_bytes()
+        self.assertIn("values of an input", run("convert", self.folder / "s.rad", self.folder / "b.ply", "--json", chunk, status=2))
+        self.assertEqual(chunk.read_bytes(), before)
+        size = sum(file.stat().st_size for file in self.folder.glob("s*.rad*"))
+        self.assertIn(f", {size / 1000:.3g} kB\n", run("convert", self.folder / "s.rad", self.folder / "b.ply"))
+
     def test_the_leaves_of_a_tree_are_the_scene(self):
         rows = self.rows[:6]
         tree = [(2, 1), (0, 0), (3, 3), (0, 0), (0, 0), (0, 0)]

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Spark's .rad: what stays when it is written again, its ranges and trees, and damaged files. tests/cli/test_rad.py compares values with
 // another reader and writer.
+#include <cmath>
+#include <fstream>
 #include <glm/common.hpp>
 #include <nlohmann/json.hpp>
 
@@ -153,6 +155,44 @@ TEST(Rad, SmallTrees) {
     save_splats(folder / "a.rad", test::storable_splats(1, 70'000, 0), SaveOptions{.levels = 2});
     EXPECT_EQ(load_splats(folder / "a.rad").size(), 70'000u);
     EXPECT_EQ(head_at(file_bytes(folder / "a.rad"), 0).first["chunks"].size(), 2u);
+}
+
+/// The opacity of parents may be above 1, that of leaves becomes 1.
+TEST(Rad, LeavesThatAreTooOpaqueAreTold) {
+    const TempFolder folder;
+    save_splats(folder / "a.rad", test::storable_splats(4, 500, 0), SaveOptions{.levels = 3});
+    const std::string whole = file_bytes(folder / "a.rad");
+    const auto [head, begin] = head_at(whole, 0);
+    auto [chunk, payload] = head_at(whole, begin);
+    const auto alpha = std::ranges::find(chunk["properties"], json("alpha"),
+                                         [](const json& property) { return property["property"]; });
+    ASSERT_EQ((*alpha)["encoding"], "r8");
+    const double limit = 25.5 / 255 * (*alpha)["max"].get<double>();
+    size_t expected = 0;
+    for (const float logit : load_splats(folder / "a.rad").opacity_logits)
+        expected += 1 / (1 + std::exp(-double(logit))) > limit;
+    ASSERT_TRUE(expected > 0 && expected < 500);
+    (*alpha)["max"] = 10;
+    folder.write("b.rad", whole.substr(0, begin) + with_head("RADC", chunk) + whole.substr(payload));
+    EXPECT_EQ(read_splats(folder / "b.rad").remarks,
+              std::vector{"the opacity of " + std::to_string(expected) + " splats above 1 becomes 1"});
+}
+
+/// The same bytes must not let a file claim more splats each time that a chunk names them.
+TEST(Rad, ChunksThatNameOneFileCountItOnce) {
+    const TempFolder folder;
+    std::ofstream(folder / "big.radc") << std::string(200'000, 'x');
+    json head = {{"version", 1},      {"type", "gsplat"}, {"count", 10'000'000},
+                 {"chunkSize", 1000}, {"maxSh", 0},       {"chunks", json::array()}};
+    const char* names[] = {"a.rad", "big.radc", "./big.radc"};
+    for (size_t i = 0; i < 10'000; ++i) head["chunks"].push_back({{"offset", 0}, {"filename", names[i % 3]}});
+    folder.write("a.rad", with_head("RAD0", head));
+    expect_error<InputError>([&] { read_splats(folder / "a.rad"); }, {"claims 10000000 splats"});
+    // A chunk's own size limits it too.
+    std::ofstream(folder / "big.radc") << std::string(20'000'000, 'x');
+    for (json& chunk : head["chunks"]) chunk["bytes"] = 9;
+    folder.write("a.rad", with_head("RAD0", head));
+    expect_error<InputError>([&] { read_splats(folder / "a.rad"); }, {"claims 10000000 splats"});
 }
 
 TEST(Rad, DamagedFilesAreErrorsOfOneLine) {

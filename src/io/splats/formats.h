@@ -149,6 +149,9 @@ std::vector<std::filesystem::path> level_files(const std::filesystem::path& path
 /// file's folder.
 SplatScene read_rad(const std::filesystem::path& path);
 
+/// The files besides itself that an existing .rad has chunks in. Empty if it cannot be read.
+std::vector<std::filesystem::path> rad_files(const std::filesystem::path& path);
+
 /// Writes the splats in Morton order; with options.levels above 1 a tree over them, which takes memory for three copies of the
 /// scene. Positions are kept exactly. The same scene gives the same bytes.
 std::vector<std::string> write_rad(const std::filesystem::path& path, const Gaussians& gaussians,

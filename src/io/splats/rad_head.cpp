@@ -120,6 +120,7 @@ RadChunkPlace place_of(const core::FileReader& reader, const json& value,
     const Object object(reader, value, "\"chunks\"");
     RadChunkPlace place;
     place.offset = object.whole("offset", UINT64_MAX / 4);
+    place.bytes = object.whole("bytes", UINT64_MAX - 1, UINT64_MAX);
     if (!object.find("filename")) {
         place.offset += reader.offset();
         return place;

@@ -16,7 +16,8 @@
 namespace ewa::io {
 
 struct RadChunkPlace {
-    uint64_t offset = 0;  // in the file
+    uint64_t offset = 0;          // in the file
+    uint64_t bytes = UINT64_MAX;  // UINT64_MAX: unknown
     std::optional<std::filesystem::path>
         file;  // of the chunk alone; relative to the folder of the .rad, and inside it
 };

@@ -2,7 +2,10 @@
 // Reads Spark's .rad, whose layout rad.h describes.
 #include <array>
 #include <cmath>
+#include <map>
+#include <set>
 
+#include "core/folders.h"
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/splat_edit.h"
@@ -26,13 +29,16 @@ constexpr size_t kMostComments = 1000;
 class RadReader {
   public:
     explicit RadReader(const std::filesystem::path& path)
-        : folder_(path.parent_path()), reader_(path), head_(read_rad_head(reader_, folder_)) {}
+        : folder_(path.parent_path()),
+          reader_(path),
+          head_(read_rad_head(reader_, folder_)),
+          all_bytes_(bytes_of_chunks(path)) {}
 
     SplatScene read() {
         Gaussians& g = scene_.gaussians;
         scene_.format = SplatFormat::rad;
         scene_.file_sh_degree = g.sh_degree = head_.sh_degree;
-        require_memory(reader_.name(), all_bytes(), head_.count, g.sh_degree, kPackedExpansion);
+        require_memory(reader_.name(), all_bytes_, head_.count, g.sh_degree, kPackedExpansion);
         g.resize(size_t(head_.count));
         if (head_.tree) nodes_.resize(g.size());
         for (size_t index = 0; index < head_.chunks.size(); ++index) {
@@ -47,21 +53,34 @@ class RadReader {
         if (head_.tree) keep_leaves();
         add_comments();
         take_marks(scene_);
-        if (brighter_ > 0)
-            scene_.remarks.push_back("the opacity of " + core::counted(brighter_, "splat") +
+        if (!brighter_.empty())
+            scene_.remarks.push_back("the opacity of " + core::counted(brighter_.size(), "splat") +
                                      " above 1 becomes 1");
         return std::move(scene_);
     }
 
   private:
-    uint64_t all_bytes() const {
-        uint64_t bytes = reader_.size();
+    /// The bytes of all chunks. Those that several chunks claim count once, as many chunks may name one file.
+    uint64_t bytes_of_chunks(const std::filesystem::path& path) const {
+        struct File {
+            uint64_t size = 0, used = 0;
+        };
+        std::map<std::filesystem::path, File> files;  // by their paths without links
+        std::map<std::optional<std::filesystem::path>, File*> named;
         for (const RadChunkPlace& place : head_.chunks) {
-            std::error_code error;
-            if (!place.file) continue;
-            const uint64_t size = std::filesystem::file_size(folder_ / *place.file, error);
-            if (!error) bytes += size;
+            File*& file = named[place.file];
+            if (!file) {
+                std::error_code error;
+                const std::filesystem::path found = place.file ? folder_ / *place.file : path;
+                file = &files[std::filesystem::weakly_canonical(found, error)];
+                file->size = place.file ? std::filesystem::file_size(found, error) : reader_.size();
+                if (place.file && error) file->size = 0;  // it is an error once it is read
+            }
+            const uint64_t left = file->size - std::min(file->size, place.offset);
+            file->used = std::min(file->size, file->used + std::min(left, place.bytes));
         }
+        uint64_t bytes = 0;
+        for (const auto& [name, file] : files) bytes += file.used;
         return bytes;
     }
 
@@ -155,7 +174,7 @@ class RadReader {
         if (steps.encoding == r8 || steps.encoding == r8_delta)
             least = end = std::clamp(0.25 * (steps.max - steps.min) / 255, 1e-30, 0.25);
         decode(reader, alpha, [&](size_t i, size_t, float value) {
-            if (value > 1 && !head_.tree) ++brighter_;
+            if (value > 1) brighter_.push_back(uint32_t(i));
             g.opacity_logits[i] = float(logit(double(value), least, 1 - end));
         });
     }
@@ -171,7 +190,7 @@ class RadReader {
             const size_t first = 3 * size_t(sh_coefficients(degree - 1));
             std::vector<float>& codes = codes_[size_t(degree - 1)];
             if (const auto code = properties.find(name + "_code"); code != properties.end()) {
-                require_memory(reader_.name(), all_bytes(), head_.codes, g.sh_degree, kPackedExpansion);
+                require_memory(reader_.name(), all_bytes_, head_.codes, g.sh_degree, kPackedExpansion);
                 codes = values_of(reader, *code, head_.codes);
             }
             if (properties.contains(name) || labels.empty())
@@ -224,6 +243,7 @@ class RadReader {
                     reader_.fail("splat " + std::to_string(child) +
                                  " of the \"lodTree\" is a child of two splats");
         }
+        std::erase_if(brighter_, [&](uint32_t i) { return nodes_[i].count > 0; });
         scene_.variant = "tree of " + core::counted(nodes_.size(), "splat");
         nodes_ = {};
         keep_splats(scene_.gaussians, leaves);
@@ -250,8 +270,9 @@ class RadReader {
     std::filesystem::path folder_;
     core::FileReader reader_;
     RadHead head_;
+    uint64_t all_bytes_ = 0;
     SplatScene scene_;
-    uint64_t brighter_ = 0;                    // splats with an opacity above 1
+    std::vector<uint32_t> brighter_;           // splats with an opacity above 1
     size_t base_ = 0, in_chunk_ = 0;           // splats of the chunk that is read
     std::array<std::vector<float>, 3> codes_;  // of SH degrees 1 to 3
     std::vector<Children> nodes_;
@@ -261,6 +282,21 @@ class RadReader {
 
 SplatScene read_rad(const std::filesystem::path& path) {
     return RadReader(path).read();
+}
+
+std::vector<std::filesystem::path> rad_files(const std::filesystem::path& path) try {
+    if (!core::is_file(path)) return {};
+    core::FileReader reader(path);
+    std::set<std::filesystem::path> files;
+    for (const RadChunkPlace& place : read_rad_head(reader, path.parent_path()).chunks)
+        if (place.file) files.insert(path.parent_path() / *place.file);
+    std::error_code ignored;
+    std::erase_if(files, [&](const std::filesystem::path& file) {
+        return !core::is_file(file) || std::filesystem::equivalent(file, path, ignored);
+    });
+    return {files.begin(), files.end()};
+} catch (const InputError&) {
+    return {};
 }
 
 }  // namespace ewa::io
