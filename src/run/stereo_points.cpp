@@ -29,7 +29,7 @@ constexpr double kNearest =
 constexpr float kClearScore = 0.8f, kLeastScore = 0.6f;
 constexpr double kAgreement = 0.015;  // of the inverse depth
 constexpr size_t kLeastPixels = 500, kLeastPoints = 1000;
-constexpr float kOpaque = 0.99f;
+constexpr float kOpaque = 0.5f;
 
 struct View {
     SweptImage image;
@@ -47,7 +47,7 @@ Image gray_of(const Image& color) {
     return gray;
 }
 
-/// A pixel that is partly masked or transparent does not count: its colour may be the background's.
+/// A pixel that is mostly masked or transparent does not count: its colour is the background's.
 View view_of(const Frame& frame, const std::array<float, 3>& background) {
     const Image loaded = load_frame_image(frame);
     const double pixels = double(loaded.width) * loaded.height;
@@ -164,8 +164,8 @@ Image confirmed_depths(const std::vector<View>& views, size_t i) {
             for (const int j : view.others) {
                 const View& other = views[size_t(j)];
                 const glm::dvec3 seen = seen_at(other.image.camera, point);
-                if (other.found.inverse.empty() || !shows(other.image.camera, seen)) continue;
-                ++able;
+                able += !other.found.inverse.empty();
+                if (!shows(other.image.camera, seen)) continue;
                 agree += std::abs(inverse_at(other, seen) * seen.z - 1) <= kAgreement;
             }
             if (agree > 0 && agree >= std::min<size_t>(2, able)) depths.pixels[at] = float(1 / inverse);
@@ -198,13 +198,8 @@ void choose_others(std::vector<View>& views) {
     for (size_t i = 0; i < views.size(); ++i) views[i].others = others_of(views, i);
 }
 
-/// Pixels with a depth in the images before each, and in all of them last.
-std::vector<uint64_t> pixels_before(const std::vector<Image>& depths) {
-    std::vector<uint64_t> before{0};
-    for (const Image& each : depths)
-        before.push_back(before.back() +
-                         uint64_t(std::ranges::count_if(each.pixels, [](float z) { return z > 0; })));
-    return before;
+size_t pixels_with_depth(const Image& depths) {
+    return size_t(std::ranges::count_if(depths.pixels, [](float z) { return z > 0; }));
 }
 
 }  // namespace
@@ -224,12 +219,20 @@ PointCloud points_by_stereo(const Dataset& dataset, const std::vector<int>& fram
     core::on_all_cores(views.size(), [&](size_t i) { views[i].found = sweep(views, i, most[i]); });
     std::vector<Image> depths(views.size());
     core::on_all_cores(views.size(), [&](size_t i) { depths[i] = confirmed_depths(views, i); });
-    const std::vector<uint64_t> before = pixels_before(depths);
-    if (before.back() < kLeastPoints) return {};
-    PointCloud points;
+    size_t all = 0;
+    std::vector<size_t> useful;
     for (size_t i = 0; i < views.size(); ++i) {
-        const auto part = [&](size_t n) { return uint32_t(count * before[n] / before.back()); };
-        add_points({views[i].image.camera, views[i].color, depths[i]}, part(i + 1) - part(i), seed,
+        const size_t pixels = pixels_with_depth(depths[i]);
+        all += pixels;
+        if (pixels > 0) useful.push_back(i);
+    }
+    if (all < kLeastPoints) return {};
+    // As many of each view: most of them see little of what is hard to see.
+    PointCloud points;
+    for (size_t k = 0; k < useful.size(); ++k) {
+        const auto part = [&](size_t n) { return uint32_t(uint64_t(count) * n / useful.size()); };
+        const size_t i = useful[k];
+        add_points({views[i].image.camera, views[i].color, depths[i]}, part(k + 1) - part(k), seed,
                    uint32_t(i), points);
     }
     return points;
