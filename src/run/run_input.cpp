@@ -175,18 +175,19 @@ std::optional<std::string> inria_remark(const Dataset& dataset) {
 }
 
 /// What training starts from where the dataset has no points.
-const char* start_without_points(StartsFrom from) {
-    switch (from) {
+std::string start_without_points(const StartSource& source) {
+    switch (source.from) {
         case StartsFrom::depth_maps:
             return "its depth maps";
         case StartsFrom::stereo:
-            return "depths on which its images agree";
+            return fmt::format("{} on whose depth {} agree", core::counted(source.points, "point"),
+                               core::counted(source.images, "image"));
         default:
             return "random splats";
     }
 }
 
-void add_remarks(RunInput& input, StartsFrom from) {
+void add_remarks(RunInput& input, const StartSource& source) {
     const Dataset& dataset = input.dataset;
     settle_depths(input);
     if (const auto remark = idle_ranks_remark(input.options.train, input.options.ranks->size()))
@@ -194,8 +195,10 @@ void add_remarks(RunInput& input, StartsFrom from) {
     if (input.without_view_dependence())
         input.notes.emplace_back("the dataset says that no colour depends on the view: SH degree 0");
     if (input.options.init == "sfm" && dataset.points.positions.empty())
-        input.remarks.push_back(std::string("the dataset has no points: training starts from ") +
-                                start_without_points(from));
+        input.remarks.push_back("the dataset has no points: training starts from " +
+                                start_without_points(source));
+    if (input.options.init == "stereo")
+        input.notes.push_back("training starts from " + start_without_points(source));
     if (const size_t points = dataset.points.positions.size();
         input.options.init == "sfm" && points > 0 && input.start.size() > points)
         input.notes.push_back(
@@ -279,10 +282,12 @@ Gaussians splats_of(const PointCloud& points, const RunOptions& options, const D
 }  // namespace
 
 Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames,
-                         StartsFrom* from) {
-    StartsFrom unused;
-    StartsFrom& source = from ? *from : unused;
-    source = options.init == "random" ? StartsFrom::random : StartsFrom::file;
+                         StartSource* source) {
+    StartSource unused;
+    StartSource& told = source ? *source : unused;
+    told = {};
+    StartsFrom& from = told.from;
+    from = options.init == "random" ? StartsFrom::random : StartsFrom::file;
     const int degree = options.train.sh_degree;
     const std::filesystem::path file = options.init_folder / options.init;
     Gaussians start;
@@ -295,34 +300,36 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
         PointCloud measured;
         if (dataset.points.positions.empty())
             measured = points_of_depth_maps(dataset, frames, first_splats(options), options.train.seed);
-        source = measured.positions.empty() ? StartsFrom::points : StartsFrom::depth_maps;
+        from = measured.positions.empty() ? StartsFrom::points : StartsFrom::depth_maps;
         const PointCloud& points = measured.positions.empty() ? dataset.points : measured;
         if (!points.positions.empty()) start = splats_of(points, options, dataset, frames);
     }
     const bool chosen = options.init == "stereo";
     if (chosen || (options.init == "sfm" && start.size() == 0)) {
-        const PointCloud points = points_by_stereo(dataset, frames, options.train.render.background,
-                                                   first_splats(options), options.train.seed);
+        const auto [points, images] = points_by_stereo(dataset, frames, options.train.render.background,
+                                                       first_splats(options), options.train.seed);
+        told.points = points.positions.size();
+        told.images = images;
         // Random splats fill any region. Points may all lie outside.
         const bool enough = std::ranges::any_of(
             points.positions, [&](const glm::dvec3& point) { return in_region(options.train, point); });
         if (chosen && points.positions.empty())
             throw InputError(
                 "--init stereo: the images agree on too few depths; --init random starts without");
-        source = chosen || enough ? StartsFrom::stereo : StartsFrom::random;
-        if (source == StartsFrom::stereo) start = splats_of(points, options, dataset, frames);
+        from = chosen || enough ? StartsFrom::stereo : StartsFrom::random;
+        if (from == StartsFrom::stereo) start = splats_of(points, options, dataset, frames);
     }
-    if (source == StartsFrom::random) {
+    if (from == StartsFrom::random) {
         refuse_dense_start(options, options.init == "random" ? "--init random" : "the dataset");
         start = random_gaussians(dataset, frames, int(first_splats(options)), options.train.seed, degree);
-    } else if (source == StartsFrom::file && io::is_point_cloud(file)) {
+    } else if (from == StartsFrom::file && io::is_point_cloud(file)) {
         const io::PlyPoints cloud = io::read_points_ply(file);
         if (cloud.dropped.count > 0)
             throw InputError(
                 fmt::format("{}: a coordinate is not finite ({} such points in all); remove them",
                             cloud.dropped.first, cloud.dropped.count));
         start = splats_of(cloud.points, options, dataset, frames);
-    } else if (source == StartsFrom::file) {
+    } else if (from == StartsFrom::file) {
         refuse_dense_start(options, options.init);
         start = load_splats(file);
         set_sh_degree(start, degree);
@@ -396,10 +403,10 @@ RunInput load_run(const RunOptions& options) {
     train = resolve(train, input.dataset, input.split.train);
     train.render.sh_degree = train.sh_degree;
     input.options.output = output_folder(options);
-    StartsFrom from;
-    input.start = initial_splats(input.options, input.dataset, input.split.train, &from);
+    StartSource source;
+    input.start = initial_splats(input.options, input.dataset, input.split.train, &source);
     if (input.options.train.region) check_region(input.options.train, input.start);
-    add_remarks(input, from);
+    add_remarks(input, source);
     return input;
 }
 

@@ -35,12 +35,16 @@ inline bool starts_by_word(const std::string& init) {
 
 /// Where the first splats come from.
 enum class StartsFrom { points, depth_maps, stereo, random, file };
+struct StartSource {
+    StartsFrom from = StartsFrom::file;
+    size_t points = 0, images = 0;  // of stereo
+};
 
 /// The first splats that the options ask for. frames: indices of the training frames. options: with a concrete
-/// SH degree. from: tells where they come from. Throws InputError (a point that is not finite, a splat file or an image that
+/// SH degree. source: tells where they come from. Throws InputError (a point that is not finite, a splat file or an image that
 /// cannot be read, too many splats, --init stereo of images that agree on no depths).
 Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames,
-                         StartsFrom* from = nullptr);
+                         StartSource* source = nullptr);
 
 /// Throws InputError for what is wrong with the options on every dataset, the files that they name included. For use before
 /// long work makes the dataset.

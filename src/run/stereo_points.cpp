@@ -204,8 +204,8 @@ size_t pixels_with_depth(const Image& depths) {
 
 }  // namespace
 
-PointCloud points_by_stereo(const Dataset& dataset, const std::vector<int>& frames,
-                            const std::array<float, 3>& background, uint32_t count, uint64_t seed) {
+StereoPoints points_by_stereo(const Dataset& dataset, const std::vector<int>& frames,
+                              const std::array<float, 3>& background, uint32_t count, uint64_t seed) {
     std::vector<View> views = views_of(dataset, frames, background);
     choose_others(views);
     const auto [median, nearest] = scouted(views);
@@ -228,13 +228,14 @@ PointCloud points_by_stereo(const Dataset& dataset, const std::vector<int>& fram
     }
     if (all < kLeastPoints) return {};
     // As many of each view: most of them see little of what is hard to see.
-    PointCloud points;
+    StereoPoints points;
     for (size_t k = 0; k < useful.size(); ++k) {
         const auto part = [&](size_t n) { return uint32_t(uint64_t(count) * n / useful.size()); };
         const size_t i = useful[k];
         add_points({views[i].image.camera, views[i].color, depths[i]}, part(k + 1) - part(k), seed,
-                   uint32_t(i), points);
+                   uint32_t(i), points.cloud);
     }
+    points.images = useful.size();
     return points;
 }
 
