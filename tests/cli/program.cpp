@@ -34,9 +34,10 @@ namespace fs = std::filesystem;
     dup2(open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDOUT_FILENO);
     dup2(open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDERR_FILENO);
     dup2(open("/dev/null", O_RDONLY), STDIN_FILENO);
-    // Ignored where the tests run in the background of a script.
+    // Ignored where the tests run in the background of a script, or under nohup.
     std::signal(SIGINT, SIG_DFL);
     std::signal(SIGQUIT, SIG_DFL);
+    std::signal(SIGHUP, circumstances.nohup ? SIG_IGN : SIG_DFL);
     const rlimit no_core{0, 0};
     setrlimit(RLIMIT_CORE, &no_core);
     if (file_limit > 0) {

@@ -20,6 +20,7 @@ struct Circumstances {
     std::string program = {};         // runs instead of ewa
     std::string out_path = {};        // standard output goes here instead of Outcome::out
     std::string err_path = {};        // likewise Outcome::err
+    bool nohup = false;               // SIGHUP is ignored when the program starts
     size_t file_limit = 0;            // bytes that no file may exceed, as on a full disk; 0: none
     size_t address_limit = 0;         // bytes of address space; 0: no limit
     std::string await_file = {};      // as soon as this file has a byte, `signal` is sent

@@ -42,6 +42,13 @@ TEST_F(Signals, AskATrainingToEnd) {
         }
 }
 
+TEST_F(Signals, AHangupEndsNothingUnderNohup) {
+    Circumstances held = held_at(20, folder / "held", SIGHUP);
+    held.nohup = true;
+    expect_success(train("o", {}, held));
+    EXPECT_EQ(read_json(folder / "o/summary.json")["steps"], 60);
+}
+
 TEST_F(Signals, ThatComeAgainAskForNothingElse) {
     for (const int signal : {SIGTERM, SIGINT}) {
         SCOPED_TRACE(signal);
