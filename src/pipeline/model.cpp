@@ -5,6 +5,8 @@
 #include <cstring>
 #include <vector>
 
+#include "scene/splat_arrays.h"
+
 namespace ewa::pipeline {
 namespace {
 
@@ -87,15 +89,7 @@ Gaussians slice_of(const Gaussians& all, size_t first, size_t count) {
     part.origin = all.origin;
     part.density = all.density;
     part.resize(count);
-    const auto copy = [&](const std::vector<float>& from, std::vector<float>& to) {
-        const size_t values = from.size() / all.size();
-        std::copy_n(from.begin() + std::ptrdiff_t(values * first), values * count, to.begin());
-    };
-    copy(all.means, part.means);
-    copy(all.opacity_logits, part.opacity_logits);
-    copy(all.quaternions, part.quaternions);
-    copy(all.log_scales, part.log_scales);
-    copy(all.sh, part.sh);
+    scene::copy_splats(all, first, count, part, 0);
     return part;
 }
 

@@ -10,6 +10,7 @@
 #include "portions/collect.h"
 #include "run/option_table.h"
 #include "run/resume.h"
+#include "scene/splat_arrays.h"
 
 namespace ewa::train {
 namespace {
@@ -39,8 +40,7 @@ uint64_t hash_of(const Gaussians& splats) {
     core::Hash hash;
     hash.add(splats.sh_degree);
     for (int axis = 0; axis < 3; ++axis) hash.add(splats.origin[axis]);
-    for (const std::vector<float>* values :
-         {&splats.means, &splats.quaternions, &splats.log_scales, &splats.opacity_logits, &splats.sh}) {
+    for (const auto& [values, each] : scene::arrays_of(splats)) {
         hash.add(uint64_t(values->size()));
         hash.add(values->data(), values->size() * sizeof(float));
     }

@@ -14,6 +14,7 @@
 
 #include "core/parallel.h"
 #include "ewa/splat_edit.h"
+#include "scene/splat_arrays.h"
 #include "scene/splat_shape.h"
 
 namespace ewa {
@@ -356,13 +357,8 @@ namespace scene {
 
 void put_neighbors_together(Gaussians& gaussians) {
     const std::vector<uint32_t> order = morton_order(gaussians);
-    const std::array<std::pair<std::vector<float>*, size_t>, 5> all = {
-        {{&gaussians.means, 3},
-         {&gaussians.quaternions, 4},
-         {&gaussians.log_scales, 3},
-         {&gaussians.opacity_logits, 1},
-         {&gaussians.sh, gaussians.sh_stride()}}};
-    core::on_all_cores(all.size(), [&](size_t k) { reorder(*all[k].first, all[k].second, order); });
+    const auto all = arrays_of(gaussians);
+    core::on_all_cores(all.size(), [&](size_t k) { reorder(*all[k].values, all[k].each, order); });
 }
 
 double squared_light(const Gaussians& gaussians, size_t i) {

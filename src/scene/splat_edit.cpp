@@ -15,6 +15,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "scene/color.h"
+#include "scene/splat_arrays.h"
 #include "scene/splat_shape.h"
 
 namespace ewa {
@@ -176,26 +177,17 @@ void check(const glm::dmat4& matrix, double determinant) {
 }  // namespace
 
 void select_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices) {
-    select_values(gaussians.means, 3, indices);
-    select_values(gaussians.quaternions, 4, indices);
-    select_values(gaussians.log_scales, 3, indices);
-    select_values(gaussians.sh, gaussians.sh_stride(), indices);
-    select_values(gaussians.opacity_logits, 1, indices);
+    for (const auto& [values, each] : scene::arrays_of(gaussians)) select_values(*values, each, indices);
 }
 
 void keep_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices) {
     assert(std::is_sorted(indices.begin(), indices.end()));
-    const auto keep = [&](std::vector<float>& values, size_t stride) {
+    for (const auto& [values, each] : scene::arrays_of(gaussians)) {
         for (size_t i = 0; i < indices.size(); ++i)
             if (indices[i] != i)
-                std::copy_n(values.data() + indices[i] * stride, stride, values.data() + i * stride);
-        values.resize(indices.size() * stride);
-    };
-    keep(gaussians.means, 3);
-    keep(gaussians.quaternions, 4);
-    keep(gaussians.log_scales, 3);
-    keep(gaussians.sh, gaussians.sh_stride());
-    keep(gaussians.opacity_logits, 1);
+                std::copy_n(values->data() + indices[i] * each, each, values->data() + i * each);
+        values->resize(indices.size() * each);
+    }
 }
 
 void set_sh_degree(Gaussians& gaussians, int degree) {

@@ -17,6 +17,7 @@
 #include "io/splats/render_mark.h"
 #include "io/splats/splat_values.h"
 #include "io/splats/unpacking.h"
+#include "scene/splat_arrays.h"
 
 namespace ewa::io {
 
@@ -228,16 +229,8 @@ class RadWriter {
         part.sh_degree = degree();
         part.resize(end - begin);
         for (size_t i = 0; i < part.size(); ++i) {
-            const Gaussians& from = *levels_[nodes_[begin + i].level];
-            const auto copy = [&](const std::vector<float>& values, std::vector<float>& to, size_t each) {
-                std::copy_n(values.begin() + std::ptrdiff_t(each * nodes_[begin + i].index), each,
-                            to.begin() + std::ptrdiff_t(each * i));
-            };
-            copy(from.means, part.means, 3);
-            copy(from.quaternions, part.quaternions, 4);
-            copy(from.log_scales, part.log_scales, 3);
-            copy(from.opacity_logits, part.opacity_logits, 1);
-            copy(from.sh, part.sh, part.sh_stride());
+            const RadNode& node = nodes_[begin + i];
+            scene::copy_splats(*levels_[node.level], node.index, 1, part, i);
         }
         return part;
     }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "scene/splat_arrays.h"
 #include "scene/splat_shape.h"
 
 namespace ewa::io {
@@ -90,15 +91,7 @@ Gaussians rows_of(const Gaussians& g, std::span<const uint32_t> rows) {
     part.sh_degree = g.sh_degree;
     part.origin = g.origin;
     part.resize(rows.size());
-    const auto copy = [&](const std::vector<float>& from, std::vector<float>& to, size_t stride) {
-        for (size_t i = 0; i < rows.size(); ++i)
-            std::copy_n(from.data() + rows[i] * stride, stride, to.data() + i * stride);
-    };
-    copy(g.means, part.means, 3);
-    copy(g.quaternions, part.quaternions, 4);
-    copy(g.log_scales, part.log_scales, 3);
-    copy(g.opacity_logits, part.opacity_logits, 1);
-    copy(g.sh, part.sh, g.sh_stride());
+    for (size_t i = 0; i < rows.size(); ++i) scene::copy_splats(g, rows[i], 1, part, i);
     return part;
 }
 
