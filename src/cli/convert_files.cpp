@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/convert_files.h"
 
+#include <sys/stat.h>
+
+#include <set>
+#include <utility>
+
 #include "cli/convert_page.h"
 #include "cli/convert_tiles.h"
 #include "core/text.h"
@@ -32,7 +37,11 @@ std::vector<fs::path> parts_of(const fs::path& out, bool unbundled) {
 
 uint64_t bytes_of(const std::vector<fs::path>& files) {
     uint64_t sum = 0;
-    for (const fs::path& file : files) sum += fs::file_size(file);
+    std::set<std::pair<dev_t, ino_t>> counted;
+    for (const fs::path& file : files)
+        if (struct stat found{};
+            stat(file.c_str(), &found) == 0 && counted.emplace(found.st_dev, found.st_ino).second)
+            sum += uint64_t(found.st_size);
     return sum;
 }
 

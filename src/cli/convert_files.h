@@ -14,6 +14,7 @@ std::vector<std::filesystem::path> values_of(const std::filesystem::path& path);
 /// The files that a written output consists of besides itself. unbundled: it is a page with its scene beside it.
 std::vector<std::filesystem::path> parts_of(const std::filesystem::path& out, bool unbundled);
 
+/// On the disk: hard links to one file count once.
 uint64_t bytes_of(const std::vector<std::filesystem::path>& files);
 
 /// Throws InputError if an input is one of the parts that `out` writes: a chunk in a folder N_M of a lod-meta.json, or a tile of a

@@ -338,6 +338,24 @@ class RadTest(unittest.TestCase):
         size = sum(file.stat().st_size for file in self.folder.glob("s*.rad*"))
         self.assertIn(f", {size / 1000:.3g} kB\n", run("convert", self.folder / "s.rad", self.folder / "b.ply"))
 
+    def test_hard_links_to_one_file_count_once(self):
+        write_rad(self.folder / "s.rad", self.rows, PLAIN, chunk_size=150, files=True)
+        head = (self.folder / "s.rad").read_bytes()
+        meta = json.loads(head[8 : 8 + struct.unpack("<I", head[4:8])[0]])
+        together = b""
+        for place in meta["chunks"]:
+            file = self.folder / place["filename"]
+            place["offset"] = len(together)
+            together += file.read_bytes()
+            file.unlink()
+        (self.folder / "all.radc").write_bytes(together)
+        for place in meta["chunks"]:
+            (self.folder / place["filename"]).hardlink_to(self.folder / "all.radc")
+        text = json.dumps(meta).encode()
+        (self.folder / "s.rad").write_bytes(b"RAD0" + struct.pack("<I", len(text)) + padded(text))
+        size = (self.folder / "s.rad").stat().st_size + len(together)
+        self.assertIn(f", {size / 1000:.3g} kB\n", run("convert", self.folder / "s.rad", self.folder / "b.ply"))
+
     def test_the_leaves_of_a_tree_are_the_scene(self):
         rows = self.rows[:6]
         tree = [(2, 1), (0, 0), (3, 3), (0, 0), (0, 0), (0, 0)]

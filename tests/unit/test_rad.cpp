@@ -184,8 +184,13 @@ TEST(Rad, ChunksThatNameOneFileCountItOnce) {
     std::ofstream(folder / "big.radc") << std::string(200'000, 'x');
     json head = {{"version", 1},      {"type", "gsplat"}, {"count", 10'000'000},
                  {"chunkSize", 1000}, {"maxSh", 0},       {"chunks", json::array()}};
-    const char* names[] = {"a.rad", "big.radc", "./big.radc"};
-    for (size_t i = 0; i < 10'000; ++i) head["chunks"].push_back({{"offset", 0}, {"filename", names[i % 3]}});
+    std::vector<std::string> names = {"a.rad", "big.radc", "./big.radc"};
+    for (int i = 0; i < 100; ++i) {
+        names.push_back(std::to_string(i) + ".radc");
+        std::filesystem::create_hard_link(folder / "big.radc", folder / names.back());
+    }
+    for (size_t i = 0; i < 10'000; ++i)
+        head["chunks"].push_back({{"offset", 0}, {"filename", names[i % names.size()]}});
     folder.write("a.rad", with_head("RAD0", head));
     expect_error<InputError>([&] { read_splats(folder / "a.rad"); }, {"claims 10000000 splats"});
     // A chunk's own size limits it too.

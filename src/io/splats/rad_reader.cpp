@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads Spark's .rad, whose layout rad.h describes.
+#include <sys/stat.h>
+
 #include <array>
 #include <cmath>
 #include <map>
@@ -65,16 +67,16 @@ class RadReader {
         struct File {
             uint64_t size = 0, used = 0;
         };
-        std::map<std::filesystem::path, File> files;  // by their paths without links
+        std::map<std::pair<dev_t, ino_t>, File> files;  // links, soft or hard, name the same one
         std::map<std::optional<std::filesystem::path>, File*> named;
         for (const RadChunkPlace& place : head_.chunks) {
             File*& file = named[place.file];
             if (!file) {
-                std::error_code error;
-                const std::filesystem::path found = place.file ? folder_ / *place.file : path;
-                file = &files[std::filesystem::weakly_canonical(found, error)];
-                file->size = place.file ? std::filesystem::file_size(found, error) : reader_.size();
-                if (place.file && error) file->size = 0;  // it is an error once it is read
+                struct stat found {};
+                if (stat((place.file ? folder_ / *place.file : path).c_str(), &found) != 0)
+                    found = {};  // it is an error once it is read
+                file = &files[{found.st_dev, found.st_ino}];
+                file->size = place.file ? uint64_t(found.st_size) : reader_.size();
             }
             const uint64_t left = file->size - std::min(file->size, place.offset);
             file->used = std::min(file->size, file->used + std::min(left, place.bytes));
