@@ -14,6 +14,7 @@
 #include "cli/convert_clean.h"
 #include "cli/convert_edits.h"
 #include "cli/convert_files.h"
+#include "cli/convert_output.h"
 #include "cli/convert_page.h"
 #include "cli/convert_tiles.h"
 #include "cli/orbit_check.h"
@@ -40,11 +41,11 @@ struct ConvertArguments {
     fs::path output;                     // -o, which becomes the last of the files
     std::vector<glm::dmat4> placements;  // of the inputs
     std::vector<std::string> transform;
-    std::string scale_to, crop, decimate, sort, geo;
+    std::string scale_to, crop, decimate, sort;
     Edits edits;
     Cleaning cleaning;
-    int spz_version = 0, levels = 0, level = 0;  // 0: not given
-    bool gltf_spz = false, unbundled = false;
+    OutputOptions output_options;
+    int level = 0;  // of the inputs
     fs::path json;
     bool bake_sky = false, check = false, allow_empty = false, quiet = false;
     std::optional<live::Run> run;  // that the only input is of
@@ -143,13 +144,14 @@ void check_files(const ConvertArguments& arguments) {
         outputs = {{"OUT", out}, {"--json", arguments.json}, {"--dry-run", arguments.cleaning.picture}};
     for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
         inputs.push_back({"an input", arguments.files[i]});
-        if (names_tileset(out) || arguments.unbundled ||
+        if (names_tileset(out) || arguments.output_options.unbundled ||
             core::lower(out.filename().string()) == "lod-meta.json")
-            check_not_a_part(arguments.unbundled ? levels_of_page(out) : out, arguments.files[i]);
+            check_not_a_part(arguments.output_options.unbundled ? levels_of_page(out) : out,
+                             arguments.files[i]);
         for (const fs::path& values : values_of(arguments.files[i]))
             inputs.push_back({"values of an input", values});
     }
-    if (arguments.unbundled) outputs.push_back({"the levels of OUT", levels_of_page(out)});
+    if (arguments.output_options.unbundled) outputs.push_back({"the levels of OUT", levels_of_page(out)});
     check_command_outputs(outputs, inputs);
     if (names_page(out) || names_tileset(out)) return;
     const SplatFormat format = format_of_name(out);
@@ -172,7 +174,7 @@ void check_not_empty(const ConvertArguments& arguments, size_t read, size_t left
 
 Json output_json(const ConvertArguments& arguments, const SceneSize& size) {
     const fs::path& out = arguments.files.back();
-    const std::vector<fs::path> values = parts_of(out, arguments.unbundled);
+    const std::vector<fs::path> values = parts_of(out, arguments.output_options.unbundled);
     Json json = {{"file", out.string()},
                  {"format", format_text(out)},
                  {"splats", size.splats},
@@ -207,28 +209,7 @@ bool clean_scene(const ConvertArguments& arguments, Work& work, bool in_place) {
 
 int run(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
-    const bool page = names_page(out), tiles = names_tileset(out);
-    if (page && arguments.check)
-        throw InputError("--check: ewa does not read a page; check a .sog, which it holds");
-    if (tiles && arguments.check)
-        throw InputError("--check: ewa reads no tileset; check a .glb with --gltf-spz, which its tiles are");
-    const std::optional<glm::dmat4> earth = parse_geo(arguments.geo);
-    if (earth && !tiles) throw InputError("--geo: only a tileset.json is on a globe");
-    const SplatFormat format = page ? SplatFormat::sog : tiles ? SplatFormat::glb : format_to_write(out);
-    const bool levels = format == SplatFormat::sog_levels, rad = format == SplatFormat::rad;
-    if (levels && arguments.check)
-        throw InputError(
-            "--check: its splats are in another order; check a .sog, which level 0 holds in chunks");
-    if (rad && arguments.levels > 1 && arguments.check)
-        throw InputError("--check: the splats of a tree are in another order; check a .rad without --levels");
-    if (arguments.unbundled && !page) throw InputError("--unbundled: only a page has its scene inside");
-    if (!levels && !rad && !tiles && !arguments.unbundled && arguments.levels > 0)
-        throw InputError(
-            "--levels: only a lod-meta.json, a .rad, a tileset.json and an --unbundled page have levels");
-    if (arguments.spz_version > 0 && (tiles || arguments.gltf_spz))
-        throw InputError("--spz-version: a glTF and tiles hold SPZ 2; only an .spz has a version to choose");
-    if (arguments.gltf_spz && format != SplatFormat::glb && format != SplatFormat::gltf)
-        throw InputError("--gltf-spz: only a .glb or .gltf can hold an SPZ");
+    const ConvertOutput output = output_of(out, arguments.output_options, arguments.check);
     // Report wrong use before the inputs are read: they may be large.
     Edits edits = arguments.edits;
     edits.transform = parse_transform(arguments.transform);
@@ -253,7 +234,7 @@ int run(const ConvertArguments& arguments) {
                                                : "--transform and --scale-to");
     edits.transform = glm::dmat4(1);
     if (arguments.cleaning.any() && clean_scene(arguments, work, in_place)) return 0;
-    for (std::string& remark : apply_edits(work.gaussians, edits, format))
+    for (std::string& remark : apply_edits(work.gaussians, edits, output.format))
         work.lost.push_back(std::move(remark));
 
     const SceneSize size = scene_size(work.gaussians);
@@ -263,27 +244,21 @@ int run(const ConvertArguments& arguments) {
     constexpr size_t kShowFrom = 500'000;
     Progress progress("written", static_cast<int>(std::min<size_t>(count, 1u << 30)), "splats",
                       arguments.quiet || count < kShowFrom);
-    if (arguments.spz_version > 0) work.save.spz_version = arguments.spz_version;
-    work.save.gltf_spz = arguments.gltf_spz;
-    work.save.levels = arguments.levels;
     work.save.progress = [&](uint64_t done, uint64_t) { progress.update(static_cast<int>(done)); };
-    const std::vector<std::string> quantised =
-        page ? write_page(out, std::move(work.gaussians), work.save, in_place ? arguments.run : std::nullopt,
-                          arguments.unbundled)
-        : tiles  ? write_tiles(out, std::move(work.gaussians), work.save, earth)
-        : levels ? save_levels(out, std::move(work.gaussians), work.save)
-                 : save_splats(out, work.gaussians, work.save);
+    const std::vector<std::string> quantised = write_output(
+        output, arguments.output_options, work.gaussians, work.save, in_place ? arguments.run : std::nullopt);
     std::vector<std::string> remarks = work.lost;
     remarks.insert(remarks.end(), quantised.begin(), quantised.end());
 
     if (!arguments.quiet) {
         fmt::print("{}\n", described(out, format_text(out), "", size, fs::file_size(out)));
-        const std::vector<fs::path> values = parts_of(out, arguments.unbundled);
+        const std::vector<fs::path> values = parts_of(out, arguments.output_options.unbundled);
         if (!values.empty())
             fmt::print("{}{}: the values of this {}, {}\n", core::one_line(values[0].string()),
-                       values.size() > 1 ? fmt::format(" and {} other {}", values.size() - 1,
-                                                       format == SplatFormat::sog_meta ? "images" : "files")
-                                         : "",
+                       values.size() > 1
+                           ? fmt::format(" and {} other {}", values.size() - 1,
+                                         output.format == SplatFormat::sog_meta ? "images" : "files")
+                           : "",
                        format_text(out), core::bytes_text(bytes_of(values)));
         for (const std::string& remark : remarks) fmt::print("  {}\n", core::one_line(remark));
     }
@@ -350,32 +325,11 @@ Action add_convert(CLI::App& app) {
         ->type_name("OUT");
     add_editing_options(app, *arguments);
     add_cleaning_options(app, arguments->cleaning);
-    app.add_option("--spz-version", arguments->spz_version,
-                   "SPZ version of an .spz: 3 (every reader supports it) or 4 (newer, smaller files) [3]")
-        ->transform(one_of({"3", "4"}))
-        ->type_name("3|4");
-    app.add_flag("--gltf-spz", arguments->gltf_spz,
-                 "Pack the splats of a .glb or .gltf as SPZ (KHR_gaussian_splatting_compression_spz_2)");
-    app.add_option("--levels", arguments->levels,
-                   "Levels of a lod-meta.json, .rad, tileset.json or --unbundled page, each with half of the "
-                   "splats of the one before; fewer where a tile would have less than 1,000 [until one "
-                   "has at most a million, or a tile 100,000; none in a .rad]")
-        ->transform(in_range(1, 32))
-        ->type_name("N");
+    add_output_options(app, arguments->output_options);
     app.add_option("--level", arguments->level,
                    "Level of the inputs to read, each a lod-meta.json. 0: the finest")
         ->transform(in_range(0, 31))
         ->type_name("N");
-    app.add_flag(
-        "--unbundled", arguments->unbundled,
-        "Write the scene of a page NAME.html beside it, as NAME-levels/lod-meta.json, of which a web server "
-        "gives the browser what a view needs");
-    app.add_option(
-           "--geo", arguments->geo,
-           "Where a tileset.json puts the scene, in degrees (WGS 84) and metres: x points east, z to the "
-           "heading, which is north without it, and y down. Or ecef: the scene's coordinates are those of "
-           "the earth")
-        ->type_name("LAT,LON,HEIGHT[,HEADING]|ecef");
     app.add_flag("--bake-sky", arguments->bake_sky,
                  "Add opaque splats far away in place of the sky of the run: for viewers that have none");
     app.add_flag("--allow-empty", arguments->allow_empty, "Write the output even if no splat is left");

@@ -172,6 +172,10 @@ TEST(Convert, WrongUse) {
         expect_failure(
             run_ewa({"convert", folder / "s.ply", folder / name, "--spz-version", "4", "--gltf-spz"}), 2,
             "--spz-version: a glTF and tiles hold SPZ 2");
+    for (const char* name : {"o.glb", "o.sog", "o.html"})
+        expect_failure(run_ewa({"convert", folder / "s.ply", folder / name, "--spz-version", "4"}), 2,
+                       "--spz-version: only an .spz has one");
+    refuse({"--spz-version", "3"}, "--spz-version: only an .spz has one");
     refuse({"--crop", "1,2,3"}, "--crop");
     refuse({"--crop", "1,0,0,0,1,1"}, "lower corner");
     refuse({"--min-opacity", "2"}, "min-opacity");
