@@ -10,12 +10,16 @@ import subprocess
 import tempfile
 import threading
 import time
+import unittest
 
 try:
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
 except ImportError:
-    webdriver = None
+    webdriver = ActionChains = By = Keys = None
 
 EWA = SOURCE = None  # set by test_page.py
 CHROMEDRIVER = shutil.which("chromedriver")
@@ -76,16 +80,51 @@ def trained_run():
     return trained
 
 
+class BrowserTest(unittest.TestCase):
+    """Has a folder and a browser."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp())
+        cls.addClassCleanup(shutil.rmtree, cls.folder)
+
+    @classmethod
+    def open_browser(cls, **options):
+        cls.driver = browser(**options)
+        cls.addClassCleanup(cls.driver.quit)
+
+    @classmethod
+    def serve(cls, folder):
+        cls.server = served(folder)
+        cls.addClassCleanup(cls.server.shutdown)
+
+    def picture(self, name="shown.png"):
+        self.driver.execute_script("document.getElementById('bar').style.visibility = 'hidden'")
+        self.driver.save_screenshot(str(self.folder / name))
+        return self.folder / name
+
+
 class Handler(http.server.SimpleHTTPRequestHandler):
     asked = []
     refused = {}  # how often a path is answered by an error
+    silent = {}   # of a path: after how many bytes each of its next answers stops, or None for no answer
 
     def do_GET(self):
         Handler.asked.append(self.path)
+        if Handler.silent.get(self.path):
+            return self.fall_silent(Handler.silent[self.path].pop(0))
         if Handler.refused.get(self.path, 0) > 0:
             Handler.refused[self.path] -= 1
             return self.send_error(503)
         super().do_GET()
+
+    def fall_silent(self, after):
+        if after is not None:
+            self.send_response(200)
+            self.send_header("Content-Length", "1000000")
+            self.end_headers()
+            self.wfile.write(b"x" * after)
+        self.rfile.read()  # until the browser gives up
 
     def log_message(self, *arguments):
         pass

@@ -1,27 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """A page with levels beside it. test_page.py runs these tests."""
 import json
-import pathlib
 import shutil
-import tempfile
 import time
-import unittest
 
 import support
-from support import HEIGHT, PATIENCE, WIDTH, Handler, browser, psnr, run, served, settled, trained_run
-
-try:
-    from selenium.webdriver.common.by import By
-except ImportError:
-    pass
+from support import HEIGHT, PATIENCE, WIDTH, BrowserTest, By, Handler, psnr, run, settled, trained_run
 
 
-class StreamTest(unittest.TestCase):
+class StreamTest(BrowserTest):
     """A page with levels beside it, from a web server of files."""
 
     @classmethod
     def setUpClass(cls):
-        cls.folder = pathlib.Path(tempfile.mkdtemp())
+        super().setUpClass()
         scene, one = cls.folder / "wide.ply", cls.folder / "one.ply"
         run("convert", trained_run() / "splats.ply", one, "--decimate", "8k", "--quiet")
         # Copies beside each other are longer than a leaf may be.
@@ -29,19 +21,13 @@ class StreamTest(unittest.TestCase):
         cls.count = json.loads(run("info", scene, "--json"))["splats"]
         run("convert", scene, cls.folder / "site" / "page.html", "--unbundled", "--levels", 3, "--quiet")
         run("render", scene, "--size", f"{WIDTH}x{HEIGHT}", "-o", cls.folder / "whole.png", "--quiet")
-        cls.server = served(cls.folder / "site")
-        cls.driver = browser(offline=False)
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.driver.quit()
-        cls.server.shutdown()
-        shutil.rmtree(cls.folder)
+        cls.serve(cls.folder / "site")
+        cls.open_browser(offline=False)
 
     def open(self, address="", hurried=False, script="", name="page.html"):
-        """hurried: pauses are a fiftieth as long. script: runs before those of the page."""
+        """hurried: pauses are a fiftieth as long, and a server may be silent for 3 s. script: runs before those of the page."""
         if hurried:
-            script = "const later = setTimeout; window.setTimeout = (action, pause) => later(action, pause / 50);"
+            script = "const later = setTimeout; window.setTimeout = (action, pause) => later(action, pause / (pause > 9000 ? 10 : 50));"
         self.driver.get("about:blank")
         Handler.asked.clear()
         added = self.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": script})
@@ -60,11 +46,6 @@ class StreamTest(unittest.TestCase):
                 return text
             time.sleep(0.05)
         return ""
-
-    def picture(self):
-        self.driver.execute_script("document.getElementById('bar').style.visibility = 'hidden'")
-        self.driver.save_screenshot(str(self.folder / "shown.png"))
-        return self.folder / "shown.png"
 
     def test_all_fits_and_the_coarsest_level_comes_first(self):
         count = ("window.frames_left = 0; const gl = WebGL2RenderingContext.prototype, {createFramebuffer, deleteFramebuffer} = gl;"
@@ -95,6 +76,17 @@ class StreamTest(unittest.TestCase):
         self.assertEqual(self.splats(), self.count)
         self.assertEqual(Handler.asked.count("/page-levels/0_0/meta.json"), 3)
         self.assertFalse(self.driver.find_element(By.ID, "lost").is_displayed())
+
+    def test_a_server_that_falls_silent_is_asked_again(self):
+        Handler.silent["/page-levels/0_0/meta.json"] = [None]
+        Handler.silent["/page-levels/2_0/meta.json"] = [20]
+        try:
+            self.assertEqual(self.open(hurried=True), "ready")
+            self.assertEqual(self.splats(), self.count)
+            for chunk in ("0_0", "2_0"):
+                self.assertEqual(Handler.asked.count(f"/page-levels/{chunk}/meta.json"), 2)
+        finally:
+            Handler.silent.clear()
 
     def test_what_is_missing_is_said_and_the_rest_shows(self):
         for missing, shown in (("0_0", self.count // 2), ("2_0", self.count)):
@@ -158,23 +150,17 @@ class StreamTest(unittest.TestCase):
         self.assertIn("http.server", self.driver.find_element(By.ID, "text").text)
 
 
-class LevelsTest(unittest.TestCase):
+class LevelsTest(BrowserTest):
     """web/src/levels.js alone."""
 
     @classmethod
     def setUpClass(cls):
-        cls.folder = pathlib.Path(tempfile.mkdtemp())
+        super().setUpClass()
         (cls.folder / "empty.html").write_text("<!DOCTYPE html><title>empty</title>")
         shutil.copytree(support.SOURCE / "web" / "src", cls.folder / "src")
-        cls.server = served(cls.folder)
-        cls.driver = browser(offline=False)
+        cls.serve(cls.folder)
+        cls.open_browser(offline=False)
         cls.driver.get(f"http://127.0.0.1:{cls.server.server_port}/empty.html")
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.driver.quit()
-        cls.server.shutdown()
-        shutil.rmtree(cls.folder)
 
     def evaluated(self, body, *arguments):
         """What the body of an asynchronous function returns, with the module as m and a list of arguments as a."""

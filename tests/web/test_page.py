@@ -4,39 +4,26 @@
 import pathlib
 import shutil
 import sys
-import tempfile
 import time
 import unittest
 
 sys.dont_write_bytecode = True  # beside the sources
 import support
-from support import HEIGHT, PATIENCE, WIDTH, browser, psnr, run, settled, trained_run
+from support import HEIGHT, PATIENCE, WIDTH, ActionChains, BrowserTest, By, Keys, browser, psnr, run, settled, trained_run
 from test_levels import LevelsTest, StreamTest  # noqa: F401 (unittest finds them here)
 
-try:
-    from selenium.webdriver.common.action_chains import ActionChains
-    from selenium.webdriver.common.by import By
-    from selenium.webdriver.common.keys import Keys
-except ImportError:
-    pass
 
-
-class PageTest(unittest.TestCase):
+class PageTest(BrowserTest):
     @classmethod
     def setUpClass(cls):
-        cls.folder = pathlib.Path(tempfile.mkdtemp())
+        super().setUpClass()
         trained = trained_run()
         run("convert", trained, cls.folder / "page.html", "--quiet")
         shutil.copy(trained / "splats.ply", cls.folder / "alone.ply")
         run("convert", cls.folder / "alone.ply", cls.folder / "flat.html", "--max-sh", 0, "--quiet")
         cls.renders = cls.folder / "renders"
         run("render", trained, "--frames", "all", "-o", cls.renders, "--quiet")
-        cls.driver = browser()
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.driver.quit()
-        shutil.rmtree(cls.folder)
+        cls.open_browser()
 
     def open(self, name, address=""):
         self.driver.get("about:blank")
@@ -45,11 +32,6 @@ class PageTest(unittest.TestCase):
 
     def settled(self):
         return settled(self.driver)
-
-    def picture(self, name="shown.png"):
-        self.driver.execute_script("document.getElementById('bar').style.visibility = 'hidden'")
-        self.driver.save_screenshot(str(self.folder / name))
-        return self.folder / name
 
     def psnr(self, shown, rendered):
         return psnr(shown, rendered)

@@ -6,6 +6,7 @@ import {decodeSog} from "./sog.js";
 const kMostLoads = 2;               // at once
 const kKept = 2;                    // budgets of splats in memory; more only if they are on the screen or of the coarsest level
 const kPauses = [500, 2000, 8000];  // ms before a chunk that failed to load is asked for again
+const kSilence = 30000;             // ms without a byte after which a request has failed
 
 /// The leaves of the tree: {middle, radius, rows}. rows[level] is {file, offset, count}, or missing where the leaf has no splats.
 export function leavesOf(meta) {
@@ -58,10 +59,24 @@ export function chooseLevels(leaves, eye, forward, budget) {
     return chosen;
 }
 
+/// The bytes of a file. A server may fall silent at any time.
 async function fetched(url) {
-    const answer = await fetch(url).catch(() => { throw new Error(`${url} cannot be reached`); });
-    if (!answer.ok) throw new Error(`${url} is missing (${answer.status})`);
-    return answer;
+    const stop = new AbortController(), fault = () => { throw new Error(`${url} cannot be reached`); };
+    let timer = null;
+    const next = (part) => {
+        clearTimeout(timer);
+        timer = setTimeout(() => stop.abort(), kSilence);
+        return part.catch(fault);
+    };
+    try {
+        const answer = await next(fetch(url, {signal: stop.signal}));
+        if (!answer.ok) throw new Error(`${url} is missing (${answer.status})`);
+        const reader = answer.body.getReader(), parts = [];
+        for (let part = await next(reader.read()); !part.done; part = await next(reader.read())) parts.push(part.value);
+        return new Uint8Array(await new Blob(parts).arrayBuffer());
+    } finally {
+        clearTimeout(timer);
+    }
 }
 
 export class LevelScene {
@@ -137,7 +152,7 @@ export class LevelScene {
 
     async decoded(file) {
         const name = this.files[file], folder = this.folder + name.slice(0, name.lastIndexOf("/") + 1);
-        return decodeSog(this.gl, async (part) => new Uint8Array(await (await fetched(folder + part)).arrayBuffer()), () => {});
+        return decodeSog(this.gl, (part) => fetched(folder + part), () => {});
     }
 
     /// Chunks on the screen have one SH degree: that of most chunks so far, and of the first where there are as many of another.
@@ -249,5 +264,5 @@ export async function openLevels(name) {
     if (location.protocol === "file:")
         throw new Error("its levels come from a web server; in its folder, python3 -m http.server is one");
     const address = name.split("/").map(encodeURIComponent).join("/");
-    return {meta: await (await fetched(address)).json(), folder: address.slice(0, address.lastIndexOf("/") + 1)};
+    return {meta: JSON.parse(new TextDecoder().decode(await fetched(address))), folder: address.slice(0, address.lastIndexOf("/") + 1)};
 }
