@@ -55,6 +55,29 @@ TEST_F(EvaluationOfViews, ComparesEveryViewWithItsOwnImageInOrder) {
     EXPECT_EQ(evaluate(true).psnr, whole.psnr);
 }
 
+TEST_F(EvaluationOfViews, DrawsSeveralAtOnceAndEachHasItsAppearance) {
+    std::vector<Appearance> appearances;
+    for (int i = 0; i < 5; ++i) {
+        Exposure exposure = kIdentityExposure;
+        exposure[0] = 0.5f + 0.1f * float(i);
+        appearances.emplace_back(exposure);
+    }
+    const train::ViewRenderer one = train::view_renderer_of(device(), made_.truth, {});
+    std::vector<size_t> calls;
+    const train::ViewRenderer two{2, [&](std::span<const Camera> cameras) {
+                                      calls.push_back(cameras.size());
+                                      return one.images(cameras);
+                                  }};
+    train::evaluate_views(two, made_.dataset, {0, 1, 2, 3, 4}, {}, appearances, {},
+                          [&](size_t i, const train::RenderedView& view, const EvalFrame&) {
+                              const Image own = one.images(std::span(&made_.dataset.frames[i].camera, 1))[0];
+                              EXPECT_EQ(view.rendering.pixels, with_appearance(own, appearances[i]).pixels);
+                              places_.push_back(i);
+                          });
+    EXPECT_EQ(places_, (std::vector<size_t>{0, 1, 2, 3, 4}));
+    EXPECT_EQ(calls, (std::vector<size_t>{2, 2, 1}));
+}
+
 TEST_F(EvaluationOfViews, EndsByTheExceptionOfAFrame) {
     EXPECT_THROW(evaluate(false, 3), std::runtime_error);
     EXPECT_EQ(places_, (std::vector<size_t>{0, 1}));  // the third was not yet compared
