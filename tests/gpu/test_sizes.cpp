@@ -8,6 +8,7 @@
 
 #include "ewa/error.h"
 #include "gpu/test_device.h"
+#include "passes/pass.h"
 #include "pipeline/frame_buffers.h"
 #include "pipeline/frame_inputs.h"
 #include "pipeline/model.h"
@@ -177,6 +178,22 @@ TEST(SizesFor, AWideDigitSavesAPassWhereLanesCountAlone) {
     config.ranked_sort = true;
     EXPECT_EQ(radix_cut(config, 1'000'000, 11).passes, 2u);
     EXPECT_EQ(radix_cut(config, many, 15).passes, 2u);
+}
+
+/// Neighbouring lanes go to one thread, so a thread without a workgroup would have nothing to do.
+TEST(SizesFor, TheWorkgroupsOfASortInOnePassAreSharedByTheThreads) {
+    gpu::Limits limits;
+    limits.subgroup_size = 8;
+    limits.cpu = true;
+    for (const uint32_t threads : {2u, 8u, 16u}) {
+        limits.threads = threads;
+        const passes::KernelConfig config = passes::config_for(limits);
+        for (const auto& [bits, each] : {std::pair{13u, 4u}, {14u, 2u}, {15u, 1u}, {17u, 1u}}) {
+            shared::SortPush push{};
+            push.lanes = radix_cut(config, 512u << 17, bits).lanes;
+            EXPECT_EQ(passes::PerSortLane::groups(config, push)[0], each * threads) << bits << " bits";
+        }
+    }
 }
 
 TEST(SizesFor, LanesAreBetweenASubgroupAndTheMost) {
