@@ -264,10 +264,11 @@ TEST_F(Pictures, SizesOfScreensHaveNames) {
 TEST_F(Pictures, TheCodecIsOneThatFfmpegHas) {
     place({{0, 0, 3}});
     std::filesystem::create_directories(folder / "bin");
-    write_file(folder / "bin/ffmpeg",
-               "#!/bin/sh\nPATH=/usr/bin:/bin\ncase \"$*\" in\n*-encoders*) echo ' V....D librav1e  AV1'; "
-               "echo ' V....D libx264  H.264';;\n*) printf '%s\\n' \"$@\" > " +
-                   (folder / "arguments") + "\nfor last; do :; done\ncat > \"$last\";;\nesac\n");
+    write_file(
+        folder / "bin/ffmpeg",
+        "#!/bin/sh\nPATH=/usr/bin:/bin\ncase \"$*\" in\n*-encoders*) echo ' V....D librav1e  AV1'; "
+        "echo ' V....D libx264rgb  RGB'; echo ' V....D libopenh264  H.264';;\n*) printf '%s\\n' \"$@\" > " +
+            (folder / "arguments") + "\nfor last; do :; done\ncat > \"$last\";;\nesac\n");
     chmod((folder / "bin/ffmpeg").c_str(), 0755);
     const auto film = [&](const Names& more) {
         Names arguments{"render", splats, "-o", folder / "f.mp4", "--orbit", "2", "--size", "8x6"};
@@ -276,6 +277,9 @@ TEST_F(Pictures, TheCodecIsOneThatFfmpegHas) {
     };
     expect_success(film({"--codec", "av1"}));
     EXPECT_NE(read_file(folder / "arguments").find("\n-c:v\nlibrav1e\n"), std::string::npos);
+    // No encoder by a part of its name.
+    expect_success(film({"--codec", "h264"}));
+    EXPECT_NE(read_file(folder / "arguments").find("\n-c:v\nlibopenh264\n"), std::string::npos);
     expect_failure(film({"--codec", "vp9"}), 1, "libvpx-vp9");
     for (const auto& [name, codec] :
          {std::pair{"f.webm", "h264"}, {"f.webm", "hevc"}, {"f.mov", "vp9"}, {"f.mov", "av1"}})
