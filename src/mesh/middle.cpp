@@ -26,7 +26,8 @@ void for_pixels(std::span<const Camera> cameras, const DepthOfView& depth, const
         for (size_t p = 0; p < image.pixels.size(); p += step) {
             const double z = double(image.pixels[p]);
             if (!(z > 0)) continue;
-            const double x = double(p % size_t(image.width)) + 0.5, y = double(p / size_t(image.width)) + 0.5;
+            const size_t column = p % size_t(image.width), row = p / size_t(image.width);
+            const double x = double(column) + 0.5, y = double(row) + 0.5;
             const glm::dvec3 ray((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1);
             add(camera, to_world * (z * ray - camera.translation), z);
         }

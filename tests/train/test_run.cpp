@@ -13,6 +13,7 @@
 
 #include "core/json.h"
 #include "ewa/error.h"
+#include "ewa/splat_files.h"
 #include "run/advanced_options.h"
 #include "run/loss_option.h"
 #include "run/option_table.h"

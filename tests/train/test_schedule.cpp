@@ -13,6 +13,7 @@
 #include <string>
 
 #include "ewa/error.h"
+#include "ewa/training_needs.h"
 #include "train/exclusions.h"
 #include "train/image_cache.h"
 
