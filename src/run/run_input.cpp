@@ -284,9 +284,9 @@ Gaussians splats_of(const PointCloud& points, const RunOptions& options, const D
 Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames,
                          StartSource* source) {
     StartSource unused;
-    StartSource& told = source ? *source : unused;
-    told = {};
-    StartsFrom& from = told.from;
+    StartSource& found = source ? *source : unused;
+    found = {};
+    StartsFrom& from = found.from;
     from = options.init == "random" ? StartsFrom::random : StartsFrom::file;
     const int degree = options.train.sh_degree;
     const std::filesystem::path file = options.init_folder / options.init;
@@ -308,8 +308,8 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
     if (chosen || (options.init == "sfm" && start.size() == 0)) {
         const auto [points, images] = points_by_stereo(dataset, frames, options.train.render.background,
                                                        first_splats(options), options.train.seed);
-        told.points = points.positions.size();
-        told.images = images;
+        found.points = points.positions.size();
+        found.images = images;
         // Random splats fill any region. Points may all lie outside.
         const bool enough = std::ranges::any_of(
             points.positions, [&](const glm::dvec3& point) { return in_region(options.train, point); });
