@@ -35,6 +35,13 @@ enum class LensUse {
     undistort  // images are resampled to those of a pinhole
 };
 
+/// The result of load_frame_image for a frame with these values.
+struct KeptImage {
+    Image image;
+    int downscale = 1;
+    std::shared_ptr<const Image> left_out;
+};
+
 struct Frame {
     std::string name;                  // in the dataset, e.g. "0001.jpg"
     std::filesystem::path image_path;  // may not exist: see image_exists
@@ -59,6 +66,8 @@ struct Frame {
     Camera pinhole;         // `camera` before downscaling
     int downscale = 1;      // factor that is applied to the file, which may be a smaller copy already
     int split = 0;          // 1 train, 2 test; 0: split_frames decides
+    /// The frame's image, for as long as somebody keeps it who has read it before.
+    std::weak_ptr<const KeptImage> kept;
 
     /// Whether alpha in load_frame_image's result is the weight of pixels.
     bool alpha_weighs() const { return left_out || masks == MaskUse::ignore; }

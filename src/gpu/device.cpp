@@ -89,10 +89,11 @@ void check_address_space(const DeviceInfo& info) {
 
 }  // namespace
 
-Device::Device(const DeviceInfo& info, bool validation, bool own_queue) : info_(info) {
+Device::Device(const DeviceInfo& info, bool validation, bool own_queue, vk::UniqueInstance instance)
+    : info_(info), instance_(std::move(instance)) {
     check_address_space(info);
     try {
-        create_instance(validation);
+        if (!instance_) create_instance(validation);
         physical_ = instance_->enumeratePhysicalDevices().at(size_t(info.index));
         create_device(own_queue);
     } catch (const vk::SystemError& error) {
@@ -268,26 +269,40 @@ void Device::check_validation() {
 
 }  // namespace gpu
 
-std::vector<DeviceInfo> list_devices() {
+namespace {
+
+struct Found {
+    vk::UniqueInstance instance;
+    std::vector<DeviceInfo> devices;
+};
+
+Found find_devices() {
     try {
-        const auto instance = gpu::make_instance({}, {});
-        std::vector<DeviceInfo> infos;
+        Found found{gpu::make_instance({}, {}), {}};
         int index = 0;
-        for (const auto& device : instance->enumeratePhysicalDevices())
-            infos.push_back(gpu::describe(device, index++));
-        if (infos.empty())
+        for (const auto& device : found.instance->enumeratePhysicalDevices())
+            found.devices.push_back(gpu::describe(device, index++));
+        if (found.devices.empty())
             throw RunError("no Vulkan device; " + core::address_limit_text() + gpu::what_would_help());
-        return infos;
+        return found;
     } catch (const vk::SystemError& error) {
         throw RunError("no Vulkan driver works (" + vk::to_string(vk::Result(error.code().value())) + "); " +
                        core::address_limit_text() + gpu::what_would_help());
     }
 }
 
+}  // namespace
+
+std::vector<DeviceInfo> list_devices() {
+    return find_devices().devices;
+}
+
 std::shared_ptr<gpu::Device> open_device(const DeviceOptions& options) {
-    const auto infos = list_devices();
-    return std::make_shared<gpu::Device>(gpu::choose_device(infos, options.selector), options.validation,
-                                         options.own_queue);
+    Found found = find_devices();
+    const DeviceInfo chosen = gpu::choose_device(found.devices, options.selector);
+    if (options.validation) found.instance.reset();  // the validation layer comes with an instance of its own
+    return std::make_shared<gpu::Device>(chosen, options.validation, options.own_queue,
+                                         std::move(found.instance));
 }
 
 DeviceInfo device_info(const gpu::Device& device) {

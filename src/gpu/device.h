@@ -44,8 +44,8 @@ class PipelineStore;
 
 class Device {
   public:
-    /// own_queue: as in DeviceOptions.
-    Device(const DeviceInfo& info, bool validation, bool own_queue = true);
+    /// own_queue: as in DeviceOptions. instance: of which `info` is a device, without validation. Null: it gets one of its own.
+    Device(const DeviceInfo& info, bool validation, bool own_queue = true, vk::UniqueInstance instance = {});
     ~Device();
     Device(const Device&) = delete;
     Device& operator=(const Device&) = delete;

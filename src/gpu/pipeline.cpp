@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <optional>
 #include <stdexcept>
+#include <thread>
 
 #include "ewa/error.h"
 
@@ -189,7 +191,7 @@ vk::DescriptorType descriptor_type(BindingKind kind) {
 namespace {
 
 vk::UniquePipeline compile(Device& device, const std::string& name, const std::vector<uint32_t>& words,
-                           const std::vector<SpecConstant>& constants, bool uses_subgroups,
+                           const std::vector<SpecConstant>& constants, std::optional<uint32_t> lanes,
                            vk::PipelineLayout layout) {
     try {
         vk::ShaderModuleCreateInfo code;
@@ -201,12 +203,11 @@ vk::UniquePipeline compile(Device& device, const std::string& name, const std::v
         const vk::SpecializationInfo specialization(uint32_t(entries.size()), entries.data(),
                                                     constants.size() * sizeof(SpecConstant),
                                                     constants.data());
-        vk::PipelineShaderStageRequiredSubgroupSizeCreateInfoEXT size(device.limits().subgroup_size);
+        vk::PipelineShaderStageRequiredSubgroupSizeCreateInfoEXT size(lanes.value_or(0));
         vk::ComputePipelineCreateInfo create;
         create.stage.setStage(vk::ShaderStageFlagBits::eCompute).setModule(*module).setPName("main");
         create.stage.setPSpecializationInfo(&specialization);
-        // Without subgroup operations, the driver knows best how wide the shader runs.
-        if (device.subgroup_size_control() && uses_subgroups) {
+        if (lanes) {
             create.stage.setPNext(&size);
             create.stage.setFlags(vk::PipelineShaderStageCreateFlagBits::eRequireFullSubgroupsEXT);
         }
@@ -243,12 +244,17 @@ Pipeline::Pipeline(Device& device, std::string name, std::span<const uint32_t> s
     } catch (const vk::SystemError& error) {
         throw RunError("shader " + name_ + ": " + error.what());
     }
-    const bool at_once = device.limits().cpu;
-    pipeline_ = std::async(at_once ? std::launch::deferred : std::launch::async, compile, std::ref(device),
-                           name_, with_float_modes(with_values(spirv, constants), device.float_modes()),
-                           constants, reflection_.uses_subgroups, *layout_);
-    if (at_once) pipeline_.get();
+    // Without subgroup operations, the driver knows best how wide the shader runs.
+    const auto lanes = device.subgroup_size_control() && reflection_.uses_subgroups
+                           ? std::optional(device.limits().subgroup_size)
+                           : std::nullopt;
+    // A CPU has no more cores than its compiler fills: the store has as many threads.
+    pipeline_ = std::async(
+        device.limits().cpu ? std::launch::deferred : std::launch::async, compile, std::ref(device), name_,
+        with_float_modes(with_values(spirv, constants), device.float_modes()), constants, lanes, *layout_);
 }
+
+PipelineStore::PipelineStore() : threads_(std::max(1u, std::thread::hardware_concurrency())) {}
 
 const Pipeline& PipelineStore::get(Device& device, const std::string& name, std::span<const uint32_t> spirv,
                                    const std::vector<SpecConstant>& constants) {
@@ -256,7 +262,9 @@ const Pipeline& PipelineStore::get(Device& device, const std::string& name, std:
     const std::pair key(spirv.data(), constants);
     const auto found = pipelines_.find(key);
     if (found != pipelines_.end()) return found->second;
-    return pipelines_.emplace(key, Pipeline(device, name, spirv, constants)).first->second;
+    const Pipeline& made = pipelines_.emplace(key, Pipeline(device, name, spirv, constants)).first->second;
+    if (device.limits().cpu) threads_.add(spirv.size(), made.compilation());
+    return made;
 }
 
 size_t PipelineStore::count() const {

@@ -4,6 +4,7 @@
 #pragma once
 #include <compare>
 #include <cstdint>
+#include <functional>
 #include <future>
 #include <map>
 #include <mutex>
@@ -12,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "gpu/compile_threads.h"
 #include "gpu/device.h"
 
 namespace ewa::gpu {
@@ -55,8 +57,8 @@ std::vector<uint32_t> with_float_modes(std::span<const uint32_t> spirv, const Fl
 class Pipeline {
   public:
     /// constants: those that the shader does not declare are ignored. Throws std::logic_error if one that it
-    /// declares is missing. A CPU device compiles at once, any other in a thread of its own: a GPU's compiler takes up to
-    /// a second a shader, and a recording asks for many.
+    /// declares is missing. It is compiled in a thread of its own, as a GPU's compiler takes up to a second a shader. On a CPU
+    /// device, the first that waits for it compiles it.
     Pipeline(Device& device, std::string name, std::span<const uint32_t> spirv,
              const std::vector<SpecConstant>& constants);
 
@@ -66,6 +68,10 @@ class Pipeline {
     vk::Pipeline handle() const { return *pipeline_.get(); }
     vk::PipelineLayout layout() const { return *layout_; }
     vk::DescriptorSetLayout set_layout() const { return *set_layout_; }
+    /// Compiles it, or waits for that, without a word of errors: handle() throws them.
+    std::function<void()> compilation() const {
+        return [pipeline = pipeline_] { pipeline.wait(); };
+    }
 
   private:
     std::string name_;
@@ -75,10 +81,11 @@ class Pipeline {
     std::shared_future<vk::UniquePipeline> pipeline_;
 };
 
-/// The pipelines of a device, which live as long as it. Each is compiled once, for all who share the device. Calls may come
-/// from any thread.
+/// The pipelines of a device, which live as long as it. Each is compiled once, for all who share the device. A CPU device
+/// compiles on all cores. Calls may come from any thread.
 class PipelineStore {
   public:
+    PipelineStore();
     /// spirv: a module that outlives the device; its address stands for it. Throws as Pipeline's constructor does.
     const Pipeline& get(Device& device, const std::string& name, std::span<const uint32_t> spirv,
                         const std::vector<SpecConstant>& constants);
@@ -88,6 +95,7 @@ class PipelineStore {
   private:
     mutable std::mutex mutex_;
     std::map<std::pair<const uint32_t*, std::vector<SpecConstant>>, Pipeline> pipelines_;
+    CompileThreads threads_;  // last: they end before the pipelines do
 };
 
 vk::DescriptorType descriptor_type(BindingKind kind);

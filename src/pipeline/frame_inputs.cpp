@@ -59,13 +59,24 @@ void set_readout(const Camera& camera, shared::CameraBlock& block) {
     block.readout_first = float(motion.first);
 }
 
+/// The nearest of 255 levels; halves round up.
+uint8_t level(float value) {
+    const float scaled = std::clamp(value, 0.0f, 1.0f) * 255.0f;
+    const auto whole = int(scaled);
+    return uint8_t(whole + int(scaled - float(whole) >= 0.5f));
+}
+
 template <class Value, class Convert>
-gpu::Buffer upload_texels(gpu::Device& device, const Image& image, gpu::Texel texel, Value opaque,
-                          Convert convert) {
+std::vector<Value> texels_of(const Image& image, Value opaque, Convert convert) {
     const size_t pixels = size_t(image.width) * size_t(image.height), channels = size_t(image.channels);
     std::vector<Value> texels(4 * pixels, opaque);
     for (size_t i = 0; i < pixels; ++i)
         for (size_t c = 0; c < channels; ++c) texels[4 * i + c] = convert(image.pixels[i * channels + c]);
+    return texels;
+}
+
+template <class Value>
+gpu::Buffer upload_texels(gpu::Device& device, const std::vector<Value>& texels, gpu::Texel texel) {
     gpu::Buffer buffer(device, "photo", texels.size() * sizeof(Value), texel);
     buffer.upload(std::span<const Value>(texels));
     return buffer;
@@ -161,16 +172,23 @@ bool transparent(const Image& image) {
     return found;
 }
 
-gpu::Buffer upload_photo(gpu::Device& device, const Image& image, bool round_to_8_bit) {
-    const auto level = [](float value) { return std::round(std::clamp(value, 0.0f, 1.0f) * 255.0f); };
+PhotoTexels photo_texels(const Image& image, bool round_to_8_bit) {
     bool eight_bit = true;
     if (!round_to_8_bit)
         for (const float value : image.pixels)
-            eight_bit = eight_bit && value >= 0 && value <= 1 && level(value) / 255.0f == value;
-    if (eight_bit)
-        return upload_texels<uint8_t>(device, image, gpu::Texel::rgba8, 255,
-                                      [&](float value) { return uint8_t(level(value)); });
-    return upload_texels<float>(device, image, gpu::Texel::rgba32f, 1.0f, [](float value) { return value; });
+            eight_bit = eight_bit && value >= 0 && value <= 1 && float(level(value)) / 255.0f == value;
+    if (eight_bit) return texels_of<uint8_t>(image, 255, level);
+    return texels_of<float>(image, 1.0f, [](float value) { return value; });
+}
+
+gpu::Buffer upload_photo(gpu::Device& device, const PhotoTexels& texels) {
+    if (const auto* bytes = std::get_if<std::vector<uint8_t>>(&texels))
+        return upload_texels(device, *bytes, gpu::Texel::rgba8);
+    return upload_texels(device, std::get<std::vector<float>>(texels), gpu::Texel::rgba32f);
+}
+
+gpu::Buffer upload_photo(gpu::Device& device, const Image& image, bool round_to_8_bit) {
+    return upload_photo(device, photo_texels(image, round_to_8_bit));
 }
 
 uint64_t photo_bytes(int width, int height, bool round_to_8_bit) {

@@ -3,6 +3,8 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <variant>
+#include <vector>
 
 #include "ewa/camera.h"
 #include "ewa/gaussians.h"
@@ -65,6 +67,9 @@ FrameInputs inputs_of(const gpu::Buffer& block, const Camera& camera, const Rend
 /// A training image as the loss reads it: width * height RGBA texels, 8-bit if every value is one of 256
 /// levels, or with round_to_8_bit; else float32. An image of 3 channels is opaque. FramePasses::loss says what
 /// alpha means.
+using PhotoTexels = std::variant<std::vector<uint8_t>, std::vector<float>>;
+PhotoTexels photo_texels(const Image& image, bool round_to_8_bit = false);
+gpu::Buffer upload_photo(gpu::Device& device, const PhotoTexels& texels);
 gpu::Buffer upload_photo(gpu::Device& device, const Image& image, bool round_to_8_bit = false);
 
 /// Whether a pixel of the image has an alpha below 1.

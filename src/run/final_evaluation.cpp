@@ -2,6 +2,7 @@
 #include "run/final_evaluation.h"
 
 #include <algorithm>
+#include <future>
 #include <span>
 #include <utility>
 
@@ -15,6 +16,7 @@ namespace {
 // Their mean says enough. All views of a large set would take longer than its training.
 constexpr size_t kTrainViewsEvaluated = 40;
 constexpr size_t kSavedRenders = 4;
+constexpr uint64_t kMostKept = 1 << 25;  // float32 values of views that are kept: 128 MiB
 
 /// Thrown out of a part that the observer stops.
 struct Stopped {};
@@ -82,6 +84,7 @@ bool FinalEvaluation::evaluate(RunCameras& cameras, const RunFolder& folder) {
                       spread_out(scene_.appearances, kTrainViewsEvaluated), !held_out, {})
                 .psnr;
     });
+    for (std::future<void>& saved : saving_) saved.get();
     if (!done) report_.views.clear();
     return done;
 }
@@ -116,11 +119,22 @@ void FinalEvaluation::add_view(int index, const RenderedView& view, const EvalFr
     report_.views.push_back(
         report::small_view(figures.name, view.photo, view.rendering, figures.psnr, figures.ssim));
     report_.views.back().frame = index;
+    keep(index, view);
     const auto file = saved_.find(index);
     if (file == saved_.end()) return;
     core::make_folder(file->second.parent_path());
-    save_image(without_link(file->second), view.rendering);
+    // Packing a PNG takes longer than drawing the next view.
+    saving_.push_back(
+        std::async([path = without_link(file->second), image = view.rendering] { save_image(path, image); }));
     if (first_render_.empty()) first_render_ = file->second;
+}
+
+/// Keeps a view for its full size, if it is the one that this shows. Other protocols than ewa's round it.
+void FinalEvaluation::keep(int index, const RenderedView& view) {
+    const uint64_t values = view.photo.pixels.size() + view.rendering.pixels.size();
+    if (measures_.protocol != Protocol::ewa || kept_values_ + values > kMostKept) return;
+    kept_values_ += values;
+    kept_.emplace(index, RenderedView{view.photo, {}, view.rendering});
 }
 
 bool FinalEvaluation::add_full_size() {
@@ -135,19 +149,24 @@ bool FinalEvaluation::add_full_size() {
     });
 }
 
-/// Returns the bytes that it adds.
-size_t FinalEvaluation::add_full_size(report::ReportView& view) const {
+RenderedView FinalEvaluation::drawn_again(int index) const {
     const std::vector<int>& train = input_.split.train;
-    const auto place = std::find(train.begin(), train.end(), view.frame);
+    const auto place = std::find(train.begin(), train.end(), index);
     const bool known = !scene_.appearances.empty() && place != train.end();
     const auto of_new_view = new_view_appearance(scene_.appearances);
-    const Frame& frame = input_.dataset.frames[size_t(view.frame)];
-    const RenderedView rendered =
-        with_photo(std::move(scene_.renderer.images(std::span(&frame.camera, 1)).front()), frame,
-                   input_.options.train.render,
-                   known         ? &scene_.appearances[size_t(place - train.begin())]
-                   : of_new_view ? &*of_new_view
-                                 : nullptr);
+    const Frame& frame = input_.dataset.frames[size_t(index)];
+    return with_photo(std::move(scene_.renderer.images(std::span(&frame.camera, 1)).front()), frame,
+                      input_.options.train.render,
+                      known         ? &scene_.appearances[size_t(place - train.begin())]
+                      : of_new_view ? &*of_new_view
+                                    : nullptr);
+}
+
+/// Returns the bytes that it adds.
+size_t FinalEvaluation::add_full_size(report::ReportView& view) const {
+    const auto kept = kept_.find(view.frame);
+    if (kept != kept_.end()) return report::add_full_size(view, kept->second.photo, kept->second.rendering);
+    const RenderedView rendered = drawn_again(view.frame);
     return report::add_full_size(view, rendered.photo, rendered.rendering);
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 #include <filesystem>
 #include <functional>
+#include <future>
 #include <map>
 #include <memory>
 #include <optional>
@@ -67,6 +68,8 @@ class FinalEvaluation {
     Evaluation evaluated(const std::vector<int>& frames, const std::vector<Appearance>& appearances,
                          bool shown, const Measures& measures);
     void add_view(int index, const RenderedView& view, const EvalFrame& figures);
+    void keep(int index, const RenderedView& view);
+    RenderedView drawn_again(int index) const;
     size_t add_full_size(report::ReportView& view) const;
 
     RunObserver& observer_;
@@ -79,6 +82,9 @@ class FinalEvaluation {
     size_t done_ = 0;                                   // views
     std::optional<Evaluation> of_test_views_;
     std::filesystem::path first_render_;
+    std::map<int, RenderedView> kept_;       // for their full size
+    uint64_t kept_values_ = 0;               // of their images
+    std::vector<std::future<void>> saving_;  // renders
 };
 
 }  // namespace ewa::train

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <future>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -35,6 +36,7 @@
 #include "run/run_times.h"
 #include "run/scout.h"
 #include "train/checkpoint.h"
+#include "train/needs.h"
 
 namespace ewa {
 namespace {
@@ -54,12 +56,6 @@ std::vector<PlanLine> plan_of(const Trainer& trainer, const train::RunInput& inp
     return plan;
 }
 
-report::StepTime report_times(const StepTimes& times) {
-    report::StepTime result{times.steps, times.step, times.refinement, {}};
-    for (const PassTime& time : times.passes) result.passes.push_back({time.pass, time.milliseconds});
-    return result;
-}
-
 /// The checkpoint that a run continues from.
 struct EarlierRun {
     std::unique_ptr<train::CheckpointReader> reader;  // until the trainer has it
@@ -76,6 +72,7 @@ class Run {
   public:
     Run(const RunOptions& options, RunObserver& observer)
         : observer_(observer),
+          opening_(std::async(open_device, options.device)),
           progress_{.seconds_before = options.seconds_before, .last = {}, .metrics = {}},
           input_(train::load_run(options)),
           measures_(train::measures_of(options)),
@@ -92,7 +89,7 @@ class Run {
     void read_checkpoint(const TrainOptions& asked);
     void begin_files();
     void leave_out_passers_by();
-    void choose_cap();
+    MemoryEstimate choose_cap();
     TrainOptions capped_options() const;
     void start();
     void list_settings();
@@ -111,6 +108,7 @@ class Run {
     void fill_summary();
 
     RunObserver& observer_;
+    std::future<std::shared_ptr<gpu::Device>> opening_;  // while the dataset is read
     train::RunProgress progress_;
     train::RunInput input_;
     Measures measures_;
@@ -165,10 +163,11 @@ void Run::list_settings() {
         if (name == "device" && value.empty()) value = report_.summary.device + " (chosen by ewa)";
 }
 
-/// Notes the largest number of splats, which is automatic unless the options name it. A checkpoint keeps it.
-void Run::choose_cap() {
-    const TrainOptions& train = options().train;
-    const SplatCap cap = splat_cap(*device_, input_.dataset, input_.split.train, input_.start, train);
+/// Notes the largest number of splats, automatic unless options name it, and returns its memory. A checkpoint keeps it.
+MemoryEstimate Run::choose_cap() {
+    const TrainOptions train = resolve(options().train, input_.dataset, input_.split.train);
+    train::Needs needs(*device_, input_.dataset, input_.split.train, input_.start, train);
+    const SplatCap cap = needs.cap();
     report_.summary.max_splats = cap.splats;
     saves_.settings()["cap"] = cap.splats;
     if (train.max_splats == kAutomaticMaxSplats && train.strategy != Strategy::none)
@@ -176,6 +175,7 @@ void Run::choose_cap() {
                                            core::counted(cap.splats, "splat"), cap.reason));
     const std::string full = train::check_disk_room(folder_.path(), input_.start.size(), cap.splats, train);
     if (!full.empty()) input_.remarks.push_back(full);
+    return needs.memory(cap.splats);
 }
 
 /// The options with that number: the rule of the automatic one takes time on a large dataset.
@@ -187,8 +187,9 @@ TrainOptions Run::capped_options() const {
 
 /// Opens the device and tells the observer what the run begins with.
 void Run::start() {
-    device_ = open_device(options().device);
-    choose_cap();
+    device_ = opening_.get();
+    RunStart start;
+    start.memory = choose_cap();
     report_.title = input_.name;
     report_.notes = input_.notes;
     report_.remarks = input_.remarks;
@@ -201,7 +202,6 @@ void Run::start() {
     saves_.settings()["device"] = summary.device;
 
     const Camera& camera = input_.dataset.frames[size_t(input_.split.train.front())].camera;
-    RunStart start;
     start.name = input_.name;
     start.train_views = input_.split.train.size();
     start.test_views = input_.split.test.size();
@@ -214,8 +214,6 @@ void Run::start() {
     start.remarks = input_.notes;
     start.remarks.insert(start.remarks.end(), input_.remarks.begin(), input_.remarks.end());
     start.device = device_info(*device_);
-    start.memory =
-        estimate_memory(*device_, input_.dataset, input_.split.train, input_.start, capped_options());
     observer_.on_start(start);
 }
 
@@ -398,7 +396,7 @@ train::TrainedScene Run::save_last(std::unique_ptr<Trainer>& trainer) {
     if (options().inria) train::save_inria(folder_.path(), input_, scene.gaussians, last.step);
     folder_.save_appearances(input_.dataset, input_.split.train, scene.appearances);
     folder_.save_sky(scene.sky);
-    report_.times = report_times(trainer->step_times());
+    report_.times = train::report_times(trainer->step_times());
     report_.summary.ranks = trainer->rank_figures();
     report_.summary.chunks = trainer->chunk_figures();
     if (!draws_with_ranks()) trainer.reset();  // the renderer takes its memory
@@ -455,6 +453,7 @@ RunResult Run::run() {
                  input_.start, *device_);
     leave_out_passers_by();
     std::unique_ptr<Trainer> trainer = make_trainer();
+    input_.images.clear();  // the trainer has them
     progress_.last.splats = trainer->splats();
     restore(*trainer);
     begin_files();

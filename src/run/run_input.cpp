@@ -391,6 +391,7 @@ RunInput load_run(const RunOptions& options) {
     }
     TrainOptions& train = input.options.train;
     if (train.appearance == AppearanceModel::automatic && !train.exposure) {
+        input.images = scene::read_images(input.dataset, compared_frames(input.split.train));
         const AppearanceChoice choice = choose_appearance(train, input.dataset, input.split.train);
         train.appearance = choice.model;
         const bool learned = choice.model != AppearanceModel::none;

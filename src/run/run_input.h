@@ -7,6 +7,7 @@
 
 #include "ewa/run_options.h"
 #include "run/viewed_sphere.h"
+#include "scene/frame_images.h"
 
 namespace ewa::train {
 
@@ -16,6 +17,7 @@ struct RunInput {
     Dataset dataset;
     Split split;
     Gaussians start;
+    scene::KeptImages images;  // that are read already
     // For the user and the report: what ewa chose, and what may be wrong.
     std::vector<std::string> notes, remarks;
 

@@ -41,6 +41,12 @@ std::vector<TimesAt> times_in(const PlainJson& all, const char* name, const std:
 
 }  // namespace
 
+report::StepTime report_times(const StepTimes& times) {
+    report::StepTime result{times.steps, times.step, times.refinement, {}};
+    for (const PassTime& time : times.passes) result.passes.push_back({time.pass, time.milliseconds});
+    return result;
+}
+
 void add_checkpoint(RunTimes& times, const TimesAt& checkpoint) {
     times.checkpoints.push_back(checkpoint);
     while (times.checkpoints.size() > 2) times.checkpoints.erase(times.checkpoints.begin());

@@ -9,7 +9,9 @@
 #include <filesystem>
 #include <vector>
 
+#include "ewa/step_report.h"
 #include "ewa/summary.h"
+#include "report/step_time.h"
 
 namespace ewa::train {
 
@@ -25,6 +27,9 @@ struct RunTimes {
 
 /// Adds a checkpoint, and forgets all but the one before it.
 void add_checkpoint(RunTimes& times, const TimesAt& checkpoint);
+
+/// As the report has them.
+report::StepTime report_times(const StepTimes& times);
 
 /// The times of the metrics.
 std::vector<TimesAt> times_of(const std::vector<MetricsLine>& metrics);

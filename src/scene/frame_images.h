@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// How many images of frames may be decoded at once.
+// The images of frames: how many may be decoded at once, and those that are kept to be decoded once.
 #pragma once
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "ewa/dataset.h"
@@ -18,6 +19,14 @@ inline size_t images_at_once(const std::vector<const Frame*>& frames) {
         largest = std::max(largest, uint64_t(frame->source.width) * uint64_t(frame->source.height));
     return size_t(std::max<uint64_t>(1, kPixels / largest));
 }
+
+/// The image that is kept for the frame as it is, or else the result of load_frame_image. Throws as that does.
+std::shared_ptr<const Image> image_of(const Frame& frame);
+
+using KeptImages = std::vector<std::shared_ptr<const KeptImage>>;
+/// Reads the images of these frames, on all cores, as far as they take no more than 128 MiB as four float32 channels. image_of
+/// takes them for as long as the result lives. Throws as load_frame_image does.
+KeptImages read_images(Dataset& dataset, const std::vector<int>& indices);
 
 /// The frames with these indices.
 inline std::vector<const Frame*> frames_at(const Dataset& dataset, const std::vector<int>& indices) {

@@ -6,6 +6,8 @@
 #include <nanoflann.hpp>
 #include <numeric>
 
+#include "core/parallel.h"
+
 namespace ewa::scene {
 
 namespace {
@@ -55,6 +57,15 @@ Places places_of(const std::vector<glm::dvec3>& positions) {
     return places;
 }
 
+/// Calls work(i) for each i < count on all cores, many at a time.
+template <class Work>
+void in_blocks(size_t count, const Work& work) {
+    constexpr size_t kBlock = 1024;
+    core::on_all_cores((count + kBlock - 1) / kBlock, [&](size_t block) {
+        for (size_t i = block * kBlock; i < std::min(count, (block + 1) * kBlock); ++i) work(i);
+    });
+}
+
 /// The mean over the three nearest other points, or over all if there are fewer.
 double mean_at(const Places& places, const Tree& tree, size_t place) {
     std::array<size_t, kNeighbors + 1> index{};
@@ -80,7 +91,7 @@ std::vector<double> mean_squared_neighbor_distance(const std::vector<glm::dvec3>
 
     const Tree tree(3, places);
     std::vector<double> mean(places.positions.size()), result(positions.size());
-    for (size_t i = 0; i < mean.size(); ++i) mean[i] = mean_at(places, tree, i);
+    in_blocks(mean.size(), [&](size_t i) { mean[i] = mean_at(places, tree, i); });
     for (size_t i = 0; i < result.size(); ++i) result[i] = mean[places.place_of[i]];
     return result;
 }
@@ -89,18 +100,20 @@ std::vector<std::array<size_t, 2>> neighbor_pairs(const std::vector<glm::dvec3>&
     const Places places = places_of(positions);
     if (places.positions.empty()) return {};
     const Tree tree(3, places);
-    std::vector<std::array<size_t, 2>> pairs;
-    std::vector<size_t> index(count + 1);
-    std::vector<double> squared(count + 1);
-    for (size_t place = 0; place < places.positions.size(); ++place) {
+    // Entry i of a place is its i-th neighbour; a pair of a place with itself stands for none.
+    std::vector<std::array<size_t, 2>> pairs(places.positions.size() * (count + 1));
+    in_blocks(places.positions.size(), [&](size_t place) {
+        std::vector<size_t> index(count + 1);
+        std::vector<double> squared(count + 1);
         const size_t found =
             tree.knnSearch(&places.positions[place].x, index.size(), index.data(), squared.data());
+        const size_t a = places.first[place];
         for (size_t i = 0; i < found; ++i) {
-            if (index[i] == place) continue;
-            const size_t a = places.first[place], b = places.first[index[i]];
-            pairs.push_back({std::min(a, b), std::max(a, b)});
+            const size_t b = places.first[index[i]];
+            pairs[place * (count + 1) + i] = {std::min(a, b), std::max(a, b)};
         }
-    }
+    });
+    std::erase_if(pairs, [](const std::array<size_t, 2>& pair) { return pair[0] == pair[1]; });
     std::sort(pairs.begin(), pairs.end());
     pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
     return pairs;

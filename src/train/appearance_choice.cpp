@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "core/parallel.h"
 #include "image/image_files.h"
@@ -101,7 +102,8 @@ bool are_related(const std::vector<double>& a, const std::vector<double>& b) {
 /// What the frame's image is against the points that it shows: log2(image / point), as medians. Unknown where the points are too
 /// few, or do not have the colours of the image.
 Measures against_points(const Dataset& dataset, const Frame& frame) {
-    const Image image = load_frame_image(frame);
+    const std::shared_ptr<const Image> read = scene::image_of(frame);
+    const Image& image = *read;
     std::array<std::vector<double>, kQuantities> values;
     std::vector<double> own, usual;
     for (const SeenPoint& p : seen_points(frame.camera, dataset.points)) {
@@ -178,11 +180,15 @@ Spread spread_of(const std::vector<Measures>& each, size_t quantity) {
 
 }  // namespace
 
-Disagreement disagreement_of(const Dataset& dataset, const std::vector<int>& frames) {
+std::vector<int> compared_frames(const std::vector<int>& frames) {
     const size_t count = std::min(frames.size(), kMostImages);
     std::vector<int> some;
     for (size_t k = 0; k < count; ++k) some.push_back(frames[k * frames.size() / count]);
-    const Found found = measure(dataset, some);
+    return some;
+}
+
+Disagreement disagreement_of(const Dataset& dataset, const std::vector<int>& frames) {
+    const Found found = measure(dataset, compared_frames(frames));
     const Spread exposures = spread_of(found.each, kExposure);
     const auto differ = [&](size_t quantity) {
         return std::sqrt(spread_of(found.each, quantity).true_variance);

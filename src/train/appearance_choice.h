@@ -21,8 +21,11 @@ struct Disagreement {
 
 /// Compares each image with the colours of the dataset's points. An image's value is the median over the points that it shows;
 /// a point behind others does not count. Without points, EXIF's time, f-number and ISO count. frames: indices into
-/// dataset.frames; at most 64 of them are read. Throws InputError (an image that cannot be read).
+/// dataset.frames; at most 64 of them are compared. Throws InputError (an image that cannot be read).
 Disagreement disagreement_of(const Dataset& dataset, const std::vector<int>& frames);
+
+/// The frames whose images disagreement_of reads.
+std::vector<int> compared_frames(const std::vector<int>& frames);
 
 /// The exposure of each frame's image in stops of the stored values, against their mean: what PPISP starts from. 0 where neither
 /// points nor EXIF say it. Throws as disagreement_of.

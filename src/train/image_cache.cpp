@@ -30,12 +30,13 @@ bool has_depths(const Frame& frame, const LossWeights& loss) {
 }
 
 LoadedPhoto load_photo(const Frame& frame, const DepthSource& depths) {
-    LoadedPhoto loaded{load_frame_image(frame), {}};
+    LoadedPhoto loaded{scene::image_of(frame), {}, {}};
+    loaded.texels = pipeline::photo_texels(*loaded.image, frame.eight_bit);
     if (!depths.points.empty() && frame.seen)
         loaded.depths = depths_of_points(frame, depths.points);
     else if (depths.maps && !frame.depth_path.empty())
         loaded.depths = load_depth_map(frame);
-    if (!loaded.depths.pixels.empty()) drop_masked(loaded.depths, loaded.image);
+    if (!loaded.depths.pixels.empty()) drop_masked(loaded.depths, *loaded.image);
     return loaded;
 }
 
@@ -124,7 +125,7 @@ ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, 
 }
 
 ImageCache::Photo ImageCache::upload(const Frame& frame, const LoadedPhoto& loaded) const {
-    const Image& image = loaded.image;
+    const Image& image = *loaded.image;
     if (image.width != frame.camera.width || image.height != frame.camera.height)
         throw InputError("frame " + frame.name + " changed its size while it was read");
     const bool partly = pipeline::transparent(image), masked = partly && frame.alpha_weighs();
@@ -137,7 +138,7 @@ ImageCache::Photo ImageCache::upload(const Frame& frame, const LoadedPhoto& load
         depths = gpu::Buffer(device_, "depth map", 4 * loaded.depths.pixels.size());
         depths.upload(std::span<const float>(loaded.depths.pixels));
     }
-    return {pipeline::upload_photo(device_, image, frame.eight_bit),
+    return {pipeline::upload_photo(device_, loaded.texels),
             masked,
             partly && !masked && frame.masks == MaskUse::cut,
             masked ? mean_weight(image) : 1,

@@ -11,6 +11,7 @@
 #include "gpu/buffer.h"
 #include "passes/kernel_config.h"
 #include "pipeline/forward.h"
+#include "pipeline/frame_inputs.h"
 
 namespace ewa::train {
 
@@ -19,7 +20,9 @@ bool may_be_cut(const Frame& frame);
 
 /// A frame's image on the host, and the depths that the loss compares; else these have no pixels.
 struct LoadedPhoto {
-    Image image, depths;
+    std::shared_ptr<const Image> image;
+    pipeline::PhotoTexels texels;  // of the image
+    Image depths;
 };
 
 /// Device bytes of a photo of this size.

@@ -13,6 +13,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/parallel.h"
 #include "pipeline/frame_buffers.h"
 #include "pipeline/model.h"
 #include "pipeline/plan.h"
@@ -115,12 +116,12 @@ void add_footprint(Footprints& sum, const SeenSplat& f, double least_opacity, co
 std::vector<SampledView> sampled_views(const Gaussians& start, const Dataset& dataset,
                                        const std::vector<int>& frames, size_t stride) {
     std::vector<SampledView> views(std::min(frames.size(), kViews));
-    for (size_t v = 0; v < views.size(); ++v) {
+    core::on_all_cores(views.size(), [&](size_t v) {
         views[v].camera = &dataset.frames[size_t(frames[v * frames.size() / views.size()])].camera;
         for (size_t i = 0; i < start.size(); i += stride)
             if (const auto footprint = project(start, i, *views[v].camera))
                 views[v].seen.push_back(*footprint);
-    }
+    });
     return views;
 }
 
@@ -204,15 +205,18 @@ uint64_t MemoryEstimator::pairs(uint32_t splats) {
     const bool opaque = sample_->opaque;
     const double growth = opaque ? 1 : double(splats) / double(start_.size());
     const double shrink = std::pow(growth, options_.strategy == Strategy::mcmc ? -kMcmcShrink : -kAdcShrink);
-    double most = 0;
-    for (const SampledView& view : sample_->views)
+    std::vector<double> of_view(sample_->views.size());
+    core::on_all_cores(of_view.size(), [&](size_t v) {
+        const SampledView& view = sample_->views[v];
         for (const Band& band : bands_of(config, uint32_t(view.camera->height), options_.bands)) {
             Footprints sum;
             for (const SeenSplat& f : view.seen)
                 add_footprint(sum, f, opaque ? 0 : kLeastOpacity, *view.camera, config, band);
             const double seen = sum.splats + shrink * sum.sides + shrink * shrink * sum.area;
-            most = std::max(most, seen * double(sample_->stride) * growth);
+            of_view[v] = std::max(of_view[v], seen * double(sample_->stride) * growth);
         }
+    });
+    const double most = of_view.empty() ? 0 : std::ranges::max(of_view);
     return std::clamp<uint64_t>(uint64_t(most * kCapacity), first_capacity(start_.size()), kMostPairs);
 }
 

@@ -2,7 +2,9 @@
 // The loss kernels against the CPU reference, and the training image's unpacking.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <variant>
 
 #include "gpu/guarded.h"
 #include "gpu/reference_inputs.h"
@@ -386,6 +388,18 @@ TEST(Photo, MayBeRoundedToEightBits) {
     EXPECT_LE(pipeline::photo_bytes(2, 1, true), photo.bytes());
     EXPECT_EQ(photo.download<uint8_t>(8), (std::vector<uint8_t>{0, 31, 128, 255, 255, 255, 255, 255}));
     EXPECT_EQ(int(pipeline::upload_photo(*device(), picture).texel()), int(gpu::Texel::rgba32f));
+}
+
+TEST(Photo, RoundsHalvesUp) {
+    // 0.49999997 is the largest float below a half.
+    for (const float levels :
+         {0.0f, 0.49999997f, 0.5f, 1.4999999f, 1.5f, 127.5f, 254.49998f, 254.5f, 255.0f}) {
+        Image picture(1, 1, 3);
+        std::ranges::fill(picture.pixels, levels / 255.0f);
+        const auto texels = std::get<std::vector<uint8_t>>(pipeline::photo_texels(picture, true));
+        const auto expected = uint8_t(std::round(levels / 255.0f * 255.0f));
+        EXPECT_EQ(texels, (std::vector<uint8_t>{expected, expected, expected, 255})) << levels;
+    }
 }
 
 TEST(Reduce, AddsUpInAFixedOrder) {

@@ -4,9 +4,14 @@
 
 #include <array>
 #include <cmath>
+#include <filesystem>
+#include <memory>
+#include <vector>
 
+#include "ewa/error.h"
 #include "ewa/run_options.h"
 #include "ewa/training_needs.h"
+#include "scene/frame_images.h"
 #include "support/shared_by_tests.h"
 #include "train/appearance_choice.h"
 #include "train/synthetic.h"
@@ -49,6 +54,45 @@ Dataset textured(Synthetic& made, const std::array<double, 8>& stops) {
         dataset.frames[i].camera = camera;
     }
     return dataset;
+}
+
+TEST(AppearanceChoice, LeavesItsImagesToTheTraining) {
+    Synthetic made;
+    Dataset dataset = in_stops(made, {});
+    scene::KeptImages images = scene::read_images(dataset, train::compared_frames(all_frames(dataset)));
+    ASSERT_EQ(images.size(), 8u);
+    Frame& frame = dataset.frames[3];
+    const std::vector<float> pixels = load_frame_image(frame).pixels;
+    EXPECT_EQ(scene::image_of(frame).get(), &images[3]->image);
+    EXPECT_EQ(scene::image_of(frame)->pixels, pixels);
+
+    // A frame that is to be read in another way is read again.
+    frame.downscale = 2;
+    EXPECT_NE(scene::image_of(frame).get(), &images[3]->image);
+    EXPECT_LT(scene::image_of(frame)->width, images[3]->image.width);
+    frame.downscale = 1;
+    frame.left_out = std::make_shared<const Image>(1, 1, 1);
+    EXPECT_EQ(scene::image_of(frame)->channels, 4);
+    frame.left_out = nullptr;
+    EXPECT_EQ(scene::image_of(frame).get(), &images[3]->image);
+
+    std::filesystem::remove(frame.image_path);
+    EXPECT_EQ(scene::image_of(frame)->pixels, pixels);
+    images.clear();
+    EXPECT_THROW(scene::image_of(frame), InputError);
+}
+
+TEST(AppearanceChoice, KeepsNoMoreImagesThanItMay) {
+    Synthetic made;
+    Dataset dataset = in_stops(made, {});
+    // 2^25 values of four channels are 2^23 pixels.
+    for (Frame& frame : dataset.frames) frame.camera.width = frame.camera.height = 1 << 10;
+    EXPECT_EQ(scene::read_images(dataset, all_frames(dataset)).size(), 8u);
+    dataset.frames[5].camera.height += 1;
+    const scene::KeptImages images = scene::read_images(dataset, all_frames(dataset));
+    EXPECT_EQ(images.size(), 7u);
+    EXPECT_NE(dataset.frames[6].kept.lock(), nullptr);
+    EXPECT_EQ(dataset.frames[7].kept.lock(), nullptr);
 }
 
 TEST(AppearanceChoice, IsAModelWhereImagesDisagreeOnThePoints) {

@@ -41,7 +41,7 @@ TEST(Neighbors, AgainstBruteForce) {
     std::mt19937 generator(7);
     std::normal_distribution<double> normal;
     std::uniform_int_distribution<int> lattice(0, 3);
-    for (int n : {1, 2, 3, 4, 5, 40, 700}) {
+    for (int n : {1, 2, 3, 4, 5, 40, 1100}) {
         std::vector<glm::dvec3> free, crowded, far;
         for (int i = 0; i < n; ++i) {
             free.push_back({normal(generator), normal(generator), normal(generator)});
@@ -76,6 +76,14 @@ TEST(DensePoints, LieBetweenNeighbours) {
     EXPECT_EQ(scene::neighbor_pairs(line.positions, 1), (std::vector<Pair>{{0, 1}, {1, 2}, {2, 3}}));
     EXPECT_EQ(scene::neighbor_pairs(line.positions, 2),
               (std::vector<Pair>{{0, 1}, {0, 2}, {1, 2}, {1, 3}, {2, 3}}));
+    // Each point's nearest is the one before it. There are more points than one core takes at a time.
+    std::vector<glm::dvec3> squares;
+    std::vector<Pair> before;
+    for (size_t i = 0; i < 3000; ++i) {
+        squares.push_back({double(i * i), 0, 0});
+        if (i > 0) before.push_back({i - 1, i});
+    }
+    EXPECT_EQ(scene::neighbor_pairs(squares, 1), before);
     EXPECT_TRUE(scene::neighbor_pairs({}, 2).empty());
     EXPECT_TRUE(scene::neighbor_pairs({{1, 2, 3}, {1, 2, 3}}, 2).empty());
 
