@@ -35,7 +35,8 @@ const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;
 
 uint index_of(uint plane, uint i) { return param_texel(push.planes, plane, i); }
 
-// Adam's step of one texel of parameters (Kingma and Ba 2015, algorithm 1).
+// Adam's step of one texel of parameters (Kingma and Ba 2015, algorithm 1), or that with Nesterov's momentum (Dozat 2016,
+// algorithm 2).
 // random: rounds packed moments.
 void move_rounded(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, float depth, uvec4 random) {
     const uint at = index_of(plane, i);
@@ -60,7 +61,7 @@ void move_rounded(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, 
     const vec4 old_v = PACKED_MOMENTS ? second_moment(words) : uintBitsToFloat(fetch(moments2, at));
     const vec4 v = DECAYED(gradient * gradient, old_v, BETA2);
 #endif
-    vec4 moved = value - rate * (m * push.bias1) / (sqrt(v * push.bias2) + EPSILON);
+    vec4 moved = value - rate * (m * push.moment_share + gradient * push.gradient_share) / (sqrt(v * push.bias2) + EPSILON);
     const bool limited = limit_step(plane, value, depth, moved);
     if (is_finite(moved) && is_finite(m) && is_finite(v)) {
         if (limited) ++limited_steps;

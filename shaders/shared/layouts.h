@@ -533,7 +533,8 @@ struct UpdatePush {
     uint planes;  // texel planes a splat
     uint instance_capacity;
     float mean_rate, opacity_rate, quaternion_rate, scale_rate, sh0_rate, sh_rest_rate;
-    float bias1, bias2;  // 1 / (1 - beta^step)
+    // Shares of the first moment and of the gradient in a step (pipeline/adam.h), and 1 / (1 - beta2^step)
+    float moment_share, gradient_share, bias2;
     float half_size[2];  // W / 2, H / 2: px to normalised device coordinates
     // With UPDATE_REGULARISED: d(loss)/d(opacity) and d(loss)/d(scale along one axis) of every splat.
     float opacity_weight, scale_weight;
@@ -577,7 +578,8 @@ struct UpdateViewsPush {
     float share;  // of a view in the gradient: 1 / views
     float mean_rate, opacity_rate, quaternion_rate, scale_rate, sh0_rate, sh_rest_rate;
     float beta1, beta2, epsilon;  // Adam's
-    float bias1, bias2;           // 1 / (1 - beta^step)
+    // Shares of the first moment and of the gradient in a step (pipeline/adam.h), and 1 / (1 - beta2^step)
+    float moment_share, gradient_share, bias2;
     // With UPDATE_REGULARISED: d(loss)/d(opacity) and d(loss)/d(scale along one axis) of every splat.
     float opacity_weight, scale_weight;
     // With UPDATE_PACKED_MOMENTS: of the rounding.

@@ -14,7 +14,7 @@ namespace {
 constexpr float kPull = 1e-3f;
 
 shared::UpdatePush update_push(const Model& model, const FrameBuffers& frame, const Rates& rates) {
-    const auto [bias1, bias2] = adam_biases(rates.step);
+    const AdamShares shares = adam_shares(rates.nesterov, rates.step);
     return {.splats = model.splats,
             .planes = model.planes(),
             .instance_capacity = frame.instance_capacity,
@@ -24,8 +24,9 @@ shared::UpdatePush update_push(const Model& model, const FrameBuffers& frame, co
             .scale_rate = rates.scale,
             .sh0_rate = rates.sh0,
             .sh_rest_rate = rates.sh_rest,
-            .bias1 = bias1,
-            .bias2 = bias2,
+            .moment_share = shares.moment,
+            .gradient_share = shares.gradient,
+            .bias2 = adam_biases(rates.step)[1],
             .half_size = {0.5f * float(frame.sizes.width), 0.5f * float(frame.sizes.height)},
             .opacity_weight = rates.opacity_weight,
             .scale_weight = rates.scale_weight,

@@ -30,7 +30,7 @@ float decay(double beta, uint32_t views) {
 }
 
 shared::UpdateViewsPush update_views_push(const Model& model, const Rates& rates, uint32_t bands) {
-    const auto [bias1, bias2] = adam_biases(rates.step);
+    const AdamShares shares = adam_shares(rates.nesterov, rates.step, rates.views);
     return {.splats = model.splats,
             .first = model.first,
             .planes = model.planes(),
@@ -46,8 +46,9 @@ shared::UpdateViewsPush update_views_push(const Model& model, const Rates& rates
             .beta1 = decay(shared::ADAM_BETA1, rates.views),
             .beta2 = decay(shared::ADAM_BETA2, rates.views),
             .epsilon = float(shared::ADAM_EPSILON / std::sqrt(rates.views)),
-            .bias1 = bias1,
-            .bias2 = bias2,
+            .moment_share = shares.moment,
+            .gradient_share = shares.gradient,
+            .bias2 = adam_biases(rates.step)[1],
             .opacity_weight = rates.opacity_weight,
             .scale_weight = rates.scale_weight,
             .seed = {uint32_t(rates.seed), uint32_t(rates.seed >> 32)},

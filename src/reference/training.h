@@ -23,9 +23,12 @@ struct AdamState {
     explicit AdamState(size_t n = 0) : m(n, 0.0), v(n, 0.0) {}
 };
 
+// With Nesterov's momentum (Dozat 2016, "Incorporating Nesterov momentum into Adam", algorithm 2 with a constant BETA1), the
+// step takes BETA1 m / (1 - BETA1^(t + 1)) + (1 - BETA1) g / (1 - BETA1^t) in place of m / (1 - BETA1^t).
+
 /// `step` counts from 1. A value whose new m, v or x is not finite keeps all three; returns how many do.
 uint64_t adam_step(std::span<double> values, std::span<const double> gradient, AdamState& state, double rate,
-                   int step);
+                   int step, bool nesterov = false);
 
 // Both moments in a word, 16 bits each (docs/numerics.md, "Moments in 16 bits").
 

@@ -31,6 +31,8 @@ constexpr double kPoseWarmUp = 0.1;
 // With few training images: how often each is seen by a run whose rates fade, and the rates' last factor.
 constexpr int kVisitsOfFading = 60;
 constexpr double kLastFading = 0.1;
+// With many: the rates start higher, and settle in the last part of the run to a factor.
+constexpr double kSettledPower = 1.2, kSettling = 0.2, kLastSettling = 0.2;
 
 // PPISP and bilateral grids: steps of a full run in which their rates rise, and the rates' first and last factor.
 constexpr double kPpispWarmUp = 500, kGridWarmUp = 1000, kLastAppearanceRate = 0.01;
@@ -142,7 +144,7 @@ double Schedule::opacity_gain(int step) const {
 
 double Schedule::fading(int step) const {
     if (fade_start == 0 || step <= fade_start) return 1;
-    return std::pow(kLastFading, double(step - fade_start) / (steps - fade_start));
+    return std::pow(last_rate, double(step - fade_start) / (steps - fade_start));
 }
 
 double Schedule::mean_rate(int step, double extent) const {
@@ -212,9 +214,18 @@ Schedule schedule_for(const TrainOptions& options, size_t photos) {
     s.shortness = std::min(1 / share, kMostShortness);
     // With higher rates the splats follow wrong cameras before these are right.
     s.power = options.refine_poses ? 0.5 * options.short_run_power : options.short_run_power;
-    if (few_photos(options, photos) && options.steps < kFullRun &&
-        size_t(options.steps) >= photos * kVisitsOfFading)
+    const bool few = few_photos(options, photos), shortened = options.steps < kFullRun;
+    if (few && shortened && size_t(options.steps) >= photos * kVisitsOfFading) {
         s.fade_start = options.steps / 2;
+        s.last_rate = kLastFading;
+    }
+    s.nesterov =
+        shortened && !few && s.power > 0 && options.strategy != Strategy::mcmc && !options.refine_poses;
+    if (s.nesterov) {
+        s.power *= kSettledPower;
+        s.fade_start = std::max(1, int(std::lround((1 - kSettling) * options.steps)));
+        s.last_rate = kLastSettling;
+    }
     s.means_rate = options.means_rate;
     s.means_rate_final = options.means_rate_final;
     s.exposures_rate = options.exposure_rate;

@@ -38,8 +38,10 @@ struct Schedule {
     int least_degree = 0, most_halvings = 64;     // what the run has reached before
     double means_rate = 0, means_rate_final = 0;  // per unit of scene extent, of a full run
     double shortness = 1;                         // 30,000 over the steps, from 1 to 300
-    double power = 0;    // TrainOptions::short_run_power, half of it with refine_poses
-    int fade_start = 0;  // the step after which the rates fade; 0: they do not
+    double power = 0;       // TrainOptions::short_run_power, half of it with refine_poses
+    int fade_start = 0;     // the step after which the rates fade; 0: they do not
+    double last_rate = 1;   // factor of the rates at the end of fading
+    bool nesterov = false;  // of the splats' Adam
     double exposures_rate = 0, exposures_rate_final = 0;
     double poses_rate = 0, poses_rate_final = 0;
     double skies_rate = 0, skies_rate_final = 0;
@@ -65,7 +67,8 @@ struct Schedule {
     double gain(int step) const;
     /// The same of opacities, which need less: shortness^(0.6 power), falling to 1.
     double opacity_gain(int step) const;
-    /// Another factor of all the splats' learning rates: 1 up to fade_start, then falling exponentially to a tenth.
+    /// Another factor of all the splats' learning rates: 1 up to fade_start, then falling exponentially to
+    /// last_rate.
     double fading(int step) const;
     /// Learning rate of the means without gain: exponential from means_rate to means_rate_final over the run (Plenoxels'
     /// decay, as 3DGS uses it), times the scene extent.

@@ -50,6 +50,7 @@ Rates Training::rates(int step) const {
     r.sh0 = float(gain * options_.sh0_rate);
     r.sh_rest = float(gain * options_.sh_rest_rate);
     r.step = uint32_t(step);
+    r.nesterov = schedule_.nesterov;
     r.seed = options_.seed;
     if (plan_.regularised) {
         r.opacity_weight = float(options_.opacity_weight / portions_.splats());

@@ -11,6 +11,7 @@
 #include "gpu/guarded.h"
 #include "gpu/reference_inputs.h"
 #include "passes/passes.h"
+#include "pipeline/adam.h"
 #include "pipeline/backward.h"
 #include "reference/training.h"
 #include "support/gradient_check.h"
@@ -116,7 +117,8 @@ struct Bench {
     }
 };
 
-shared::UpdatePush push_for(const Scene& scene, uint32_t step) {
+shared::UpdatePush push_for(const Scene& scene, uint32_t step, bool nesterov = false) {
+    const pipeline::AdamShares shares = pipeline::adam_shares(nesterov, step);
     const uint32_t n = uint32_t(scene.gaussians.size());
     return {n,
             pipeline::parameter_planes(scene.gaussians.sh_degree),
@@ -127,7 +129,8 @@ shared::UpdatePush push_for(const Scene& scene, uint32_t step) {
             4e-3f,
             5e-3f,
             6e-4f,
-            float(1 / (1 - std::pow(shared::ADAM_BETA1, step))),
+            shares.moment,
+            shares.gradient,
             float(1 / (1 - std::pow(shared::ADAM_BETA2, step))),
             {0.5f * float(scene.camera.width), 0.5f * float(scene.camera.height)},
             0,
@@ -258,7 +261,13 @@ struct Followed {
         : name(n), values(wide(start)), state(start.size()) {}
 };
 
-TEST(UpdateAdam, FollowsTheReferencesAdamOverSeveralSteps) {
+class UpdateAdam : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Momentum, UpdateAdam, testing::Bool(), [](const auto& asked) {
+    return asked.param ? std::string("Nesterov") : std::string("Plain");
+});
+
+TEST_P(UpdateAdam, FollowsTheReferencesAdamOverSeveralSteps) {
+    const bool nesterov = GetParam();
     const Scene scene = random_scene(1900, 150, SplatKind::mixed, 61, 47, 2);
     const Slots slots(scene);
     GuardedModel model(scene.gaussians), gradient(scene.gaussians);
@@ -269,14 +278,14 @@ TEST(UpdateAdam, FollowsTheReferencesAdamOverSeveralSteps) {
         sh("sh", start.sh);
     for (int step = 1; step <= 6; ++step) {
         SCOPED_TRACE("step " + std::to_string(step));
-        const auto push = push_for(scene, uint32_t(step));
+        const auto push = push_for(scene, uint32_t(step), nesterov);
         bench.run(scene, model.model, gradient.moments1, gradient.moments2, kGradient, push);
         const Gaussians g = gradient.read(gradient.moments1);
         bench.run(scene, model.model, model.moments1, model.moments2, kStatistics, push);
         const Gaussians now = model.read(model.model.params);
         const auto compare = [&](Followed& f, const std::vector<float>& by, const std::vector<float>& actual,
                                  double rate) {
-            adam_step(f.values, wide(by), f.state, rate, step);
+            adam_step(f.values, wide(by), f.state, rate, step, nesterov);
             double worst = 0;
             for (size_t i = 0; i < actual.size(); ++i) {
                 // A step of Adam is the rate times a quotient of float32 moments; and each step rounds the
@@ -294,8 +303,8 @@ TEST(UpdateAdam, FollowsTheReferencesAdamOverSeveralSteps) {
         const size_t stride = start.sh_stride();
         reference::AdamState rest_state = sh.state;
         std::vector<double> rest = sh.values;
-        adam_step(rest, wide(g.sh), rest_state, push.sh_rest_rate, step);
-        adam_step(sh.values, wide(g.sh), sh.state, push.sh0_rate, step);
+        adam_step(rest, wide(g.sh), rest_state, push.sh_rest_rate, step, nesterov);
+        adam_step(sh.values, wide(g.sh), sh.state, push.sh0_rate, step, nesterov);
         for (size_t i = 0; i < rest.size(); ++i) {
             if (i % stride >= 3) sh.values[i] = rest[i];
             const double rate = i % stride >= 3 ? push.sh_rest_rate : push.sh0_rate;

@@ -328,11 +328,14 @@ TEST(ViewBatch, AStepFollowsAdamWithTheRulesOfABatch) {
     const SeenScene seen(90, 60, size_t(kViews), SplatKind::ordinary);
     Step step(seen, {});
     std::vector<double> m, v;
-    for (uint32_t t = 1; t <= 2; ++t) {
+    for (uint32_t t = 1; t <= 4; ++t) {
+        const bool nesterov = t > 2;
         const auto before = step.model.params.download<float>(parameter_bytes(60, 2) / 4);
         const auto old_m = step.model.moments1.download<float>(before.size());
         const auto old_v = step.model.moments2.download<float>(before.size());
-        step.update(seen, some_rates(uint32_t(kViews) * t));
+        Rates asked = some_rates(uint32_t(kViews) * t);
+        asked.nesterov = nesterov;
+        step.update(seen, asked);
         const auto after = step.model.params.download<float>(before.size());
         const auto new_m = step.model.moments1.download<float>(before.size());
         const auto new_v = step.model.moments2.download<float>(before.size());
@@ -347,7 +350,10 @@ TEST(ViewBatch, AStepFollowsAdamWithTheRulesOfABatch) {
                 EXPECT_NEAR(new_v[at], expected_v, 1e-3 * expected_v + 1e-16);
                 const double rates[] = {1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 5e-3, 6e-4};
                 const size_t which = f == 0 ? 0 : f == 3 ? 1 : f == 5 ? 2 : f == 9 ? 3 : f < 14 ? 4 : 6;
-                const double to = rates[which] * std::sqrt(kViews) * (new_m[at] / bias1) /
+                const double along =
+                    nesterov ? beta1 * new_m[at] / (1 - std::pow(beta1, t + 1)) + (1 - beta1) * g / bias1
+                             : new_m[at] / bias1;
+                const double to = rates[which] * std::sqrt(kViews) * along /
                                   (std::sqrt(new_v[at] / bias2) + 1e-15 / std::sqrt(kViews));
                 EXPECT_NEAR(before[at] - after[at], to, 2e-6 + 1e-4 * std::abs(to)) << f << " of splat " << i;
                 moved += std::abs(to) > 1e-4;

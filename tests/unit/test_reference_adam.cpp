@@ -28,6 +28,23 @@ TEST(ReferenceAdam, MatchesTheRecurrence) {
     }
 }
 
+/// Dozat's form with a constant decay, whose products of decays are powers.
+TEST(ReferenceAdam, NesterovLooksAStepAhead) {
+    test::Random random(6);
+    double x = -0.3, m = 0, v = 0;
+    std::vector<double> values = {x};
+    AdamState state(1);
+    for (int t = 1; t <= 50; ++t) {
+        const double g = 0.2 + random.normal();
+        m = 0.9 * m + 0.1 * g;
+        v = 0.999 * v + 0.001 * g * g;
+        const double now = g / (1 - std::pow(0.9, t)), next = m / (1 - std::pow(0.9, t + 1));
+        x -= 0.01 * (0.1 * now + 0.9 * next) / std::sqrt(v / (1 - std::pow(0.999, t)));
+        EXPECT_EQ(adam_step(values, std::vector<double>{g}, state, 0.01, t, true), 0u);
+        EXPECT_NEAR(values[0], x, 1e-12);
+    }
+}
+
 TEST(ReferenceAdam, FirstStepIsTheRateWhateverTheGradient) {
     std::vector<double> values = {1, 1, 1};
     AdamState state(3);
