@@ -169,8 +169,7 @@ Lists download(FrameRun& run) {
     Lists lists;
     lists.records = run.records();
     lists.tile_counts = frame.tile_counts.download<uint32_t>(n);
-    // Each pass of a sort writes the other of its two buffers.
-    lists.order = frame.order[sizes.depth_sort.passes & 1].download<uint32_t>(n);
+    lists.order = frame.order[0].download<uint32_t>(n);
     lists.prefix = frame.prefix.download<uint32_t>(n);
     lists.totals = frame.scan_totals.download<uint32_t>(size_t(sizes.scan_blocks) + 1);
     lists.instances = run.counts().instances;

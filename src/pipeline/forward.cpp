@@ -22,24 +22,24 @@ uint32_t project_mode(const Plan& plan) {
     return surface | (plan.debug ? shared::PROJECT_DEBUG : 0);
 }
 
-/// The buffer of splats in depth order.
-const gpu::Buffer& record_depth_order(const passes::Recorder& on, uint32_t splats,
-                                      const FrameBuffers& frame) {
-    const uint32_t result = record_sort(on,
-                                        {.keys = {&frame.depth_keys[0], &frame.depth_keys[1]},
-                                         .values = {&frame.order[0], &frame.order[1]},
-                                         .indices = {},
-                                         .own_indices = true,
-                                         .counters = frame.counters,
-                                         .counter_prefix = frame.counter_prefix,
-                                         .digit_totals = frame.digit_totals,
-                                         .counts = frame.counts},
-                                        {.cut = frame.sizes.depth_sort,
-                                         .items = splats,
-                                         .capacity = splats,
-                                         .keep_keys = false,
-                                         .name = "depth order"});
-    return frame.order[result];
+/// Leaves the splats in depth order in order[0]: later buffers may share the memory of the other one. Each pass of a sort writes
+/// the other buffer of two, and the first pass reads none.
+void record_depth_order(const passes::Recorder& on, uint32_t splats, const FrameBuffers& frame) {
+    const uint32_t first = frame.sizes.depth_sort.passes % 2;
+    record_sort(on,
+                {.keys = {&frame.depth_keys[0], &frame.depth_keys[1]},
+                 .values = {&frame.order[first], &frame.order[1 - first]},
+                 .indices = {},
+                 .own_indices = true,
+                 .counters = frame.counters,
+                 .counter_prefix = frame.counter_prefix,
+                 .digit_totals = frame.digit_totals,
+                 .counts = frame.counts},
+                {.cut = frame.sizes.depth_sort,
+                 .items = splats,
+                 .capacity = splats,
+                 .keep_keys = false,
+                 .name = "depth order"});
 }
 
 void record_instances(const passes::Recorder& on, bool gradients, uint32_t splats, const FrameBuffers& frame,
@@ -124,8 +124,8 @@ shared::BlendPush blend_push(const passes::KernelConfig& config, const FrameBuff
 
 void record_tile_lists(const passes::Recorder& on, bool gradients, uint32_t splats, const FrameBuffers& frame,
                        bool wraps) {
-    const gpu::Buffer& order = record_depth_order(on, splats, frame);
-    record_instances(on, gradients, splats, frame, order, wraps);
+    record_depth_order(on, splats, frame);
+    record_instances(on, gradients, splats, frame, frame.order[0], wraps);
     record_tile_order(on, gradients, frame);
 }
 

@@ -142,6 +142,37 @@ TEST(Frame, OverlaidBuffersChangeNothing) {
     }
 }
 
+/// So many splats that a CPU's depth sort takes an odd number of passes, and so many instances that they lie over its buffers.
+TEST(Frame, OverlaidBuffersChangeNothingOfManySplats) {
+    const passes::KernelConfig& config = rig().config();
+    const size_t splats =
+        config.ranked_sort ? 2000 : std::min<size_t>(size_t(config.sort_lanes_max) << 11, 300000);
+    Scene scene = random_scene(81, splats, SplatKind::ordinary, 256, 192, 0);
+    // Small and faint, so that the farthest show.
+    for (float& scale : scene.gaussians.log_scales) scale -= 0.8f;
+    for (float& logit : scene.gaussians.opacity_logits) logit = std::min(logit, -4.0f);
+    const Image target = random_target(9, 256, 192);
+    const LossGradient shared = loss_gradient(device(), scene.gaussians, scene.camera, target, scene.options);
+    const Result apart = run_frame(scene, uint32_t(10 * splats), true);
+    ASSERT_LE(apart.counts.instances, 10 * splats);
+    EXPECT_GT(apart.counts.instances, 3 * splats);
+    if (splats == size_t(config.sort_lanes_max) << 11) {
+        EXPECT_EQ(apart.sizes.depth_sort.passes, 3u);
+    }
+    EXPECT_EQ(shared.l1, double(apart.counts.l1));
+    EXPECT_EQ(shared.gradient.means, apart.gradient.means);
+    EXPECT_EQ(shared.gradient.sh, apart.gradient.sh);
+    const auto depth = [&](uint32_t splat) {
+        const float* mean = &scene.gaussians.means[3 * size_t(splat)];
+        return (scene.camera.rotation * glm::dvec3(mean[0], mean[1], mean[2]) + scene.camera.translation).z;
+    };
+    size_t behind = 0;
+    for (uint32_t tile = 0; tile < apart.sizes.tiles; ++tile)
+        for (uint32_t k = apart.starts[tile] + 1; k < apart.starts[tile + 1]; ++k)
+            behind += depth(apart.splats[k]) < depth(apart.splats[k - 1]) - 1e-4;
+    EXPECT_EQ(behind, 0u);
+}
+
 void expect_finite(const Gaussians& g) {
     for (const auto* values : {&g.means, &g.quaternions, &g.log_scales, &g.opacity_logits, &g.sh})
         for (const float value : *values) ASSERT_TRUE(std::isfinite(value));
