@@ -23,6 +23,7 @@ void CompileThreads::add(size_t size, std::function<void()> work) {
     std::erase_if(threads_, [](const std::future<void>& thread) {
         return thread.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
     });
+    threads_.reserve(threads_.size() + 1);  // a thread that is lost by bad_alloc would wait for the mutex
     try {
         threads_.push_back(std::async(std::launch::async, [this] { run(); }));
         ++running_;

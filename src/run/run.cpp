@@ -476,6 +476,7 @@ RunResult follow_training(const RunOptions& asked) {
     if (input.options.robust) train::leave_out_passers_by(device, input, {}, nullptr);
     Trainer trainer(device, input.dataset, input.split.train, std::exchange(input.start, {}),
                     input.options.train, asked.ranks);
+    input.images.clear();  // the trainer has them
     trainer.follow();
     return {};
 }

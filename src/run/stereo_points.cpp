@@ -49,10 +49,10 @@ Image gray_of(const Image& color) {
 
 /// A pixel that is mostly masked or transparent does not count: its colour is the background's.
 View view_of(const Frame& frame, const std::array<float, 3>& background) {
-    const Image loaded = load_frame_image(frame);
-    const double pixels = double(loaded.width) * loaded.height;
+    const std::shared_ptr<const Image> loaded = scene::image_of(frame);
+    const double pixels = double(loaded->width) * loaded->height;
     const int factor = std::max(1, int(std::lround(std::sqrt(pixels / kPixels))));
-    const Image small = downscale(loaded, factor);
+    const Image small = downscale(*loaded, factor);
     View view;
     view.color = over_background(small, background);
     view.image = {gray_of(view.color), downscale(frame.camera, factor)};

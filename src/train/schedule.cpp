@@ -138,6 +138,10 @@ double Schedule::gain(int step) const {
     return std::pow(shortness, power * (1 - 0.5 * double(step) / steps));
 }
 
+double Schedule::appearance_gain(int step) const {
+    return std::pow(shortness, appearance_power * (1 - 0.5 * double(step) / steps));
+}
+
 double Schedule::opacity_gain(int step) const {
     return std::pow(shortness, 0.6 * power * (1 - double(step) / steps));
 }
@@ -162,7 +166,7 @@ double Schedule::sky_rate(int step) const {
 double Schedule::appearance_rate(int step) const {
     const double share = double(step) / steps;
     const double risen = std::min(1.0, kLastAppearanceRate + share / appearance_warm_up);
-    return appearances_rate * gain(step) * risen * decayed(1, kLastAppearanceRate, share);
+    return appearances_rate * appearance_gain(step) * risen * decayed(1, kLastAppearanceRate, share);
 }
 
 double Schedule::camera_rate(int step) const {
@@ -214,6 +218,7 @@ Schedule schedule_for(const TrainOptions& options, size_t photos) {
     s.shortness = std::min(1 / share, kMostShortness);
     // With higher rates the splats follow wrong cameras before these are right.
     s.power = options.refine_poses ? 0.5 * options.short_run_power : options.short_run_power;
+    s.appearance_power = s.power;
     const bool few = few_photos(options, photos), shortened = options.steps < kFullRun;
     if (few && shortened && size_t(options.steps) >= photos * kVisitsOfFading) {
         s.fade_start = options.steps / 2;

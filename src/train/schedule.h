@@ -38,10 +38,12 @@ struct Schedule {
     int least_degree = 0, most_halvings = 64;     // what the run has reached before
     double means_rate = 0, means_rate_final = 0;  // per unit of scene extent, of a full run
     double shortness = 1;                         // 30,000 over the steps, from 1 to 300
-    double power = 0;       // TrainOptions::short_run_power, half of it with refine_poses
-    int fade_start = 0;     // the step after which the rates fade; 0: they do not
-    double last_rate = 1;   // factor of the rates at the end of fading
-    bool nesterov = false;  // of the splats' Adam
+    double power =
+        0;  // TrainOptions::short_run_power, half of it with refine_poses, higher where rates settle
+    double appearance_power = 0;  // the same without the last rule
+    int fade_start = 0;           // the step after which the rates fade; 0: they do not
+    double last_rate = 1;         // factor of the rates at the end of fading
+    bool nesterov = false;        // of the splats' Adam
     double exposures_rate = 0, exposures_rate_final = 0;
     double poses_rate = 0, poses_rate_final = 0;
     double skies_rate = 0, skies_rate_final = 0;
@@ -65,6 +67,8 @@ struct Schedule {
     /// Factor of the splats' learning rates in this step: shortness^power at the first step, falling exponentially to its
     /// square root at the last.
     double gain(int step) const;
+    /// The same of appearances, with appearance_power.
+    double appearance_gain(int step) const;
     /// The same of opacities, which need less: shortness^(0.6 power), falling to 1.
     double opacity_gain(int step) const;
     /// Another factor of all the splats' learning rates: 1 up to fade_start, then falling exponentially to
@@ -77,7 +81,7 @@ struct Schedule {
     double exposure_rate(int step) const;
     double sky_rate(int step) const;
     /// Learning rate of a photo's PPISP or grid, and of a camera's PPISP: both rise from a hundredth and fall exponentially
-    /// to a hundredth, with gain.
+    /// to a hundredth, with appearance_gain.
     double appearance_rate(int step) const;
     double camera_rate(int step) const;
     /// Learning rate of the cameras' motions, with the same decay after a rise from 0.

@@ -44,7 +44,7 @@ class Compiler {
             std::fprintf(stderr, "kernel %s", Definition::shader);
             for (const gpu::SpecConstant& constant : variant) std::fprintf(stderr, " %u", constant.value);
             std::fputc('\n', stderr);
-            cache_.get<Definition>(variant);
+            (void)cache_.get<Definition>(variant).pipeline.handle();  // waits for the compiler
         }
         compiled_.insert(Definition::shader);
     }
@@ -177,6 +177,7 @@ void compile_rays(Compiler& compiler) {
 
 void compile_training(Compiler& compiler) {
     using namespace shared;
+    compiler.compile<passes::Contribute>({{SPEC_KERNEL, kFootprints}});
     compiler.compile<passes::UnpackTarget>({{SPEC_COLOR_FLOATS, {0, 1}}});
     compiler.compile<passes::MaskImages>({{SPEC_COLOR_FLOATS, {0, 1}}});
     compiler.compile<passes::MaskGradient>({{SPEC_COLOR_FLOATS, {0, 1}}});

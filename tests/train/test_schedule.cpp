@@ -237,6 +237,8 @@ TEST(Schedule, ShortRunsSettle) {
         options.strategy = strategy;
         const Schedule s = schedule_for(options, 43);
         EXPECT_TRUE(s.nesterov);
+        EXPECT_NEAR(s.gain(0), std::pow(30, 0.6), 1e-12);
+        EXPECT_NEAR(s.appearance_gain(0), std::pow(30, 0.5), 1e-12);
         EXPECT_EQ(s.fading(1), 1);
         EXPECT_EQ(s.fading(800), 1);
         EXPECT_NEAR(s.fading(900), std::sqrt(0.2), 1e-12);
