@@ -173,7 +173,8 @@ Frame frame_of(const FrameState& state) {
             .distortion = distortion_of(n[4], k),
             .pinhole = camera_of(cameras[2]),
             .downscale = n[2],
-            .split = n[3]};
+            .split = n[3],
+            .kept = {}};
 }
 
 MaskUse mask_use(const std::string& word) {
