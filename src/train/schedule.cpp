@@ -224,9 +224,10 @@ Schedule schedule_for(const TrainOptions& options, size_t photos) {
         s.fade_start = options.steps / 2;
         s.last_rate = kLastFading;
     }
-    s.nesterov =
+    const bool settles =
         shortened && !few && s.power > 0 && options.strategy != Strategy::mcmc && !options.refine_poses;
-    if (s.nesterov) {
+    s.nesterov = settles;
+    if (settles) {
         s.power *= kSettledPower;
         s.fade_start = std::max(1, int(std::lround((1 - kSettling) * options.steps)));
         s.last_rate = kLastSettling;

@@ -10,7 +10,8 @@
 // the more the shorter it is.
 //
 // The learning rates of 3DGS are those of 30,000 steps. A step of Adam moves a parameter by about its rate, whatever the
-// gradient is. So parameters of a short run do not come as far as they have to. A shorter run has higher rates: see gain.
+// gradient is. So parameters of a short run do not come as far as they have to. A shorter run has higher rates: see gain. High rates
+// keep the splats in motion. So the rates of adc and none fall at the end of such a run: see fading.
 //
 // With few photos, splats learn views that no other photo confirms, and held-out views get worse while the photos get better.
 // Regularisers then keep splats small and transparent, and the rates of a run that shows each photo often fade: see
