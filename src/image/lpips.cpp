@@ -234,10 +234,10 @@ Lpips::Lpips(Network network, const std::map<std::string, Tensor>& weights, cons
     int inputs = 3, compared = 0;
     for (const LpipsLayer& layer : layers) {
         Filters filters{layer, inputs, {}, {}, {}};
-        const std::string name = prefix + "features." + layer.name;
+        const std::string name = prefix + "features." + layer.name, weight = name + ".weight";
         const size_t terms = size_t(inputs * layer.kernel * layer.kernel);
         const std::vector<float>& values =
-            tensor_values(weights, name + ".weight", terms * size_t(layer.channels), file);
+            tensor_values(weights, weight, terms * size_t(layer.channels), file);
         filters.packed.resize(values.size());
         for (size_t c = 0; c < size_t(layer.channels); ++c)
             for (size_t k = 0; k < terms; ++k)

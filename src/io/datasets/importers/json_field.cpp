@@ -42,25 +42,33 @@ bool JsonField::has(const char* key) const {
     return found != value_->end() && !found->is_null();
 }
 
-JsonField JsonField::at(const char* key, const std::string& what) const {
+const nlohmann::json& JsonField::member(const char* key) const {
     if (!has(key)) fail(quoted(key) + " is missing");
-    return {*value_->find(key), what.empty() ? where_ : where_ + ": " + what};
+    return *value_->find(key);
 }
 
-JsonField JsonField::list(const char* key) const {
-    const JsonField field = at(key);
-    if (!field.value().is_array()) fail(quoted(key) + " is not a list");
-    return field;
+JsonField JsonField::at(const char* key, const std::string& what) const {
+    return {member(key), what.empty() ? where_ : where_ + ": " + what};
+}
+
+const nlohmann::json& JsonField::list(const char* key) const {
+    const nlohmann::json& value = member(key);
+    if (!value.is_array()) fail(quoted(key) + " is not a list");
+    return value;
+}
+
+const nlohmann::json& JsonField::members(const char* key) const {
+    const nlohmann::json& value = member(key);
+    if (!value.is_object()) fail(quoted(key) + " is not a JSON object");
+    return value;
 }
 
 JsonField JsonField::object(const char* key) const {
-    const JsonField field = at(key);
-    if (!field.value().is_object()) fail(quoted(key) + " is not a JSON object");
-    return field;
+    return {members(key), where_};
 }
 
 double JsonField::number(const char* key) const {
-    const nlohmann::json& value = at(key).value();
+    const nlohmann::json& value = member(key);
     if (!value.is_number() || !std::isfinite(value.get<double>()))
         fail(quoted(key) + " is not a finite number");
     return value.get<double>();
@@ -71,7 +79,7 @@ double JsonField::number(const char* key, double absent) const {
 }
 
 std::vector<double> JsonField::numbers(const char* key, size_t count) const {
-    const nlohmann::json& value = at(key).value();
+    const nlohmann::json& value = member(key);
     std::vector<double> numbers;
     if (!value.is_array() || value.size() > count || !add_numbers(value, 0, numbers) ||
         numbers.size() != count)
@@ -94,7 +102,7 @@ uint64_t JsonField::index(const char* key) const {
 }
 
 std::string JsonField::text(const char* key) const {
-    const nlohmann::json& value = at(key).value();
+    const nlohmann::json& value = member(key);
     if (!value.is_string()) fail(quoted(key) + " is not a string");
     return value.get<std::string>();
 }

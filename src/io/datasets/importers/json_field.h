@@ -20,8 +20,9 @@ class JsonField {
     bool has(const char* key) const;
     /// A member that must be there. The place of the result is this one's, with `what` added if it is not empty.
     JsonField at(const char* key, const std::string& what = {}) const;
-    /// Throws unless the member is a list or an object.
-    JsonField list(const char* key) const;
+    /// Throws unless the member is a list or an object. The values outlive the field, as its own does.
+    const nlohmann::json& list(const char* key) const;
+    const nlohmann::json& members(const char* key) const;
     JsonField object(const char* key) const;
 
     /// Finite numbers.
@@ -38,6 +39,8 @@ class JsonField {
     [[noreturn]] void fail(const std::string& text) const;
 
   private:
+    const nlohmann::json& member(const char* key) const;
+
     const nlohmann::json* value_;
     std::string where_;
 };

@@ -52,7 +52,7 @@ using Keyed = std::map<uint64_t, JsonField>;
 Keyed keyed(const JsonField& top, const char* list, const std::string& what) {
     Keyed entries;
     if (!top.has(list)) return entries;
-    for (const json& entry : top.list(list).value()) {
+    for (const json& entry : top.list(list)) {
         const JsonField field(entry, top.where() + ": " + what + " " + std::to_string(entries.size()));
         entries.insert_or_assign(field.index("key"), field.object("value"));
     }
@@ -112,7 +112,7 @@ void read_extrinsic(const JsonField& value, Camera& camera) {
 void add_structure(const JsonField& top, ImageRecords& records) {
     if (!top.has("structure")) return;
     size_t number = 0;
-    for (const json& entry : top.list("structure").value()) {
+    for (const json& entry : top.list("structure")) {
         const std::string place = "point " + std::to_string(number++) + " of \"structure\"";
         const auto value = entry.find("value");
         const auto x = value != entry.end() && value->is_object() && value->contains("X")
@@ -138,7 +138,7 @@ ImageRecords import_open_mvg(const ImportSource& source) {
     std::map<uint64_t, ImageRecord> cameras;
     // In the order of the file, in which the first of a type has its name.
     size_t number = 0;
-    for (const json& entry : top.list("intrinsics").value()) {
+    for (const json& entry : top.list("intrinsics")) {
         const JsonField field(entry, name + ": intrinsic " + std::to_string(number++));
         cameras.insert_or_assign(field.index("key"), open_mvg_camera(field.object("value"), types));
     }
@@ -151,7 +151,7 @@ ImageRecords import_open_mvg(const ImportSource& source) {
     records.folder = images.folder();
     size_t unplaced = 0;
     number = 0;
-    for (const json& entry : top.list("views").value()) {
+    for (const json& entry : top.list("views")) {
         const std::string where = name + ": view " + std::to_string(number++);
         const JsonField view = data_of(JsonField(entry, where).object("value"));
         const auto pose = poses.find(view.index("id_pose"));

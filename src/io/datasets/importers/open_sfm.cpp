@@ -133,7 +133,7 @@ const json& largest(const json& list, const std::string& name) {
 
 void add_open_sfm_points(const JsonField& reconstruction, ImageRecords& records) {
     if (!reconstruction.has("points")) return;
-    for (const auto& [id, point] : reconstruction.object("points").value().items()) {
+    for (const auto& [id, point] : reconstruction.members("points").items()) {
         const std::string place = "point " + id.substr(0, 60);
         const auto position = point.is_object() && point.contains("coordinates")
                                   ? three_numbers(point["coordinates"])
@@ -162,12 +162,12 @@ ImageRecords import_open_sfm(const ImportSource& source) {
         records.notes.push_back("of " + std::to_string(top.size()) +
                                 " reconstructions, the one with the most images is used");
     std::map<std::string, ImageRecord> cameras;
-    for (const auto& [id, camera] : reconstruction.object("cameras").value().items())
+    for (const auto& [id, camera] : reconstruction.members("cameras").items())
         cameras.emplace(id, open_sfm_camera({camera, name + ": camera \"" + id + "\""}));
 
     const ImageFinder images(source.dataset, {"images"});
     records.folder = images.folder();
-    for (const auto& [key, value] : reconstruction.object("shots").value().items()) {
+    for (const auto& [key, value] : reconstruction.members("shots").items()) {
         const JsonField shot(value, name + ": shot \"" + key + "\"");
         const auto camera = cameras.find(shot.text("camera"));
         if (camera == cameras.end()) shot.fail("its camera is not in the list of cameras");
