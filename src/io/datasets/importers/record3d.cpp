@@ -68,8 +68,7 @@ ImageRecords import_record3d(const ImportSource& source) {
     if (!document.is_object()) throw InputError(name + ": is not a JSON object");
     const JsonField top(document, name);
     const size_t poses = top.list("poses").size();
-    const bool per_frame =
-        top.has("perFrameIntrinsicCoeffs") && !top.list("perFrameIntrinsicCoeffs").empty();
+    const bool per_frame = top.has("perFrameIntrinsicCoeffs") && !top.list("perFrameIntrinsicCoeffs").empty();
     if (per_frame && top.value()["perFrameIntrinsicCoeffs"].size() != poses)
         top.fail("\"perFrameIntrinsicCoeffs\" and \"poses\" differ in length");
     const ImageFinder images(source.dataset, {"rgb", "rgbd", "images"});
