@@ -220,9 +220,9 @@ int make_mesh(const MeshArguments& arguments, const std::optional<live::Run>& ru
     mesh::Fused fused = mesh::fuse(cameras, depth, fusion, done);
     scene::TriangleMesh& made = fused.mesh;
     if (made.triangles.empty())
-        throw InputError(
-            fmt::format("no surface is as large as {:g} voxels of {:.3g}; take a smaller --voxel", kLeastPart,
-                        fused.voxel));
+        throw InputError(fmt::format(
+            "no surface is as large as {:g} voxels of {:.3g}; take a smaller --voxel, such as {:.1g}",
+            kLeastPart, fused.voxel, fused.voxel / 8));
     mesh::set_normals(made);
     if (!arguments.collision)
         mesh::set_colors(

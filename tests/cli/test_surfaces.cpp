@@ -337,6 +337,8 @@ TEST(Mesh, ErrorsAreOneLine) {
     expect_failure(mesh(folder, "m.stl"), 2, ".ply, .obj or .glb");
     expect_failure(mesh(folder, "m.ply", {"--voxel", "0"}), 2, "--voxel");
     expect_failure(mesh(folder, "m.ply", {"--voxel", "1e-9"}), 2, "--voxel");
+    expect_failure(mesh(folder, "m.ply", {"--voxel", "1"}), 2,
+                   "voxels of 1; take a smaller --voxel, such as 0.1");
     expect_failure(mesh(folder, "m.ply", {"--voxel", "50"}), 2, "--voxel");
     expect_failure(mesh(folder, "shell.ply"), 2, "SPLATS");
     expect_failure(run_ewa({"mesh", folder / "absent.ply", "-o", folder / "m.ply"}), 2, "absent.ply");
