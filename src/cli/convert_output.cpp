@@ -104,7 +104,8 @@ std::vector<std::string> write_output(const ConvertOutput& output, const OutputO
     if (options.spz_version > 0) save.spz_version = options.spz_version;
     save.gltf_spz = options.gltf_spz;
     save.levels = options.levels;
-    if (output.page) return write_page(output.file, std::move(gaussians), save, run, options);
+    if (output.page)
+        return write_page(output.file, std::move(gaussians), save, run, options.unbundled, options.title);
     if (output.tiles) return write_tiles(output.file, std::move(gaussians), save, output.earth);
     if (output.format == SplatFormat::sog_levels) return save_levels(output.file, std::move(gaussians), save);
     return save_splats(output.file, gaussians, save);

@@ -43,10 +43,11 @@ fs::path levels_of_page(const fs::path& page) {
 }
 
 std::vector<std::string> write_page(const fs::path& path, Gaussians gaussians, const SaveOptions& options,
-                                    const std::optional<live::Run>& run, const OutputOptions& output) {
+                                    const std::optional<live::Run>& run, bool unbundled,
+                                    const std::string& title) {
     std::vector<std::string> remarks;
     report::ScenePage page;
-    page.title = output.title.empty() ? path.stem().string() : output.title;
+    page.title = title.empty() ? path.stem().string() : title;
     core::AtomicFile file(path);
     scene::FramingHints hints;
     if (run) {
@@ -65,7 +66,7 @@ std::vector<std::string> write_page(const fs::path& path, Gaussians gaussians, c
         page.portrait = scene::frame_scene(gaussians, kStartHeight, kStartWidth, hints).camera;
     page.target = framing.target;
     page.up = framing.up;
-    if (output.unbundled) {
+    if (unbundled) {
         page.levels = levels_beside(path).generic_string();
         for (std::string& remark : save_levels(levels_of_page(path), std::move(gaussians), options))
             remarks.push_back(std::move(remark));
