@@ -157,7 +157,7 @@ void place(mesh::Fused& fused, const glm::dmat4& placement) {
 
 /// Says where nobody chose voxels that are too large to show the scene.
 void note_coarse_voxels(const mesh::Fused& fused, const MeshArguments& arguments, Progress& progress) {
-    constexpr double kFew = 60, kMany = 200;  // voxels from corner to corner
+    constexpr double kFew = 80, kMany = 200;  // voxels from corner to corner
     if (arguments.voxel > 0 || arguments.collision) return;
     glm::vec3 low(fused.mesh.positions.at(0)), high(low);
     for (const glm::vec3& p : fused.mesh.positions) {
