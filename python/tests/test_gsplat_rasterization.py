@@ -664,3 +664,46 @@ def test_a_forked_process_is_told_that_it_cannot_render():
         finally:
             os._exit(2)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+
+
+def warnings_of(calls):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for _ in range(3):
+            calls()
+    return [(str(warning.message), warning.filename) for warning in caught]
+
+
+def test_logarithms_and_logits_get_one_warning_each():
+    s = Scene()
+    logits = torch.linspace(-3, 3, 60)
+
+    def right():
+        ours.rasterization(**s.arguments(scales=s.scales.detach() * 0, opacities=logits.sigmoid()))
+        ours.rasterization(**s.arguments(opacities=(logits > 0).float()))
+
+    def raw():
+        ours.rasterization(**s.arguments(scales=s.scales.detach().log(), opacities=logits))
+
+    def low():
+        ours.rasterization(**s.arguments(opacities=-logits.sigmoid()))
+
+    def one():
+        scales = s.scales.detach().clone()
+        scales[7, 1] = -0.1
+        ours.rasterization(**s.arguments(scales=scales))
+
+    negative = "scales are negative: pass torch.exp(scales)"
+    assert warnings_of(right) == []
+    assert warnings_of(raw) == [
+        (negative, __file__),
+        ("opacities above 1: pass torch.sigmoid(opacities)", __file__),
+    ]
+    assert warnings_of(raw) == []
+    assert warnings_of(low) == [("opacities below 0: pass torch.sigmoid(opacities)", __file__)]
+    assert warnings_of(one) == [(negative, __file__)]
+
+
+def test_a_camera_model_that_nobody_has_is_no_matter_of_cuda():
+    with pytest.raises(ValueError, match="'equirectangular' is none of .*pinhole, ortho and fisheye"):
+        ours.rasterization(**Scene().arguments(camera_model="equirectangular"))

@@ -2,14 +2,19 @@
 """Checks of arguments: device, type and shape of tensors, and what ewa does not have."""
 
 import functools
+import math
 import operator
+import sys
 import warnings
+from collections.abc import Callable
+from typing import NoReturn
 
 import numpy as np
 import torch
 from torch import Tensor
 
 _warned_of_double = False
+_warned_of_raw = set()  # names, each with the function that called
 
 
 class ArgumentError(ValueError, AssertionError, RuntimeError):
@@ -43,6 +48,21 @@ def _warn_of_double(name):
     if not _warned_of_double:
         _warned_of_double = True
         warnings.warn(f"{name} is float64; ewa computes in float32", stacklevel=4)
+
+
+def warn_of_raw(name, value, most, function):
+    """Warns of values that `function` was not applied to: once in each caller of rasterization.
+
+    For rasterization's own callees.
+    """
+    place = name, sys._getframe(3).f_code
+    if place in _warned_of_raw or not value.numel():
+        return
+    low, high = value.detach().aminmax()
+    if low < 0 or high > most:
+        _warned_of_raw.add(place)
+        wrong = f"above {most}" if high > most else "below 0" if most < math.inf else "are negative"
+        warnings.warn(f"{name} {wrong}: pass torch.{function}({name})", stacklevel=4)
 
 
 def shape(name, value, expected):
@@ -97,10 +117,10 @@ def unavailable(what):
     )
 
 
-def refusal(name, what):
+def refusal(name: str, what: str) -> Callable[..., NoReturn]:
     """A function of gsplat's name that says why it cannot run."""
 
-    def refuse(*args, **kwargs):
+    def refuse(*args: object, **kwargs: object) -> NoReturn:
         raise unavailable(f"{name} ({what})")
 
     refuse.__name__ = refuse.__qualname__ = name

@@ -108,8 +108,13 @@ _TERMS = {"pinhole": _PINHOLE_TERMS, "fisheye": {"radial_coeffs": (0, 1, 4, 5)},
 
 def lens_of(camera_model, cameras, **coefficients):
     """The lens of cameras [..., C] as ewa's operators take it: its name, and terms [..., C, 12]."""
-    if camera_model not in _MODELS:
+    if camera_model in ("ftheta", "lidar"):
         raise unavailable(f"camera_model {camera_model!r}")
+    check(
+        camera_model in _MODELS,
+        f"camera_model {camera_model!r} is none of gsplat's pinhole, ortho and fisheye; ewa.render has"
+        " equirectangular, too",
+    )
     given = {name: tensor(name, v) for name, v in coefficients.items() if v is not None}
     if camera_model == "pinhole" and not given:
         return "pinhole", None

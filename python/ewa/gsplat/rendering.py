@@ -9,7 +9,16 @@ from torch import Tensor
 
 from . import _dialect
 from .._native import operators
-from ._arguments import check, integer, mismatch, refusal, shape, tensor, unavailable
+from ._arguments import (
+    check,
+    integer,
+    mismatch,
+    refusal,
+    shape,
+    tensor,
+    unavailable,
+    warn_of_raw,
+)
 from ._autograd import Blend, Images, attach_absgrad, needs_gradient, project_options
 from ._geometry import camera_offsets, upper_triangle
 from ._harmonics import evaluate
@@ -284,8 +293,10 @@ class _Scene:
             quats, scales = tensor("quats", quats), tensor("scales", scales)
             shape("quats", quats, own + (4,))
             shape("scales", scales, own + (3,))
+            warn_of_raw("scales", scales, math.inf, "exp")
         self.opacities = tensor("opacities", opacities)
         shape("opacities", self.opacities, own)
+        warn_of_raw("opacities", self.opacities, 1, "sigmoid")
         self.viewmats, Ks = tensor("viewmats", viewmats), tensor("Ks", Ks)
         self.cameras = cameras_of(self.viewmats)
         self.dims = self.batch + (self.cameras,)

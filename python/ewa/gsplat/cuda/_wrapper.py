@@ -28,31 +28,31 @@ def persp_proj(means, covars, Ks, width, height):
     return proj(means, covars, Ks, width, height)
 
 
-def has_3dgs():
+def has_3dgs() -> bool:
     return True
 
 
-def has_adam():
+def has_adam() -> bool:
     return True
 
 
-def has_reloc():
+def has_reloc() -> bool:
     return True
 
 
-def has_2dgs():
+def has_2dgs() -> bool:
     return False
 
 
-def has_3dgut():
+def has_3dgut() -> bool:
     return False
 
 
-def has_camera_wrappers():
+def has_camera_wrappers() -> bool:
     return False
 
 
-def has_losses():
+def has_losses() -> bool:
     return False
 
 
