@@ -123,12 +123,12 @@ class LevelsWriter {
     }
 
     static ordered_json json_of(const Bound& box) {
-        ordered_json json;
+        ordered_json value;
         for (int k = 0; k < 3; ++k) {
-            json["min"].push_back(rounded(box.low[k]));
-            json["max"].push_back(rounded(box.high[k]));
+            value["min"].push_back(rounded(box.low[k]));
+            value["max"].push_back(rounded(box.high[k]));
         }
-        return json;
+        return value;
     }
 
     /// Children follow their parents, so the boxes come from the end.
@@ -153,34 +153,34 @@ class LevelsWriter {
     }
 
     ordered_json json_of(size_t at) const {
-        ordered_json json;
-        json["bound"] = json_of(rows_[at].bound);
+        ordered_json value;
+        value["bound"] = json_of(rows_[at].bound);
         if (nodes_[at].axis >= 0) {
-            json["children"] = {json_of(nodes_[at].first), json_of(nodes_[at].second)};
-            return json;
+            value["children"] = {json_of(nodes_[at].first), json_of(nodes_[at].second)};
+            return value;
         }
-        json["lods"] = ordered_json::object();
+        value["lods"] = ordered_json::object();
         for (const LevelRows& rows : rows_[at].rows)
-            json["lods"][std::to_string(rows.level)] = {
+            value["lods"][std::to_string(rows.level)] = {
                 {"file", rows.file}, {"offset", rows.offset}, {"count", rows.count}};
-        if (sizes_.size() > 1) json["errors"] = errors_of(rows_[at]);
-        return json;
+        if (sizes_.size() > 1) value["errors"] = errors_of(rows_[at]);
+        return value;
     }
 
     ordered_json meta() {
         join_bounds();
         size_t all = 0;
         for (const size_t size : sizes_) all += size;
-        ordered_json json;
-        json["version"] = 1;
-        json["asset"]["generator"] = "ewa " EWA_VERSION;
-        json["count"] = all;
-        json["counts"] = sizes_;
-        json["lodLevels"] = sizes_.size();
-        if (sizes_.size() > 1) json["lodErrors"] = true;
-        json["filenames"] = names_;
-        json["tree"] = json_of(0);
-        return json;
+        ordered_json value;
+        value["version"] = 1;
+        value["asset"]["generator"] = "ewa " EWA_VERSION;
+        value["count"] = all;
+        value["counts"] = sizes_;
+        value["lodLevels"] = sizes_.size();
+        if (sizes_.size() > 1) value["lodErrors"] = true;
+        value["filenames"] = names_;
+        value["tree"] = json_of(0);
+        return value;
     }
 
     std::filesystem::path path_;

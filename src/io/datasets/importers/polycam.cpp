@@ -25,9 +25,10 @@ constexpr uint64_t kMostCameraBytes = uint64_t(1) << 20;
 
 ImageRecord read_polycam_camera(const fs::path& path, const ImageFinder& images) {
     const std::string name = core::one_line(path.string());
-    const nlohmann::json json = core::read_json_file<nlohmann::json>(path, {.bytes = kMostCameraBytes});
-    const JsonField field(json, name);
-    if (!json.is_object()) field.fail("is not a JSON object");
+    const nlohmann::json document =
+        core::read_json_file<nlohmann::json>(path, {.bytes = kMostCameraBytes, .not_finite = true});
+    const JsonField field(document, name);
+    if (!document.is_object()) field.fail("is not a JSON object");
     ImageRecord record = begin_record(images, path.stem().string(), field);
     Camera& camera = record.camera;
     camera.cx = field.number("cx");
