@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/json.h"
 
+#include <algorithm>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <type_traits>
 #include <vector>
@@ -17,6 +19,8 @@ namespace {
 
 constexpr size_t kMostOrderedKeys = 1024;
 constexpr size_t kLongestReason = 100;  // limits what is quoted of the text
+constexpr char kNotFinite =
+    '\x7f';  // begins the string that stands for such a number; no writer has it in a text
 
 /// Builds the value from nlohmann's parser events. nlohmann's own callback searches the parent at the end of
 /// every object and list, which takes quadratic time.
@@ -34,7 +38,11 @@ class Builder : public nlohmann::json_sax<Json> {
     bool number_float(typename Json::number_float_t value, const std::string&) override {
         return leaf(value);
     }
-    bool string(std::string& value) override { return leaf(std::move(value)); }
+    bool string(std::string& value) override {
+        if (limits_.not_finite && value.starts_with(kNotFinite))
+            return leaf(std::numeric_limits<double>::quiet_NaN());
+        return leaf(std::move(value));
+    }
     bool binary(typename Json::binary_t&) override { return false; }  // JSON text has none
 
     bool start_object(std::size_t) override {
@@ -137,6 +145,30 @@ class Builder : public nlohmann::json_sax<Json> {
     size_t objects_ = 0, values_ = 0;
 };
 
+/// The text with strings of the same length in place of numbers that are not finite: nlohmann's parser refuses these.
+std::string with_marks(std::string_view text, bool comments) {
+    std::string marked(text);
+    for (size_t i = 0; i < text.size(); ++i) {
+        const std::string_view rest = text.substr(i);
+        if (rest[0] == '"') {
+            for (++i; i < text.size() && text[i] != '"'; ++i) i += text[i] == '\\';
+        } else if (comments && rest.starts_with("//")) {
+            i = std::min(text.find('\n', i), text.size());
+        } else if (comments && rest.starts_with("/*")) {
+            i = std::min(text.find("*/", i + 2), text.size());
+        } else {
+            for (const std::string_view word : {"NaN", "Infinity", "-Infinity"})
+                if (rest.starts_with(word)) {
+                    marked.replace(i, word.size(), word.size(), kNotFinite);
+                    marked[i] = marked[i + word.size() - 1] = '"';
+                    i += word.size() - 1;
+                    break;
+                }
+        }
+    }
+    return marked;
+}
+
 void check_size(uint64_t bytes, const std::string& name, const JsonLimits& limits) {
     if (bytes > limits.bytes)
         throw InputError(name + ": the JSON has " + std::to_string(bytes) + " bytes, more than " +
@@ -149,6 +181,9 @@ template <class Json>
 Json parse_json(std::string_view text, const std::string& name, const JsonLimits& limits) {
     check_size(text.size(), name, limits);
     Builder<Json> builder(name, limits);
+    std::string marked;
+    if (limits.not_finite && (text.find("NaN") != text.npos || text.find("Infinity") != text.npos))
+        text = marked = with_marks(text, limits.comments);
     constexpr bool kWhole = true;
     Json::sax_parse(text.begin(), text.end(), &builder, nlohmann::detail::input_format_t::json, kWhole,
                     limits.comments);

@@ -17,8 +17,10 @@ struct JsonLimits {
     size_t objects = size_t(1) << 20;
     size_t values = size_t(1) << 22;  // lists and scalars
     bool comments = false;            // whether // and /* */ are allowed between values
-    std::string_view skipped = {};    // values of this key are neither kept nor counted; empty: none
-    uint64_t begin = 0;               // offset of the text in its file, for errors
+    bool not_finite =
+        false;  // whether NaN, Infinity and -Infinity, which Python writes, are numbers; all become NaN
+    std::string_view skipped = {};  // values of this key are neither kept nor counted; empty: none
+    uint64_t begin = 0;             // offset of the text in its file, for errors
 };
 
 /// Parses the text in one pass and without recursion. The time is linear in the length, times the logarithm

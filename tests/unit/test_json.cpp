@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/json.h"
 
+#include <cmath>
 #include <ctime>
 #include <nlohmann/json.hpp>
 
@@ -49,6 +50,29 @@ TEST(Json, IsWhatNlohmannReads) {
     const std::string commented = "// one\n{/* two */\"a\": 1}";
     EXPECT_EQ(parse_json<json>(commented, "a.json", JsonLimits{.comments = true}), (json{{"a", 1}}));
     refuse(commented, {"a.json: byte 1: not valid JSON"});
+}
+
+TEST(Json, TakesNumbersThatAreNotFiniteWhereAsked) {
+    const std::string text =
+        R"({"a": NaN, "b": [1, -Infinity, Infinity], "c": "NaN \\\" Infinity", "d": {"e": NaN}, "f": 2})";
+    const JsonLimits limits{.comments = true, .not_finite = true};
+    const json parsed = parse_json<json>(text, "a.json", limits);
+    for (const char* at : {"/a", "/b/1", "/b/2", "/d/e"}) {
+        const json& value = parsed[json::json_pointer(at)];
+        ASSERT_TRUE(value.is_number_float()) << at;
+        EXPECT_TRUE(std::isnan(value.get<double>())) << at;
+    }
+    EXPECT_EQ(parsed["b"][0], 1);
+    EXPECT_EQ(parsed["c"], "NaN \\\" Infinity");
+    EXPECT_EQ(parsed["f"], 2);
+    EXPECT_EQ(parse_json<json>("[NaN, /* \" NaN */ 1, // it's \" Infinity\n \"NaN\"]", "a.json", limits)[2],
+              "NaN");
+    EXPECT_TRUE(std::isnan(parse_json<json>("NaN", "a.json", limits).get<double>()));
+    for (const char* none : {"[NaN", "[nan]", "[-NaN]", "[Infinity1]", "[NaN NaN]", "[\"NaN]"})
+        refuse(none, {"not valid JSON"}, limits);
+    // The offsets are those of the file.
+    refuse("[NaN, -Infinity, oops]", {"a.json: byte 18: not valid JSON: unexpected '"}, limits);
+    refuse(text, {"a.json: byte 7: not valid JSON"});
 }
 
 TEST(Json, SaysWhereItIsNone) {

@@ -329,4 +329,31 @@ TEST(Transforms, RealScene) {
     EXPECT_EQ(load_frame_image(frame).width, frame.camera.width);
 }
 
+/// Python's json writes them.
+TEST(Transforms, NumbersThatAreNotFiniteCountWhereTheyAreUsed) {
+    Scene scene;
+    const auto with = [&](const std::string& key, const std::string& value) {
+        std::string text = scene.model.dump();
+        const std::string entry = "\"" + key + "\":" + value + ",";
+        text.insert(text.find("\"file_path\""), entry);
+        return text.insert(1, entry);
+    };
+    for (const char* number : {"NaN", "Infinity", "-Infinity"}) {
+        scene.folder.write("transforms.json", with("sharpness", number));
+        EXPECT_EQ(load_dataset(scene.folder.path(), {}).frames.size(), 2u);
+        for (const char* key : {"w", "fl_x", "cx", "k1", "depth_unit_scale_factor", "is_fisheye"}) {
+            scene.folder.write("transforms.json", with(key, number));
+            expect_error<InputError>(
+                [&] { load_dataset(scene.folder.path(), {}); },
+                {"transforms.json: frame 0: \"" + std::string(key) + "\" is not finite"});
+        }
+        std::string text = scene.model.dump();
+        const std::string row = "[[0,0,1,1]";
+        scene.folder.write("transforms.json",
+                           text.replace(text.find(row), row.size(), "[[0,0," + std::string(number) + ",1]"));
+        expect_error<InputError>([&] { load_dataset(scene.folder.path(), {}); },
+                                 {"\"transform_matrix\" holds an entry that is not a finite number"});
+    }
+}
+
 }  // namespace

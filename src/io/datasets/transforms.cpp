@@ -79,7 +79,7 @@ class Entry {
         if (!value) return false;
         if (!value->is_boolean() && !value->is_number())
             fail(std::string("\"") + key + "\" is neither true nor false");
-        return value->is_boolean() ? value->get<bool>() : value->get<double>() != 0;
+        return value->is_boolean() ? value->get<bool>() : number(key) != 0;
     }
 
     const std::string& where() const { return where_; }
@@ -337,7 +337,8 @@ Json matrix_of(const Camera& camera) {
 
 ImageRecords read_transforms(const std::filesystem::path& path, int split, bool with_points) {
     const std::string name = core::one_line(path.string());
-    const json top = core::read_json_file<json>(path, {.comments = true});  // as instant-ngp accepts them
+    const json top = core::read_json_file<json>(
+        path, {.comments = true, .not_finite = true});  // as instant-ngp and Python write them
     if (!top.is_object()) throw InputError(name + ": is not a JSON object");
     const auto frames = top.find("frames");
     if (frames == top.end() || !frames->is_array())

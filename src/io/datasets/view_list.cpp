@@ -111,13 +111,14 @@ Json camera_json(const std::string& name, const Camera& c) {
 }
 
 std::vector<NamedView> read_views(const std::filesystem::path& path, size_t most) {
-    const Json json = core::read_json_file<Json>(path, {.bytes = most * kLargestView});
-    if (!json.is_object() || !json.contains("views") || !json["views"].is_array())
+    const Json document =
+        core::read_json_file<Json>(path, {.bytes = most * kLargestView, .not_finite = true});
+    if (!document.is_object() || !document.contains("views") || !document["views"].is_array())
         throw InputError(path.string() + ": is not a list of views: expected an object with \"views\"");
-    if (json["views"].size() > most)
+    if (document["views"].size() > most)
         throw InputError(path.string() + ": more than " + std::to_string(most) + " views");
     std::vector<NamedView> views;
-    for (const Json& entry : json["views"]) {
+    for (const Json& entry : document["views"]) {
         const std::string where = path.string() + ": view " + std::to_string(views.size()) + ": ";
         try {
             views.push_back(parse_view(entry));

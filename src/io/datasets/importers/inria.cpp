@@ -20,7 +20,7 @@ namespace ewa::io {
 
 ImageRecords import_inria(const ImportSource& source) {
     const std::string name = core::one_line(source.file.string());
-    const auto document = core::read_json_file<nlohmann::json>(source.file);
+    const auto document = core::read_json_file<nlohmann::json>(source.file, {.not_finite = true});
     if (!document.is_array()) throw InputError(name + ": is not a list of cameras");
     const ImageFinder images(source.dataset, {"images", "input"});
     ImageRecords records;

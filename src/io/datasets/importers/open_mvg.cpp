@@ -131,6 +131,7 @@ ImageRecords import_open_mvg(const ImportSource& source) {
     const json document = core::read_json_file<json>(source.file, {.bytes = uint64_t(1) << 30,
                                                                    .objects = size_t(1) << 22,
                                                                    .values = size_t(1) << 25,
+                                                                   .not_finite = true,
                                                                    .skipped = "observations"});
     if (!document.is_object()) throw InputError(name + ": is not a JSON object");
     const JsonField top(document, name);

@@ -151,8 +151,10 @@ void add_open_sfm_points(const JsonField& reconstruction, ImageRecords& records)
 
 ImageRecords import_open_sfm(const ImportSource& source) {
     const std::string name = core::one_line(source.file.string());
-    const json top = core::read_json_file<json>(
-        source.file, {.bytes = uint64_t(1) << 30, .objects = size_t(1) << 22, .values = size_t(1) << 25});
+    const json top = core::read_json_file<json>(source.file, {.bytes = uint64_t(1) << 30,
+                                                              .objects = size_t(1) << 22,
+                                                              .values = size_t(1) << 25,
+                                                              .not_finite = true});
     if (!top.is_array()) throw InputError(name + ": is not a list of reconstructions");
     const JsonField reconstruction(largest(top, name), name);
     ImageRecords records;

@@ -64,7 +64,7 @@ void set_record3d_pose(const JsonField& top, size_t index, Camera& camera) {
 
 ImageRecords import_record3d(const ImportSource& source) {
     const std::string name = core::one_line(source.file.string());
-    const json document = core::read_json_file<json>(source.file);
+    const json document = core::read_json_file<json>(source.file, {.not_finite = true});
     if (!document.is_object()) throw InputError(name + ": is not a JSON object");
     const JsonField top(document, name);
     const size_t poses = top.list("poses").size();
