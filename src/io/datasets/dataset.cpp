@@ -273,6 +273,7 @@ void append(io::ImageRecords& all, io::ImageRecords more) {
     if (all.points.positions.empty()) all.points = std::move(more.points);
     if (all.dropped.count == 0) all.dropped.first = std::move(more.dropped.first);
     all.dropped.count += more.dropped.count;
+    all.notes.insert(all.notes.end(), more.notes.begin(), more.notes.end());
     all.color_depends_on_view = all.color_depends_on_view || more.color_depends_on_view;
 }
 
@@ -286,18 +287,26 @@ io::ImageRecords read_transforms_at(const fs::path& file, const DatasetOptions& 
     return io::read_transforms(file, split_of(file), options.need_points);
 }
 
-/// The transforms_train.json and transforms_test.json of a folder; empty if it has neither.
+/// The transforms_train.json of a folder and what is held out: transforms_test.json, or else transforms_val.json. Empty if it has
+/// none of them.
 std::optional<io::ImageRecords> read_split_transforms(const fs::path& path, const DatasetOptions& options) {
     std::optional<io::ImageRecords> all;
-    for (const char* file : {"transforms_train.json", "transforms_test.json"})
-        if (is_file(path / file)) {
-            io::ImageRecords records = read_transforms_at(path / file, options);
+    const fs::path train = path / "transforms_train.json", test = path / "transforms_test.json",
+                   val = path / "transforms_val.json";
+    if (!is_file(train) && !is_file(test)) return all;
+    for (const auto& [file, split] : {std::pair(train, 1), std::pair(is_file(test) ? test : val, 2)})
+        if (is_file(file)) {
+            io::ImageRecords records = io::read_transforms(file, split, options.need_points);
             if (all)
                 append(*all, std::move(records));
             else
                 all = std::move(records);
         }
-    if (all) all->folder = path / "images";
+    if (!all) return all;
+    all->folder = path / "images";
+    if (is_file(test) && is_file(val))
+        all->notes.emplace_back(
+            "transforms_val.json is not used: transforms_test.json has the held-out images");
     return all;
 }
 

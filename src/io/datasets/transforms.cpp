@@ -18,6 +18,7 @@
 //   depth_unit_scale_factor        world units of a level of such a .png; 0.001 without
 //   ply_file_path                  points, at the top of the file
 //   view_dependent                 at the top: false if no colour depends on the direction of view
+//   train_filenames val_filenames test_filenames   at the top: the split, see named_splits.h
 #include <algorithm>
 #include <cmath>
 #include <glm/matrix.hpp>
@@ -32,6 +33,7 @@
 #include "core/words.h"
 #include "ewa/error.h"
 #include "io/datasets/image_records.h"
+#include "io/datasets/named_splits.h"
 #include "io/datasets/rotation.h"
 #include "scene/readout.h"
 
@@ -367,6 +369,7 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
         read_intrinsics(entry, image);
         result.images.push_back(std::move(image));
     }
+    split_by_names(top, name, result);
     if (unused_poses)
         result.notes.emplace_back(
             "transform_matrix_start and _end are not used: rolling_shutter names no order of the readout");
