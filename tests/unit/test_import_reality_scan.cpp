@@ -31,12 +31,13 @@ std::string joined(const std::vector<double>& values, const char* between) {
     return text.str();
 }
 
-std::string xmp(const SceneView& view, bool as_attributes, const std::string& model = "brown4t2") {
+std::string xmp(const SceneView& view, bool as_attributes, const std::string& model = "brown4t2",
+                const std::vector<double>& terms = {kTerms, kTerms + 6}) {
     std::vector<double> r;
     for (int row = 0; row < 3; ++row)
         for (int column = 0; column < 3; ++column) r.push_back(view.rotation[column][row]);
     const std::string parts[3] = {joined(r, " "), joined({view.center.x, view.center.y, view.center.z}, " "),
-                                  joined({kTerms, kTerms + 6}, " ")};
+                                  joined(terms, " ")};
     const char* names[3] = {"Rotation", "Position", "DistortionCoeficients"};
     std::string attributes, elements;
     for (int i = 0; i < 3; ++i) {
@@ -71,6 +72,26 @@ TEST(ImportRealityScan, XmpBesideTheImages) {
         EXPECT_EQ(dataset.format, "RealityScan XMP");
         EXPECT_EQ(dataset.program, "RealityScan");
         expect_scene(dataset, brown4t2);
+    }
+}
+
+TEST(ImportRealityScan, DivisionIsColmapsOrAPinhole) {
+    for (const double k : {0.0, -0.31}) {
+        const TempFolder folder;
+        write_scene_images(folder);
+        for (const SceneView& view : scene_views())
+            folder.write("images/" + xmp_name(view), xmp(view, true, "division", {k, 0, 0, 0, 0, 0}));
+        const Dataset dataset = load_dataset(folder.path(), {});
+        EXPECT_EQ(dataset.frames[0].distortion.none(), k == 0);
+        expect_scene(dataset, [&](const glm::dvec3& p) {
+            // The image d of the ray u has u = d / (1 + k |d|^2): the smaller root along the radius.
+            const glm::dvec2 u = tangents(p);
+            const double r = glm::length(u),
+                         d = k == 0 ? r : (1 - std::sqrt(1 - 4 * k * r * r)) / (2 * k * r);
+            const double side = std::max(kSceneWidth, kSceneHeight);
+            return kFocal / 36 * side * (r > 0 ? d / r * u : u) + side * glm::dvec2(kU, kV) +
+                   0.5 * glm::dvec2(kSceneWidth, kSceneHeight);
+        });
     }
 }
 
@@ -140,6 +161,48 @@ TEST(ImportRealityScan, Csv) {
     EXPECT_EQ(dataset.format, "RealityScan CSV");
     expect_scene(dataset, brown4t2, 1e-8);
     expect_scene(load_dataset(folder / "registration.csv", {}), brown4t2, 1e-8);
+}
+
+TEST(ImportRealityScan, CsvOfOtherVersions) {
+    const std::string columns = "f,px,py,k1,k2,k3,k4,t1,t2";
+    std::string semicolons = csv();
+    std::replace(semicolons.begin(), semicolons.end(), ',', ';');
+    for (const std::string& text :
+         {"#cameras 3\n" + csv(),
+          "\xef\xbb\xbf#cameras 3\r\n" + csv("#name,x,y,alt,yaw,pitch,roll," + columns),
+          csv("Label, X, Y, Z, Yaw, Pitch, Roll, " + columns), semicolons}) {
+        const TempFolder folder;
+        write_scene_images(folder);
+        folder.write("registration.csv", text);
+        expect_scene(load_dataset(folder.path(), {}), brown4t2, 1e-8);
+    }
+}
+
+TEST(ImportRealityScan, CsvThatIsNearlyOneIsNamed) {
+    const TempFolder folder;
+    write_scene_images(folder);
+    folder.write("cams.csv", csv("#name,x,y,alt,omega,phi,kappa,f,px,py,k1,k2,k3,k4,t1,t2"));
+    for (const std::filesystem::path& path : {folder.path(), folder / "cams.csv"})
+        expect_error<InputError>([&] { load_dataset(path, {}); },
+                                 {"cams.csv lacks the column heading of RealityScan's"});
+    // Ground control points are no cameras.
+    folder.write("cams.csv", "name,x,y,z\na,1,2,3\n");
+    expect_error<InputError>([&] { load_dataset(folder.path(), {}); }, {"not a dataset; expected"});
+}
+
+TEST(ImportRealityScan, ASecondFileOfCamerasIsNoted) {
+    const TempFolder folder;
+    write_scene_images(folder);
+    folder.write("a.csv", csv());
+    EXPECT_TRUE(load_dataset(folder.path(), {}).notes.empty());
+    folder.write("b.csv", csv());
+    const Dataset dataset = load_dataset(folder.path(), {});
+    ASSERT_EQ(dataset.notes.size(), 1u);
+    EXPECT_EQ(dataset.notes[0], "b.csv has cameras, too: name it to use it in place of a.csv");
+    EXPECT_TRUE(load_dataset(folder / "b.csv", {}).notes.empty());
+    std::filesystem::remove(folder / "b.csv");
+    folder.write("images/c.xmp", xmp(scene_views()[2], true));
+    EXPECT_EQ(load_dataset(folder.path(), {}).notes.size(), 1u);
 }
 
 TEST(ImportRealityScan, CsvLooksDownWithoutTurns) {

@@ -317,6 +317,11 @@ std::optional<io::ImageRecords> import_model(const fs::path& path, const Dataset
     found->source.with_points = options.need_points;
     io::ImageRecords records = found->importer->read(found->source);
     records.format = found->importer->format;
+    if (const fs::path other = is_file(path) ? fs::path() : io::other_cameras(path, *found, records.files);
+        !other.empty())
+        records.notes.push_back(core::one_line(other.filename().string() +
+                                               " has cameras, too: name it to use it in place of " +
+                                               found->source.file.filename().string()));
     return records;
 }
 

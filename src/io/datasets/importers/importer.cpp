@@ -13,6 +13,7 @@
 #include "ewa/error.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/json_field.h"
+#include "io/datasets/importers/reality_scan.h"
 
 namespace ewa::io {
 
@@ -54,8 +55,9 @@ bool begins_as_reality_scan_xmp(std::string_view head) {
 }
 
 bool begins_as_reality_scan_csv(std::string_view head) {
-    const std::string_view line = head.substr(0, head.find('\n'));
-    return holds(line, "name,") && holds(line, "heading") && holds(line, "pitch") && holds(line, "roll");
+    const CsvColumns columns = reality_scan_columns(reality_scan_heading(head));
+    return std::ranges::all_of(std::array{"name", "heading", "pitch", "roll"},
+                               [&](const char* column) { return columns.contains(column); });
 }
 
 bool begins_as_polycam(std::string_view head) {
@@ -117,6 +119,22 @@ fs::path dataset_of_file(const CameraImporter& importer, const fs::path& file) {
         }
     }
     return folder;
+}
+
+/// What a table lacks that is nearly one of RealityScan's: most of its columns are there. Empty for other files.
+std::string nearly_reality_scan_csv(const fs::path& file) {
+    if (!has_extension<kCsv>(file)) return {};
+    const CsvColumns columns = reality_scan_columns(reality_scan_heading(head_of(file)));
+    std::string missing;
+    size_t there = 0;
+    for (const char* column : kCsvColumns)
+        if (columns.contains(column))
+            ++there;
+        else if (missing.empty())
+            missing = column;
+    if (missing.empty() || 2 * there <= kCsvColumns.size()) return {};
+    return core::one_line(file.filename().string()) + " lacks the column " + missing +
+           " of RealityScan's \"Internal/External camera parameters\"";
 }
 
 /// Files of programs that hold cameras in a form which only these programs read.
@@ -197,6 +215,21 @@ std::optional<FoundImporter> find_importer(const fs::path& path) {
     return std::nullopt;
 }
 
+fs::path other_cameras(const fs::path& dataset, const FoundImporter& found,
+                       const std::vector<fs::path>& read) {
+    for (const CameraImporter& importer : camera_importers())
+        for (const std::string_view place : importer.places) {
+            const fs::path folder = place.empty() ? dataset : dataset / place;
+            // A program may write several kinds of its cameras, each in a folder of its own.
+            if (&importer == found.importer && found.source.file.parent_path() != folder) continue;
+            for (const fs::path& file : files_of_folder(folder))
+                if (is_usual(importer, file.filename()) && std::ranges::find(read, file) == read.end() &&
+                    reads(importer, file))
+                    return file;
+        }
+    return {};
+}
+
 bool is_imported(const fs::path& entry, const std::function<std::string()>& head) {
     std::optional<std::string> read;
     return std::ranges::any_of(camera_importers(), [&](const CameraImporter& importer) {
@@ -215,11 +248,13 @@ std::string export_advice(const fs::path& path) {
         return {};
     };
     if (!core::is_folder(path)) {
-        const std::string text = advice(path, kUnread);
-        return text.empty() ? advice(path, kOther) : text;
+        for (const std::string& text : {advice(path, kUnread), nearly_reality_scan_csv(path)})
+            if (!text.empty()) return text;
+        return advice(path, kOther);
     }
     for (const fs::path& file : files_of_folder(path))
-        if (std::string text = advice(file, kUnread); !text.empty()) return text;
+        for (const std::string& text : {advice(file, kUnread), nearly_reality_scan_csv(file)})
+            if (!text.empty()) return text;
     return {};
 }
 

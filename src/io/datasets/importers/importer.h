@@ -53,6 +53,10 @@ std::optional<FoundImporter> find_importer(const std::filesystem::path& path);
 
 /// Whether an entry of an archive has cameras. head: gives the entry's first bytes, and is only called for names that fit.
 bool is_imported(const std::filesystem::path& entry, const std::function<std::string()>& head);
+/// Another file of the dataset's folder that has cameras and is not among the files that were read. Empty: none.
+std::filesystem::path other_cameras(const std::filesystem::path& dataset, const FoundImporter& found,
+                                    const std::vector<std::filesystem::path>& read);
+
 
 /// What to export, for a folder or file with the cameras of a program in a form that is not read, such as its own project. Or why
 /// a file is not the one that its name promises. Empty if there is nothing to say.

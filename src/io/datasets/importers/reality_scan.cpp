@@ -31,7 +31,9 @@ void set_calibration(ImageRecord& record, const RealityScanCalibration& given, c
         d.p2 = given.terms[4];
         d.p1 = given.terms[5];
     }
-    d.lens = d.k4 != 0 ? Lens::radial4 : Lens::brown;
+    d.lens = given.division ? d.k1 != 0 ? Lens::division : Lens::brown
+             : d.k4 != 0    ? Lens::radial4
+                            : Lens::brown;
     finish_record(record, where);
 }
 

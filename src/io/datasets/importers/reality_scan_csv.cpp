@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // The table "Internal/External camera parameters" of RealityScan (once RealityCapture), a CSV file.
 //
-// #name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2 in any order; what follows roll may be missing, but for f.
+// #name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2 in any order; what follows roll may be missing, but for f. A line
+// "#cameras N" may be before it, and yaw stand for heading.
 // The camera (x right, y up, z back) is turned by Rz(-heading) Rx(pitch) Ry(roll), in degrees: without turns it looks straight down,
 // and z is up. RealityScanCalibration has the other units.
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 #include <map>
+#include <string_view>
 
 #include "core/file_reader.h"
 #include "core/text.h"
@@ -22,14 +24,14 @@ namespace {
 
 constexpr size_t kLongestRow = 1 << 16, kMostRows = 1000000;
 
-/// Cells between commas, with or without quotation marks around one.
-std::vector<std::string> cells_of(std::string_view line) {
+/// Cells between separators, with or without quotation marks around one.
+std::vector<std::string> cells_of(std::string_view line, char separator) {
     std::vector<std::string> cells(1);
     bool quoted = false;
     for (const char c : line) {
         if (c == '"')
             quoted = !quoted;
-        else if (c == ',' && !quoted)
+        else if (c == separator && !quoted)
             cells.emplace_back();
         else
             cells.back() += c;
@@ -40,7 +42,7 @@ std::vector<std::string> cells_of(std::string_view line) {
 
 /// A row with the columns that the first line names.
 struct CsvRow {
-    const std::map<std::string, size_t>& columns;
+    const CsvColumns& columns;
     std::vector<std::string> cells;
     std::string where;
 
@@ -58,6 +60,13 @@ struct CsvRow {
         return columns.contains(column) ? number(column) : absent;
     }
 };
+
+constexpr std::string_view kSeparators = ",;\t";
+
+/// The first of kSeparators in the line.
+char separator_in(std::string_view line) {
+    return line[std::min(line.find_first_of(kSeparators), line.size() - 1)];
+}
 
 glm::dmat3 turned(const glm::dvec3& axis, double degrees) {
     return glm::mat3_cast(glm::angleAxis(glm::radians(degrees), axis));
@@ -85,11 +94,37 @@ ImageRecord record_of(const CsvRow& row, const ImageFinder& images) {
 
 }  // namespace
 
+std::string_view reality_scan_heading(std::string_view head) {
+    for (size_t begin = 0, end = 0; begin < head.size(); begin = end + 1) {
+        end = std::min(head.find('\n', begin), head.size());
+        const std::string_view line = core::trim(head.substr(begin, end - begin));
+        if (line.find_first_of(kSeparators) != line.npos) return line;
+    }
+    return {};
+}
+
+CsvColumns reality_scan_columns(std::string_view heading) {
+    static const std::map<std::string, std::string> kOther{
+        {"yaw", "heading"}, {"z", "alt"},         {"altitude", "alt"},  {"label", "name"},
+        {"image", "name"},  {"filename", "name"}, {"imagename", "name"}};
+    CsvColumns columns;
+    if (heading.empty()) return columns;
+    const std::vector<std::string> cells = cells_of(heading, separator_in(heading));
+    for (size_t i = 0; i < cells.size(); ++i) {
+        const size_t begin = std::min(cells[i].find_first_not_of("#\xef\xbb\xbf "), cells[i].size());
+        const std::string name = core::lower(cells[i].substr(begin));
+        const auto other = kOther.find(name);
+        columns.emplace(other == kOther.end() ? name : other->second, i);
+    }
+    return columns;
+}
+
 ImageRecords import_reality_scan_csv(const ImportSource& source) {
     core::FileReader reader(source.file);
     std::string line;
-    std::map<std::string, size_t> columns;  // a name may occur twice: the first one counts
+    CsvColumns columns;
     size_t width = 0;
+    char separator = ',';
     ImageRecords records;
     records.program = "RealityScan";
     records.files = {source.file};
@@ -97,16 +132,14 @@ ImageRecords import_reality_scan_csv(const ImportSource& source) {
     records.folder = images.folder();
     for (size_t number = 1; reader.read_line(line, kLongestRow); ++number) {
         const std::string where = reader.name() + ":" + std::to_string(number);
-        constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
-        if (number == 1 && line.starts_with(kByteOrderMark)) line.erase(0, kByteOrderMark.size());
         if (core::trim(line).empty()) continue;
         if (number > kMostRows) throw InputError(where + ": has more than 1000000 rows");
-        std::vector<std::string> cells = cells_of(line);
         if (columns.empty()) {
-            if (cells[0].starts_with("#")) cells[0].erase(0, 1);
-            width = cells.size();
-            for (size_t i = 0; i < width; ++i) columns.emplace(cells[i], i);
-            for (const char* column : {"name", "x", "y", "alt", "heading", "pitch", "roll", "f"})
+            if (reality_scan_heading(line).empty()) continue;
+            separator = separator_in(line);
+            width = cells_of(line, separator).size();
+            columns = reality_scan_columns(line);
+            for (const char* column : kCsvColumns)
                 if (!columns.contains(column))
                     throw InputError(
                         where + ": the column " + column +
@@ -114,9 +147,9 @@ ImageRecords import_reality_scan_csv(const ImportSource& source) {
             continue;
         }
         if (line.starts_with("#")) continue;
-        const CsvRow row{columns, cells, where};
-        if (cells.size() < width)
-            row.fail("has " + std::to_string(cells.size()) + " of " + std::to_string(width) + " values");
+        const CsvRow row{columns, cells_of(line, separator), where};
+        if (row.cells.size() < width)
+            row.fail("has " + std::to_string(row.cells.size()) + " of " + std::to_string(width) + " values");
         records.images.push_back(record_of(row, images));
     }
     add_points_beside(source.dataset, source.with_points, records);

@@ -79,12 +79,16 @@ RealityScanCalibration calibration_in(const XcrDescription& xcr) {
             "a Skew other than 0 or an AspectRatio other than 1 is not supported; export as COLMAP");
     const std::string model = xcr.text("DistortionModel");
     if (model.empty() || model == "perspective") return calibration;
-    static constexpr std::array<std::string_view, 4> kBrown{"brown3", "brown4", "brown3t2", "brown4t2"};
-    if (std::ranges::find(kBrown, model) == kBrown.end())
-        xcr.field.fail("the DistortionModel \"" + model.substr(0, 60) +
-                       "\" is not supported; align with brown4t2, or export undistorted images as COLMAP");
     if (!xcr.text("DistortionCoeficients").empty())
         calibration.terms = xcr.numbers("DistortionCoeficients", 6);
+    const std::vector<double>& terms = calibration.terms;
+    static constexpr std::array<std::string_view, 4> kBrown{"brown3", "brown4", "brown3t2", "brown4t2"};
+    // Only its first term is known to be COLMAP's.
+    calibration.division = model == "division" && std::all_of(terms.begin() + !terms.empty(), terms.end(),
+                                                              [](double k) { return k == 0; });
+    if (std::ranges::find(kBrown, model) == kBrown.end() && !calibration.division)
+        xcr.field.fail("the DistortionModel \"" + model.substr(0, 60) +
+                       "\" is not supported; align with brown4t2, or export undistorted images as COLMAP");
     return calibration;
 }
 
