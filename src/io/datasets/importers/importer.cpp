@@ -43,7 +43,7 @@ template <const auto& extension>
 bool has_extension(const fs::path& name) {
     return extension_in_lower_case(name) == extension;
 }
-constexpr std::string_view kXml = ".xml", kXmp = ".xmp", kCsv = ".csv";
+constexpr std::string_view kXml = ".xml", kXmp = ".xmp", kCsv = ".csv", kOut = ".out";
 
 bool begins_as_metashape(std::string_view head) {
     return holds(head, "<document") && holds(head, "<chunk");
@@ -73,6 +73,18 @@ bool begins_as_record3d(std::string_view head) {
     const std::string_view text = core::trim(head);
     return !text.empty() && text.front() == '{' &&
            (holds(text, "\"poses\"") || holds(text, "\"perFrameIntrinsicCoeffs\""));
+}
+
+bool begins_as_bundler(std::string_view head) {
+    return head.starts_with("# Bundle file");
+}
+
+bool is_poses_bounds(const fs::path& name) {
+    return name == "poses_bounds.npy";
+}
+
+bool begins_as_numpy(std::string_view head) {
+    return head.starts_with("\x93NUMPY");
 }
 
 bool begins_as_inria(std::string_view head) {
@@ -193,7 +205,9 @@ const std::vector<CameraImporter>& camera_importers() {
          begins_as_polycam,
          import_polycam},
         {"Record3D", {""}, "metadata", is_record3d_metadata, begins_as_record3d, import_record3d},
-        {"INRIA's cameras.json", {""}, "cameras", is_json, begins_as_inria, import_inria}};
+        {"INRIA's cameras.json", {""}, "cameras", is_json, begins_as_inria, import_inria},
+        {"Bundler", {"", "bundle"}, "", has_extension<kOut>, begins_as_bundler, import_bundler},
+        {"LLFF poses_bounds.npy", {""}, "", is_poses_bounds, begins_as_numpy, import_llff}};
     return importers;
 }
 

@@ -38,7 +38,8 @@ inline constexpr size_t kHeadBytes = size_t(1) << 16;
 
 /// The programs, for messages.
 inline constexpr std::string_view kImportedFrom =
-    "OpenSfM, OpenDroneMap, OpenMVG, Metashape, RealityScan, Polycam, Record3D or INRIA's trainer";
+    "OpenSfM, OpenDroneMap, OpenMVG, Metashape, RealityScan, Polycam, Record3D, Bundler, LLFF or INRIA's "
+    "trainer";
 
 /// In the order in which they are tried.
 const std::vector<CameraImporter>& camera_importers();
@@ -87,3 +88,5 @@ ImageRecords import_record3d(const ImportSource& source);
 ImageRecords import_inria(const ImportSource& source);
 
 }  // namespace ewa::io
+ImageRecords import_bundler(const ImportSource& source);
+ImageRecords import_llff(const ImportSource& source);
