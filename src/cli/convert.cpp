@@ -41,7 +41,7 @@ struct ConvertArguments {
     fs::path output;                     // -o, which becomes the last of the files
     std::vector<glm::dmat4> placements;  // of the inputs
     std::vector<std::string> transform;
-    std::string scale_to, crop, decimate, sort;
+    std::string scale_to, decimate, sort;
     Edits edits;
     Cleaning cleaning;
     OutputOptions output_options;
@@ -218,12 +218,12 @@ int run(const ConvertArguments& arguments) {
         edits.transform = glm::scale(glm::dmat4(1.0), glm::dvec3(factor)) * edits.transform;
         if (!arguments.quiet) fmt::print("--scale-to: times {:.6g}\n", factor);
     }
-    edits.crop = parse_crop(arguments.crop);
     edits.decimation = parse_decimation(arguments.decimate);
     edits.morton = arguments.sort == "morton";
     if (!arguments.cleaning.picture.empty() && !arguments.cleaning.any())
         throw InputError(
             "--dry-run: no option removes splats; see --remove-floaters and others of ewa convert --help");
+    check_cleaning(arguments.cleaning);
     check_files(arguments);
     Work work = read_all(arguments);
     const size_t read = work.gaussians.size();
@@ -270,28 +270,12 @@ int run(const ConvertArguments& arguments) {
 }
 
 void add_editing_options(CLI::App& app, ConvertArguments& arguments) {
-    app.add_option(
-           "--transform", arguments.transform,
-           "Of the joined scene: move=x,y,z, turn=x,y,z,degrees, scale=s, or a matrix of 12 or 16 numbers, "
-           "row by row. "
-           "Repeat the option for several steps, applied in order. Axes are those of a PLY: y down, "
-           "z forward")
-        ->type_name("STEP")
-        ->expected(1)
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-        ->take_all();
+    add_transform_option(app, arguments.transform, "Of the joined scene");
     app.add_option(
            "--scale-to", arguments.scale_to,
            "Scale the joined scene until these two points are LENGTH apart; they are its points before "
            "--transform. ewa-view measures points")
         ->type_name("x,y,z,X,Y,Z,LENGTH");
-    app.add_option("--crop", arguments.crop,
-                   "Keep only splats whose centre is in this box; applied after --transform")
-        ->type_name("x,y,z,X,Y,Z");
-    app.add_option("--min-opacity", arguments.edits.min_opacity,
-                   "Keep only splats with at least this opacity")
-        ->transform(in_range(0.0, 1.0))
-        ->type_name("0..1");
     app.add_option("--max-sh", arguments.edits.max_sh, "Reduce the spherical harmonics to this degree")
         ->transform(in_range(0, kMaxShDegree))
         ->type_name("0..3");
@@ -342,6 +326,9 @@ Action add_convert(CLI::App& app) {
     add_quiet_option(app, arguments->quiet);
     return [arguments] {
         if (!arguments->output.empty()) arguments->files.push_back(arguments->output);
+        // A picture of what would be removed needs no output.
+        if (arguments->files.size() == 1 && !arguments->cleaning.picture.empty())
+            arguments->files.emplace_back(arguments->cleaning.picture.string() + ".ply");
         if (arguments->files.size() < 2)
             throw InputError("FILES: an input and the output are needed, and there is only " +
                              core::one_line(arguments->files[0].string()));

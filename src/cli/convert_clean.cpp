@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -38,6 +39,10 @@ double color_of(const Gaussians& g, size_t i, size_t channel) {
     return shared::COLOR_OFFSET + shared::SH_C0 * g.sh[g.sh_stride() * i + channel];
 }
 
+double opacity_of(const Gaussians& g, size_t i) {
+    return 1 / (1 + std::exp(-double(g.opacity_logits[i])));
+}
+
 struct Column {
     const char* name;
     double (*value)(const Gaussians&, size_t);
@@ -46,8 +51,7 @@ constexpr Column kColumns[] = {
     {"x", [](const Gaussians& g, size_t i) { return g.world_mean(i).x; }},
     {"y", [](const Gaussians& g, size_t i) { return g.world_mean(i).y; }},
     {"z", [](const Gaussians& g, size_t i) { return g.world_mean(i).z; }},
-    {"opacity",
-     [](const Gaussians& g, size_t i) { return 1 / (1 + std::exp(-double(g.opacity_logits[i]))); }},
+    {"opacity", opacity_of},
     {"scale", [](const Gaussians& g, size_t i) { return scale_of(g, i, true); }},
     {"thickness", [](const Gaussians& g, size_t i) { return scale_of(g, i, false); }},
     {"red", [](const Gaussians& g, size_t i) { return color_of(g, i, 0); }},
@@ -105,6 +109,12 @@ std::array<double, 4> parse_sphere(const std::string& text) {
     return numbers;
 }
 
+std::array<double, 6> parse_crop(const std::string& text) {
+    const auto box = core::parse_box(text);
+    if (!box) throw InputError("--crop: " + core::not_a_box(text));
+    return *box;
+}
+
 std::vector<Camera> cameras_that_see(const std::optional<live::Run>& run) {
     if (!run)
         throw InputError(
@@ -139,6 +149,7 @@ Gaussians highlighted(const Gaussians& all, const Gaussians& left) {
 }  // namespace
 
 void add_cleaning_options(CLI::App& app, Cleaning& cleaning) {
+    const size_t others = app.get_options().size();
     app.add_flag("--remove-invalid", cleaning.invalid,
                  "Remove splats with a value that is not finite, or a zero quaternion");
     app.add_option(
@@ -149,8 +160,14 @@ void add_cleaning_options(CLI::App& app, Cleaning& cleaning) {
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
         ->take_all();
+    app.add_option("--crop", cleaning.box,
+                   "Keep only splats whose centre is in this box; applied after --transform")
+        ->type_name("x,y,z,X,Y,Z");
     app.add_option("--crop-sphere", cleaning.sphere, "Keep only splats whose centre is in this sphere")
         ->type_name("x,y,z,radius");
+    app.add_option("--min-opacity", cleaning.min_opacity, "Keep only splats with at least this opacity")
+        ->transform(in_range(0.0, 1.0))
+        ->type_name("0..1");
     app.add_option("--min-views", cleaning.min_views,
                    "Of a training run: remove splats whose centre is in fewer images than this")
         ->transform(in_range(0, 1'000'000))
@@ -160,8 +177,17 @@ void add_cleaning_options(CLI::App& app, Cleaning& cleaning) {
     app.add_flag("--largest-cluster", cleaning.largest_cluster,
                  "Keep only the largest group of splats that touch others of about their size");
     app.add_option("--dry-run", cleaning.picture,
-                   "Write only this picture, in which all that would be removed is red, and no OUT")
+                   "Write only this picture, in which all that would be removed is red. OUT may be left out, "
+                   "and is not written")
         ->type_name("PICTURE");
+    const std::vector<CLI::Option*> all = app.get_options();
+    for (size_t i = others; i < all.size(); ++i) all[i]->group("Clean");
+}
+
+void check_cleaning(const Cleaning& cleaning) {
+    for (const std::string& text : cleaning.ranges) parse_range(text);
+    if (!cleaning.sphere.empty()) parse_sphere(cleaning.sphere);
+    if (!cleaning.box.empty()) parse_crop(cleaning.box);
 }
 
 std::vector<Removed> clean(Gaussians& gaussians, const Cleaning& cleaning,
@@ -179,7 +205,7 @@ std::vector<Removed> clean(Gaussians& gaussians, const Cleaning& cleaning,
         for (size_t i = 0; i < gaussians.size(); ++i)
             if (keep(i)) kept.push_back(uint32_t(i));
         removed.push_back({option, gaussians.size() - kept.size()});
-        if (kept.size() < gaussians.size()) select_splats(gaussians, kept);
+        if (kept.size() < gaussians.size()) keep_splats(gaussians, kept);
     };
     if (cleaning.invalid) keep_only("--remove-invalid", [&](size_t i) { return drawable(gaussians, i); });
     for (const Range& range : ranges)
@@ -204,6 +230,17 @@ std::vector<Removed> clean(Gaussians& gaussians, const Cleaning& cleaning,
         else
             keep_only("--remove-floaters", [&](size_t i) { return groups.sizes[group(i)] >= kLeastGroup; });
     }
+    if (!cleaning.box.empty())
+        keep_only("--crop", [&, box = parse_crop(cleaning.box)](size_t i) {
+            const glm::dvec3 at = gaussians.world_mean(i);
+            bool inside = true;
+            for (int axis = 0; axis < 3; ++axis)
+                inside = inside && at[axis] >= box[size_t(axis)] && at[axis] <= box[size_t(axis) + 3];
+            return inside;
+        });
+    if (cleaning.min_opacity > 0)
+        keep_only("--min-opacity",
+                  [&](size_t i) { return opacity_of(gaussians, i) >= cleaning.min_opacity; });
     return removed;
 }
 

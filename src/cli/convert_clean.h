@@ -18,16 +18,21 @@ namespace ewa::cli {
 struct Cleaning {
     bool floaters = false, largest_cluster = false, invalid = false;
     int min_views = 0;
+    double min_opacity = 0;
     std::vector<std::string> ranges;  // COLUMN=LOW..HIGH
-    std::string sphere;               // x,y,z,radius; empty: none
+    std::string sphere, box;          // x,y,z,radius and x,y,z,X,Y,Z; empty: none
     std::filesystem::path picture;    // of what would be removed; empty: none
 
     bool any() const {
-        return floaters || largest_cluster || invalid || min_views > 0 || !ranges.empty() || !sphere.empty();
+        return floaters || largest_cluster || invalid || min_views > 0 || min_opacity > 0 ||
+               !ranges.empty() || !sphere.empty() || !box.empty();
     }
 };
 
 void add_cleaning_options(CLI::App& app, Cleaning& cleaning);
+
+/// Throws InputError for a text that cannot be read.
+void check_cleaning(const Cleaning& cleaning);
 
 struct Removed {
     std::string option;

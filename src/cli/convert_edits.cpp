@@ -79,29 +79,10 @@ glm::dmat4 parse_step(const std::string& what, const std::string& step) {
     refuse(what, step);
 }
 
-template <typename Keep>
-void keep_if(Gaussians& gaussians, const Keep& keep) {
-    std::vector<uint32_t> kept;
-    for (size_t i = 0; i < gaussians.size(); ++i)
-        if (keep(i)) kept.push_back(static_cast<uint32_t>(i));
-    if (kept.size() < gaussians.size()) keep_splats(gaussians, kept);
-}
-
 size_t drawable_count(const Gaussians& gaussians) {
     size_t count = 0;
     for (size_t i = 0; i < gaussians.size(); ++i) count += drawable(gaussians, i);
     return count;
-}
-
-void crop(Gaussians& gaussians, const std::array<double, 6>& n) {
-    keep_if(gaussians, [&](size_t i) {
-        bool inside = true;
-        for (size_t axis = 0; axis < 3; ++axis) {
-            const double v = gaussians.world_mean(i)[int(axis)];
-            inside = inside && v >= n[axis] && v <= n[3 + axis];
-        }
-        return inside;
-    });
 }
 
 }  // namespace
@@ -110,6 +91,17 @@ glm::dmat4 parse_transform(const std::vector<std::string>& steps, const std::str
     glm::dmat4 matrix(1.0);
     for (const std::string& step : steps) matrix = parse_step(what, step) * matrix;
     return matrix;
+}
+
+void add_transform_option(CLI::App& app, std::vector<std::string>& steps, const std::string& of) {
+    app.add_option("--transform", steps,
+                   of + ": move=x,y,z, turn=x,y,z,degrees, scale=s, or a matrix of 12 or 16 numbers, "
+                        "row by row. Repeat the option for several steps, applied in order. Axes are those "
+                        "of a PLY: y down, z forward")
+        ->type_name("STEP")
+        ->expected(1)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+        ->take_all();
 }
 
 double parse_scale_to(const std::string& text, const glm::dmat4& transform) {
@@ -151,13 +143,6 @@ void place_splats(Gaussians& gaussians, const glm::dmat4& matrix, const std::str
             what, before - after, before));
 }
 
-std::optional<std::array<double, 6>> parse_crop(const std::string& text) {
-    if (text.empty()) return std::nullopt;
-    const auto box = core::parse_box(text);
-    if (!box) throw InputError("--crop: " + core::not_a_box(text));
-    return box;
-}
-
 std::optional<Decimation> parse_decimation(const std::string& text) {
     if (text.empty()) return std::nullopt;
     Decimation decimation;
@@ -181,11 +166,6 @@ size_t left_of(size_t count, const Decimation& decimation) {
 
 std::vector<std::string> apply_edits(Gaussians& gaussians, const Edits& edits, SplatFormat format) {
     place_splats(gaussians, edits.transform, "--transform");
-    if (edits.crop) crop(gaussians, *edits.crop);
-    if (edits.min_opacity > 0)
-        keep_if(gaussians, [&](size_t i) {
-            return 1 / (1 + std::exp(-static_cast<double>(gaussians.opacity_logits[i]))) >= edits.min_opacity;
-        });
     if (gaussians.sh_degree > edits.max_sh) set_sh_degree(gaussians, edits.max_sh);
     std::vector<std::string> remarks;
     if (edits.decimation) {
@@ -197,7 +177,10 @@ std::vector<std::string> apply_edits(Gaussians& gaussians, const Edits& edits, S
     }
     if (format != SplatFormat::ply) {
         const size_t before = gaussians.size();
-        keep_if(gaussians, [&](size_t i) { return drawable(gaussians, i); });
+        std::vector<uint32_t> kept;
+        for (size_t i = 0; i < before; ++i)
+            if (drawable(gaussians, i)) kept.push_back(static_cast<uint32_t>(i));
+        if (kept.size() < before) keep_splats(gaussians, kept);
         if (gaussians.size() < before)
             remarks.push_back("skipped " + core::counted(before - gaussians.size(), "splat") +
                               " with a value that is not finite or a zero quaternion");

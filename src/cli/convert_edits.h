@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The edits of ewa convert between reading and writing.
 #pragma once
-#include <array>
+#include <CLI/CLI.hpp>
+
 #include <filesystem>
 #include <glm/mat4x4.hpp>
 #include <optional>
@@ -20,8 +21,6 @@ struct Decimation {
 
 struct Edits {
     glm::dmat4 transform{1.0};
-    std::optional<std::array<double, 6>> crop;  // a box: x, y, z of the low corner, then of the high one
-    double min_opacity = 0;
     int max_sh = kMaxShDegree;
     std::optional<Decimation> decimation;
     bool morton = false;
@@ -31,6 +30,9 @@ struct Edits {
 /// "scale=s", or a matrix of 12 or 16 numbers, row by row. Throws InputError that begins with `what` and names the
 /// step.
 glm::dmat4 parse_transform(const std::vector<std::string>& steps, const std::string& what = "--transform");
+
+/// --transform. of: what it moves.
+void add_transform_option(CLI::App& app, std::vector<std::string>& steps, const std::string& of);
 
 /// Parses --scale-to, "x,y,z,X,Y,Z,LENGTH". Returns the factor by which the scene grows about the world's origin, so that the two points
 /// are LENGTH apart after `transform` and it. Throws InputError.
@@ -47,9 +49,6 @@ PlacedInput parse_input(const std::string& text);
 
 /// Transforms the splats. Throws InputError, which begins with `what`, if fewer of them could be drawn afterwards.
 void place_splats(Gaussians& gaussians, const glm::dmat4& matrix, const std::string& what);
-
-/// Parses --crop. Empty: no box. Throws InputError.
-std::optional<std::array<double, 6>> parse_crop(const std::string& text);
 
 /// Parses --decimate: N, or P% with 0 < P <= 100. Empty: none. Throws InputError.
 std::optional<Decimation> parse_decimation(const std::string& text);

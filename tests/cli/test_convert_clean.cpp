@@ -43,6 +43,8 @@ TEST(ConvertClean, RemovesAndSaysHowMany) {
     EXPECT_EQ(left({"--remove-floaters"}, "--remove-floaters removed 4 of 16 splats"), 12u);
     EXPECT_EQ(left({"--largest-cluster"}, "--largest-cluster removed 4 of 16 splats"), 12u);
     EXPECT_EQ(left({"--keep", "opacity=0.5.."}, "--keep opacity removed 8 of 16 splats"), 8u);
+    EXPECT_EQ(left({"--crop", "0,-1,0,3.5,1,9"}, "--crop removed 12 of 16 splats"), 4u);
+    EXPECT_EQ(left({"--min-opacity", "0.5"}, "--min-opacity removed 8 of 16 splats"), 8u);
     EXPECT_EQ(
         left({"--keep", "x=2..4", "--keep", "red=..0.6", "--allow-empty"}, "--keep red removed 3 of 16"), 0u);
 }
@@ -78,6 +80,12 @@ TEST(ConvertClean, DryRunDrawsInRed) {
     EXPECT_NE(outcome.out.find("would remove 4 of 16 splats"), std::string::npos) << outcome.out;
     EXPECT_FALSE(std::filesystem::exists(folder / "o.ply"));
     EXPECT_EQ(read_json(folder / "o.json")["removed"]["--largest-cluster"], 4);
+    // OUT may be left out, and boxes are shown, too.
+    const Outcome alone =
+        run_ewa({"convert", folder / "s.ply", "--crop", "0,-1,0,3.5,1,9", "--dry-run", folder / "q.png"});
+    expect_success(alone);
+    EXPECT_NE(alone.out.find("--crop would remove 12 of 16 splats"), std::string::npos) << alone.out;
+    EXPECT_EQ(files_below(folder / "."), (std::vector<std::string>{"o.json", "p.png", "q.png", "s.ply"}));
     const ewa::Image picture = ewa::load_image(folder / "p.png");
     size_t red = 0, gray = 0;
     for (size_t i = 0; i < picture.pixels.size(); i += 3) {
