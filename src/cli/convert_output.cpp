@@ -6,6 +6,7 @@
 #include "cli/arguments.h"
 #include "cli/convert_page.h"
 #include "cli/convert_tiles.h"
+#include "core/text.h"
 #include "ewa/error.h"
 
 namespace ewa::cli {
@@ -18,6 +19,7 @@ void check_options(const ConvertOutput& output, const OutputOptions& options) {
     const bool levels =
         format == SplatFormat::sog_levels || format == SplatFormat::rad || output.tiles || options.unbundled;
     if (!options.geo.empty() && !output.tiles) throw InputError("--geo: only a tileset.json is on a globe");
+    if (!options.title.empty() && !output.page) throw InputError("--title: only a page has one");
     if (options.unbundled && !output.page) throw InputError("--unbundled: only a page has its scene inside");
     if (options.levels > 0 && !levels)
         throw InputError(
@@ -60,6 +62,7 @@ void add_output_options(CLI::App& app, OutputOptions& options) {
         "--unbundled", options.unbundled,
         "Write the scene of a page NAME.html beside it, as NAME-levels/lod-meta.json, of which a web server "
         "gives the browser what a view needs");
+    app.add_option("--title", options.title, "Title of a page [the name of its file]")->type_name("TEXT");
     app.add_option(
            "--geo", options.geo,
            "Where a tileset.json puts the scene, in degrees (WGS 84) and metres: x points east, z to the "
@@ -68,12 +71,28 @@ void add_output_options(CLI::App& app, OutputOptions& options) {
         ->type_name("LAT,LON,HEIGHT[,HEADING]|ecef");
 }
 
+namespace {
+
+SplatFormat format_of_output(const fs::path& file) try {
+    return format_to_write(file);
+} catch (const InputError& error) {
+    const std::string extension = core::lower(file.extension().string());
+    std::string hint = ", tileset.json, .html (a page)";
+    for (const char* mesh : {".obj", ".stl", ".fbx", ".dae"})
+        if (extension == mesh)
+            hint += "; ewa mesh makes meshes: ewa mesh IN -o " + file.stem().string() +
+                    (extension == ".obj" ? ".obj" : ".glb");
+    throw InputError(error.what() + core::one_line(hint));
+}
+
+}  // namespace
+
 ConvertOutput output_of(const fs::path& file, const OutputOptions& options, bool check) {
     ConvertOutput output{.file = file,
                          .page = names_page(file),
                          .tiles = names_tileset(file),
                          .earth = parse_geo(options.geo)};
-    output.format = output.page ? SplatFormat::sog : output.tiles ? SplatFormat::glb : format_to_write(file);
+    output.format = output.page ? SplatFormat::sog : output.tiles ? SplatFormat::glb : format_of_output(file);
     check_options(output, options);
     if (check) check_readable(output, options);
     return output;
@@ -85,7 +104,7 @@ std::vector<std::string> write_output(const ConvertOutput& output, const OutputO
     if (options.spz_version > 0) save.spz_version = options.spz_version;
     save.gltf_spz = options.gltf_spz;
     save.levels = options.levels;
-    if (output.page) return write_page(output.file, std::move(gaussians), save, run, options.unbundled);
+    if (output.page) return write_page(output.file, std::move(gaussians), save, run, options);
     if (output.tiles) return write_tiles(output.file, std::move(gaussians), save, output.earth);
     if (output.format == SplatFormat::sog_levels) return save_levels(output.file, std::move(gaussians), save);
     return save_splats(output.file, gaussians, save);

@@ -20,7 +20,7 @@ namespace ewa::cli {
 struct OutputOptions {
     int spz_version = 0, levels = 0;  // 0: not given
     bool gltf_spz = false, unbundled = false;
-    std::string geo;
+    std::string geo, title;
 };
 
 void add_output_options(CLI::App& app, OutputOptions& options);

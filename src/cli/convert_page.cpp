@@ -43,10 +43,10 @@ fs::path levels_of_page(const fs::path& page) {
 }
 
 std::vector<std::string> write_page(const fs::path& path, Gaussians gaussians, const SaveOptions& options,
-                                    const std::optional<live::Run>& run, bool unbundled) {
+                                    const std::optional<live::Run>& run, const OutputOptions& output) {
     std::vector<std::string> remarks;
     report::ScenePage page;
-    page.title = path.stem().string();
+    page.title = output.title.empty() ? path.stem().string() : output.title;
     core::AtomicFile file(path);
     scene::FramingHints hints;
     if (run) {
@@ -61,9 +61,11 @@ std::vector<std::string> write_page(const fs::path& path, Gaussians gaussians, c
     }
     const scene::Framing framing = scene::frame_scene(gaussians, kStartWidth, kStartHeight, hints);
     page.start = page.views.empty() ? framing.camera : page.views.front().camera;
+    if (page.views.empty())
+        page.portrait = scene::frame_scene(gaussians, kStartHeight, kStartWidth, hints).camera;
     page.target = framing.target;
     page.up = framing.up;
-    if (unbundled) {
+    if (output.unbundled) {
         page.levels = levels_beside(path).generic_string();
         for (std::string& remark : save_levels(levels_of_page(path), std::move(gaussians), options))
             remarks.push_back(std::move(remark));

@@ -40,6 +40,7 @@ std::string settings_text(const ScenePage& page) {
                      {"target", numbers(page.target)},
                      {"start", view_json(page.start)},
                      {"cameras", Json::array()}};
+    if (page.portrait) settings["portrait"] = view_json(*page.portrait);
     if (!page.levels.empty()) {
         settings["levels"] = page.levels;
         settings["budget"] = kBudget;

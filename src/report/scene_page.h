@@ -3,6 +3,7 @@
 // Its program is in web/.
 #pragma once
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,10 +22,11 @@ struct ScenePage {
     std::string title;
     std::string sog;          // a .sog file of version 2 with stored entries; empty with `levels`
     std::string levels = {};  // name of the lod-meta.json beside the page; empty: the scene is in the page
-    std::array<float, 3> background{};   // RGB, 0..1
-    Camera start;                        // the first view
-    glm::dvec3 up{0, -1, 0}, target{0};  // world: unit length; the point that the views turn about
-    std::vector<PageView> views = {};    // those that the page can go to
+    std::array<float, 3> background{};    // RGB, 0..1
+    Camera start;                         // the first view
+    std::optional<Camera> portrait = {};  // that of a window which is higher than wide; empty: `start`
+    glm::dvec3 up{0, -1, 0}, target{0};   // world: unit length; the point that the views turn about
+    std::vector<PageView> views = {};     // those that the page can go to
 };
 
 /// The text of the file.

@@ -307,6 +307,16 @@ TEST(Convert, WritesAPage) {
     EXPECT_NE(page.find("<title>a &lt;b&gt;</title>"), std::string::npos);
     EXPECT_NE(page.find("id=\"scene\">UEsDB"), std::string::npos) << "no archive in the page";
     EXPECT_EQ(read_json(folder / "j.json")["output"]["format"], "page");
+    expect_success(run_ewa({"convert", folder / "s.ply", folder / "a <b>.html", "--title", "The <fox> & more",
+                            "--json", folder / "j.json"}));
+    const std::string named = read_file(folder / "a <b>.html");
+    for (const char* text :
+         {"<title>The &lt;fox&gt; &amp; more</title>", "<h1>The &lt;fox&gt; &amp; more</h1>"})
+        EXPECT_NE(named.find(text), std::string::npos) << text;
+    expect_failure(run_ewa({"convert", folder / "s.ply", folder / "c.spz", "--title", "x"}), 2,
+                   "--title: only a page has one");
+    expect_failure(run_ewa({"convert", folder / "s.ply", folder / "c.obj"}), 2,
+                   ".rad, tileset.json, .html (a page); ewa mesh makes meshes: ewa mesh IN -o c.obj");
     expect_failure(run_ewa({"convert", folder / "s.ply", folder / "c.html", "--check"}), 2, "check a .sog");
     expect_failure(run_ewa({"convert", folder / "a <b>.html", folder / "d.ply"}), 2, "not a supported kind");
     EXPECT_EQ(files_below(folder / ""), (Names{"a <b>.html", "j.json", "s.ply"}));

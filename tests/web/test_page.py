@@ -108,6 +108,21 @@ class PageTest(BrowserTest):
         self.settled()
         self.assertEqual(self.driver.find_element(By.ID, "play").text, "▶")
 
+    def test_the_first_view_fills_a_high_window_as_a_wide_one(self):
+        high = self.folder / "high.ply"
+        run("convert", self.folder / "alone.ply", high, "--transform", "1,0,0,0,0,3,0,0,0,0,1,0", "--quiet")
+        run("convert", high, self.folder / "high.html", "--title", "A <high> scene", "--quiet")
+        for width, height in ((108, 192), (192, 108)):
+            self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
+                                        {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False})
+            self.addCleanup(self.driver.execute_cdp_cmd, "Emulation.setDeviceMetricsOverride",
+                            {"width": WIDTH, "height": HEIGHT, "deviceScaleFactor": 1, "mobile": False})
+            self.assertEqual(self.open("high.html"), "ready")
+            self.assertEqual(self.driver.title, "A <high> scene")
+            # ewa render frames a scene for the shape of its image.
+            run("render", high, "-o", self.folder / "framed.png", "--size", f"{width}x{height}", "--quiet")
+            self.assertGreater(self.psnr(self.picture(), self.folder / "framed.png"), 35, (width, height))
+
     def test_help_opens(self):
         self.open("page.html")
         self.press("h")

@@ -41,7 +41,7 @@ class Page {
     constructor(gl, settings) {
         Object.assign(this, {gl, settings, canvas: gl.canvas, renderer: new Renderer(gl), index: -1, film: 0, light: false,
                              coming: null, levels: null, timer: null, rested: ""});
-        this.camera = new Camera(settings.start, settings.up, settings.target);
+        this.camera = new Camera(this.start(), settings.up, settings.target);
         this.sorter = new Sorter((order, scene) => {
             try {
                 // A scene replaces the one before together with its order.
@@ -144,10 +144,16 @@ class Page {
         for (const id of ["previous", "next", "where"]) byId(id).hidden = none;
     }
 
+    /// The first view, which fills the window.
+    start() {
+        const {start, portrait} = this.settings, {clientWidth, clientHeight} = this.canvas;
+        return portrait && clientHeight > clientWidth ? portrait : start;
+    }
+
     home() {
         this.index = -1;
         this.film = 0;
-        this.camera.show(this.settings.start, this.settings.target);
+        this.camera.show(this.start(), this.settings.target);
         this.request();
     }
 
