@@ -6,16 +6,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
 #include <glm/mat3x3.hpp>
 #include <memory>
 #include <numbers>
 #include <optional>
+#include <span>
 
 #include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/convert_edits.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
+#include "cli/render_views.h"
 #include "cli/run_inputs.h"
 #include "core/text.h"
 #include "core/typing.h"
@@ -29,10 +34,11 @@
 #include "mesh/mesh_files.h"
 #include "mesh/meshing.h"
 #include "mesh/parts.h"
+#include "mesh/pinholes.h"
 #include "run/loss_option.h"
 #include "scene/dataset_files.h"
 #include "scene/framing.h"
-#include "scene/readout.h"
+#include "scene/splat_shape.h"
 
 namespace ewa::cli {
 namespace {
@@ -41,7 +47,8 @@ namespace fs = std::filesystem;
 
 struct MeshArguments {
     fs::path splats, cameras, output;
-    std::string scale_to;
+    std::string scale_to, up;
+    std::vector<std::string> transform;
     double voxel = 0;   // 0: not given
     int triangles = 0;  // 0: not given
     int downscale = 1, max_width = 0;
@@ -59,7 +66,7 @@ constexpr double kCollisionVoxels = 4;
 constexpr size_t kCollisionTriangles = 10000;
 
 /// Around the scene from all directions, for splats whose cameras are not known.
-std::vector<Camera> own_cameras(const Gaussians& gaussians) {
+mesh::Pinholes own_cameras(const Gaussians& gaussians) {
     const scene::Framing framing = scene::frame_scene(gaussians, kOwnViewSide, kOwnViewSide);
     const double distance = glm::length(framing.camera.position() - framing.target);
     std::vector<Camera> cameras;
@@ -69,47 +76,7 @@ std::vector<Camera> own_cameras(const Gaussians& gaussians) {
         cameras.push_back(scene::look_at(framing.target + distance * to, framing.target, framing.up,
                                          kOwnViewSide, kOwnViewSide));
     }
-    return cameras;
-}
-
-/// The six sides of a cube about the camera of a 360° image, with its pixels per degree in their middles. They overlap: a side sees
-/// nothing between its last pixel's centre and its border.
-void add_cube(const Camera& around, std::vector<Camera>& cameras) {
-    constexpr int kOverlap = 2;  // px
-    Camera side;
-    const int length = std::max(1, int(std::lround(2 * around.fx)));
-    side.width = side.height = length + 2 * kOverlap;
-    side.fx = side.fy = 0.5 * length;
-    side.cx = side.cy = 0.5 * side.width;
-    constexpr double kTurns[] = {0, 0.25, 0.5, 0.75};
-    const auto add = [&](double turn, double nod) {
-        const double a = 2 * std::numbers::pi * turn, b = 2 * std::numbers::pi * nod;
-        const glm::dmat3 about_y(std::cos(a), 0, std::sin(a), 0, 1, 0, -std::sin(a), 0, std::cos(a));
-        const glm::dmat3 about_x(1, 0, 0, 0, std::cos(b), -std::sin(b), 0, std::sin(b), std::cos(b));
-        side.rotation = about_x * about_y * around.rotation;
-        side.translation = about_x * about_y * around.translation;
-        cameras.push_back(side);
-    };
-    for (const double turn : kTurns) add(turn, 0);
-    for (const double nod : {0.25, 0.75}) add(0, nod);
-}
-
-std::vector<Camera> cameras_of(const Dataset& dataset) {
-    std::vector<Camera> cameras;
-    for (const Frame& frame : dataset.frames) {
-        if (frame.camera.distortion.lens == Lens::equirectangular) {
-            add_cube(frame.camera, cameras);
-            continue;
-        }
-        if (!frame.camera.distortion.none())
-            throw InputError("a mesh needs pinholes or 360 degree images, and " + core::one_line(frame.name) +
-                             " has parallel rays; name other cameras with --cameras");
-        if (scene::moves(frame.camera))
-            throw InputError("a mesh needs cameras at rest, and " + core::one_line(frame.name) +
-                             " has a rolling shutter");
-        cameras.push_back(frame.camera);
-    }
-    return cameras;
+    return mesh::Pinholes(std::move(cameras));
 }
 
 /// The cameras of --cameras or of the run, refined as the run refined them. Empty without both.
@@ -117,10 +84,12 @@ std::optional<Dataset> dataset_of_mesh(const MeshArguments& arguments, const std
     fs::path path = arguments.cameras;
     if (path.empty() && run) path = dataset_of(*run);
     if (path.empty()) return std::nullopt;
+    const bool own = run && arguments.cameras.empty();
+    const LensUse lens = own && run->text("lens") == "native" ? LensUse::native : LensUse::automatic;
     Dataset dataset = load_cameras_as_trained(
         dataset_input(path),
-        {.downscale = arguments.downscale, .max_width = arguments.max_width, .lens = LensUse::automatic});
-    const fs::path refined = arguments.cameras.empty() ? refined_cameras_of(*run) : fs::path();
+        {.downscale = arguments.downscale, .max_width = arguments.max_width, .lens = lens});
+    const fs::path refined = own ? refined_cameras_of(*run) : fs::path();
     if (!refined.empty()) io::use_refined_cameras(dataset, refined);
     return dataset;
 }
@@ -171,18 +140,36 @@ mesh::FusionOptions fusion_options(const MeshArguments& arguments) {
     return options;
 }
 
-void enlarge(mesh::Fused& fused, double scale) {
-    if (scale == 1) return;
-    fused.mesh.origin *= scale;
-    for (glm::vec3& p : fused.mesh.positions) {
-        const glm::dvec3 to = scale * glm::dvec3(p);
-        p = glm::vec3(to);
-        if (!(glm::length(to) <= double(std::numeric_limits<float>::max())))
-            throw InputError(
-                fmt::format("--scale-to: {:g} times as large, the mesh is too large for its numbers", scale));
-    }
+/// From --transform and --scale-to.
+glm::dmat4 placement_of(const MeshArguments& arguments) {
+    const glm::dmat4 transform = parse_transform(arguments.transform);
+    if (arguments.scale_to.empty()) return transform;
+    return glm::scale(glm::dmat4(1.0), glm::dvec3(parse_scale_to(arguments.scale_to, transform))) * transform;
+}
+
+void place(mesh::Fused& fused, const glm::dmat4& placement) {
+    if (placement == glm::dmat4(1.0)) return;
+    mesh::transform_mesh(fused.mesh, placement);
+    const double scale = std::cbrt(std::abs(glm::determinant(glm::dmat3(placement))));
     fused.voxel *= scale;
     fused.space.radius *= scale;
+}
+
+/// Says where nobody chose voxels that are too large to show the scene.
+void note_coarse_voxels(const mesh::Fused& fused, const MeshArguments& arguments, Progress& progress) {
+    constexpr double kFew = 60, kMany = 200;  // voxels from corner to corner
+    if (arguments.voxel > 0 || arguments.collision) return;
+    glm::vec3 low(fused.mesh.positions.at(0)), high(low);
+    for (const glm::vec3& p : fused.mesh.positions) {
+        low = glm::min(low, p);
+        high = glm::max(high, p);
+    }
+    const double voxels = double(glm::length(high - low)) / fused.voxel;
+    if (voxels < kFew)
+        progress.note(fmt::format(
+            "voxels of {:.3g}, two pixels of the images, are coarse: the mesh is {:.0f} of them from "
+            "corner to corner; --voxel {:.1g} makes it {:.0f}",
+            fused.voxel, voxels, voxels * fused.voxel / kMany, kMany));
 }
 
 void print(const mesh::Fused& fused, const MeshArguments& arguments, size_t most, Progress& progress) {
@@ -202,11 +189,18 @@ void print(const mesh::Fused& fused, const MeshArguments& arguments, size_t most
 int make_mesh(const MeshArguments& arguments, const std::optional<live::Run>& run) {
     RenderOptions options;
     const DrawArguments draw;
-    const double scale = arguments.scale_to.empty() ? 1 : parse_scale_to(arguments.scale_to);
+    const glm::dmat4 placement = placement_of(arguments);
+    scene::check_transform(placement);
+    const std::optional<glm::dvec3> up = parse_up(arguments.up);
+    if (up && core::lower(arguments.output.extension().string()) == ".ply")
+        throw InputError("--up is for .glb and .obj, whose y points up; --transform turns a .ply");
     const Gaussians gaussians = draw.load(arguments.splats, options);
     const std::optional<Dataset> dataset = dataset_of_mesh(arguments, run);
     check_output(arguments, dataset);
-    const std::vector<Camera> cameras = dataset ? cameras_of(*dataset) : own_cameras(gaussians);
+    // The splats of a run have seen no more than its images.
+    const mesh::Pinholes pinholes =
+        dataset ? mesh::Pinholes(*dataset, !run || !arguments.cameras.empty()) : own_cameras(gaussians);
+    const std::span<const Camera> cameras = pinholes.cameras();
     mesh::meshing();  // says at once that it is missing
 
     Renderer renderer(open_device(arguments.device), gaussians, options);
@@ -219,8 +213,10 @@ int make_mesh(const MeshArguments& arguments, const std::optional<live::Run>& ru
     };
     const bool mean = at_mean_depth(arguments, run);
     mesh::DepthCache cache(cameras.size(), [&](size_t i) {
-        if (mean) return solid_mean_depth(renderer.render(cameras[i], Drawing::depth));
-        return renderer.render(cameras[i], Drawing::median_depth).median_depth;
+        Image seen = mean ? solid_mean_depth(renderer.render(cameras[i], Drawing::depth))
+                          : renderer.render(cameras[i], Drawing::median_depth).median_depth;
+        pinholes.cut(i, seen);
+        return seen;
     });
     const mesh::DepthOfView depth = [&](size_t i) -> const Image& { return cache.at(i); };
     const mesh::FusionOptions fusion = fusion_options(arguments);
@@ -236,9 +232,10 @@ int make_mesh(const MeshArguments& arguments, const std::optional<live::Run>& ru
             made, cameras, depth, [&](size_t i) { return renderer.render(cameras[i]).color; },
             [&](const glm::dvec3& at) { return mesh::kTruncation * fused.voxel_at(at); },
             [&](size_t views) { done(2 * cameras.size() + views); });
-    enlarge(fused, scale);
+    note_coarse_voxels(fused, arguments, progress);
+    place(fused, placement);
     make_folder(arguments.output.parent_path());
-    mesh::save_mesh(arguments.output, made);
+    mesh::save_mesh(arguments.output, made, up.value_or(glm::dvec3(0, -1, 0)));
     print(fused, arguments, fusion.most_triangles, progress);
     return 0;
 }
@@ -250,7 +247,7 @@ int run(CLI::App& app, MeshArguments& arguments) {
     if (input.run && input.run->flag("points"))
         throw InputError(core::one_line(arguments.splats.string()) +
                          " holds the spheres of --points, which have no surfaces");
-    if (input.run) use_options_of(*input.run, app);
+    if (input.run) use_options_of(*input.run, app, arguments.cameras);
     return make_mesh(arguments, input.run);
 }
 
@@ -286,9 +283,16 @@ Action add_mesh(CLI::App& app) {
         "Also mesh the background, with voxels that grow with the distance from what the cameras look at");
     app.add_flag("--collision", arguments->collision,
                  "A mesh for physics: closed, coarse, of at most 10,000 triangles, without colours");
+    add_transform_option(app, arguments->transform, "Of the mesh");
+    app.add_option(
+           "--up", arguments->up,
+           "Axis of the scene that becomes y in a .glb or .obj: x, y, z, or the opposite [-y, as for splats "
+           "in a .glb]")
+        ->type_name("AXIS");
     app.add_option(
            "--scale-to", arguments->scale_to,
-           "Scale the mesh until these two points of the scene are LENGTH apart. ewa-view measures points")
+           "Scale the mesh until these two points of the scene are LENGTH apart; they are its points before "
+           "--transform. ewa-view measures points")
         ->type_name("x,y,z,X,Y,Z,LENGTH");
     add_size_options(app, arguments->downscale, arguments->max_width);
     add_device_options(app, arguments->device);

@@ -47,17 +47,6 @@ std::array<glm::dvec3, 2> parse_look_at(const std::string& text) {
     return {eye, target};
 }
 
-std::optional<glm::dvec3> parse_up(const std::string& text) {
-    if (text.empty()) return std::nullopt;
-    const bool negative = text[0] == '-';
-    const std::string axis = text.substr(negative || text[0] == '+' ? 1 : 0);
-    if (axis != "x" && axis != "y" && axis != "z")
-        throw InputError("--up: '" + text + "' is not an axis: x, y, z, or the opposite such as --up=-y");
-    glm::dvec3 up(0);
-    up[axis[0] - 'x'] = negative ? -1 : 1;
-    return up;
-}
-
 /// The cameras at whole times, for a motion of so many frames.
 ViewPath moments_of(std::function<Camera(double)> at, int count) {
     ViewPath views;
@@ -113,6 +102,17 @@ ViewPath seen_through(const LensArgument& lens, ViewPath views, const glm::dvec3
 }
 
 }  // namespace
+
+std::optional<glm::dvec3> parse_up(const std::string& text) {
+    if (text.empty()) return std::nullopt;
+    const bool negative = text[0] == '-';
+    const std::string axis = text.substr(negative || text[0] == '+' ? 1 : 0);
+    if (axis != "x" && axis != "y" && axis != "z")
+        throw InputError("--up: '" + text + "' is not an axis: x, y, z, or the opposite such as --up=-y");
+    glm::dvec3 up(0);
+    up[axis[0] - 'x'] = negative ? -1 : 1;
+    return up;
+}
 
 void add_views_options(CLI::App& app, ViewsArguments& arguments, CLI::Option* cameras) {
     const auto option = [&](const char* name, auto& value, const char* type, const char* help) {

@@ -39,6 +39,9 @@ enum class ViewsOutput { image, folder, film };
 /// Throws InputError for the names of other images and films, and of an existing file.
 ViewsOutput views_output(const std::filesystem::path& path);
 
+/// Parses --up. Empty: not given. Throws InputError.
+std::optional<glm::dvec3> parse_up(const std::string& text);
+
 /// Throws InputError for texts that cannot be read, and options that exclude each other. The scene is not needed.
 void check_views(const ViewsArguments& arguments);
 

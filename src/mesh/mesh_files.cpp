@@ -4,11 +4,13 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
 #include <string>
 
 #include "core/atomic_file.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "io/gltf/mesh.h"
 #include "io/gltf/mesh_writer.h"
 
 namespace ewa::mesh {
@@ -70,18 +72,29 @@ void write_ply(Text& out, const TriangleMesh& mesh) {
     }
 }
 
-void write_obj(Text& out, const TriangleMesh& mesh) {
-    out.add("# ewa " EWA_VERSION "\n");
+void write_obj(Text& out, const TriangleMesh& mesh, const glm::dquat& turn) {
+    out.add("# ewa " EWA_VERSION ", {} {} {} {} {}\n", io::kTurnOfSplats, turn.x, turn.y, turn.z, turn.w);
+    const glm::dmat3 turned = glm::mat3_cast(turn);
     for (size_t i = 0; i < mesh.positions.size(); ++i) {
-        const glm::dvec3 p = mesh.origin + glm::dvec3(mesh.positions[i]);
+        const glm::dvec3 p = turned * (mesh.origin + glm::dvec3(mesh.positions[i]));
         out.add("v {:.9g} {:.9g} {:.9g}", p.x, p.y, p.z);
         if (!mesh.colors.empty())
             for (const uint8_t c : mesh.colors[i]) out.add(" {:.4g}", c / 255.0);
         out.add("\n");
     }
-    for (const glm::vec3& n : mesh.normals) out.add("vn {:.4f} {:.4f} {:.4f}\n", n.x, n.y, n.z);
+    for (const glm::vec3& normal : mesh.normals) {
+        const glm::dvec3 n = turned * glm::dvec3(normal);
+        out.add("vn {:.4f} {:.4f} {:.4f}\n", n.x, n.y, n.z);
+    }
     for (const auto& t : mesh.triangles)
         out.add("f {0}//{0} {1}//{1} {2}//{2}\n", t[0] + 1, t[1] + 1, t[2] + 1);
+}
+
+/// Turns an axis to y by the shortest way; -y about z, as in a .glb of splats.
+glm::dquat turn_to_y(const glm::dvec3& up) {
+    if (up.y < 0) return {0, 0, 0, 1};
+    if (up.y > 0) return {1, 0, 0, 0};
+    return glm::angleAxis(glm::half_pi<double>(), glm::cross(up, glm::dvec3(0, 1, 0)));
 }
 
 }  // namespace
@@ -92,16 +105,16 @@ void check_mesh_name(const std::filesystem::path& path) {
         throw InputError("-o " + core::one_line(path.string()) + ": a mesh is a .ply, .obj or .glb");
 }
 
-void save_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
+void save_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const glm::dvec3& up) {
     check_mesh_name(path);
     const std::string extension = extension_of(path);
-    if (extension == ".glb") return io::write_glb_mesh(path, mesh);
+    if (extension == ".glb") return io::write_glb_mesh(path, mesh, turn_to_y(up));
     core::AtomicFile file(path);
     Text out(file);
     if (extension == ".ply")
         write_ply(out, mesh);
     else
-        write_obj(out, mesh);
+        write_obj(out, mesh, turn_to_y(up));
     out.flush();
     file.commit();
 }

@@ -6,11 +6,15 @@
 #include <algorithm>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/gtc/matrix_inverse.hpp>
+#include <limits>
 #include <numeric>
 #include <utility>
 
 #include "core/typing.h"
+#include "ewa/error.h"
 #include "mesh/meshing.h"
+#include "scene/splat_shape.h"
 
 namespace ewa::mesh {
 namespace {
@@ -166,6 +170,22 @@ void set_normals(TriangleMesh& mesh) {
     mesh.normals.clear();
     for (const glm::dvec3& sum : sums)
         mesh.normals.emplace_back(glm::length(sum) > 0 ? glm::normalize(sum) : glm::dvec3(0, 0, 1));
+}
+
+void transform_mesh(TriangleMesh& mesh, const glm::dmat4& matrix) {
+    scene::check_transform(matrix);
+    const glm::dmat3 linear(matrix), cofactors = glm::determinant(linear) * glm::inverseTranspose(linear);
+    mesh.origin = glm::dvec3(matrix * glm::dvec4(mesh.origin, 1));
+    for (glm::vec3& p : mesh.positions) {
+        p = glm::vec3(linear * glm::dvec3(p));
+        if (!(glm::length(glm::dvec3(p)) <= double(std::numeric_limits<float>::max())))
+            throw InputError("the transform makes the mesh too large for its numbers");
+    }
+    const bool mirrored = glm::determinant(linear) < 0;
+    for (glm::vec3& n : mesh.normals)
+        n = glm::vec3(glm::normalize((mirrored ? -1.0 : 1.0) * (cofactors * glm::dvec3(n))));
+    if (mirrored)
+        for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
 }
 
 }  // namespace ewa::mesh

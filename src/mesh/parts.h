@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of a mesh, its border, and what is left of it without small parts or with fewer triangles.
+// The parts of a mesh, its border, what is left of it without small parts or with fewer triangles, and its place.
 #pragma once
 #include <cstddef>
+#include <glm/mat4x4.hpp>
 #include <string>
 
 #include "scene/triangle_mesh.h"
@@ -32,5 +33,9 @@ void simplify(scene::TriangleMesh& mesh, size_t most);
 /// Fills mesh.normals with means over the triangles at a vertex, weighted by their area. Where none has an area, they are means over the
 /// neighbours, or z.
 void set_normals(scene::TriangleMesh& mesh);
+
+/// Applies an affine transform to positions and normals. A mirrored mesh keeps its front. Throws InputError if the transform flattens
+/// space, or if a position leaves the range of float32.
+void transform_mesh(scene::TriangleMesh& mesh, const glm::dmat4& matrix);
 
 }  // namespace ewa::mesh

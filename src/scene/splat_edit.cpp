@@ -163,17 +163,6 @@ void turn_general(Gaussians& gaussians, const glm::dmat3& linear) {
     }
 }
 
-void check(const glm::dmat4& matrix, double determinant) {
-    for (int column = 0; column < 4; ++column)
-        for (int row = 0; row < 4; ++row)
-            if (!std::isfinite(matrix[column][row]))
-                throw InputError("the transform has an entry that is not finite");
-    if (matrix[0][3] != 0 || matrix[1][3] != 0 || matrix[2][3] != 0 || matrix[3][3] != 1)
-        throw InputError("the transform is not affine: its last row is not 0 0 0 1");
-    if (determinant == 0 || !std::isfinite(determinant))
-        throw InputError("the transform flattens space: its determinant is " + std::to_string(determinant));
-}
-
 }  // namespace
 
 void select_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices) {
@@ -257,9 +246,9 @@ std::vector<uint32_t> morton_order(const Gaussians& gaussians) {
 }
 
 void transform_splats(Gaussians& gaussians, const glm::dmat4& matrix) {
+    scene::check_transform(matrix);
     const glm::dmat3 linear(matrix);
     const double determinant = glm::determinant(linear);
-    check(matrix, determinant);
     if (matrix == glm::dmat4(1.0)) return;
     move_means(gaussians, matrix);
     if (linear == glm::dmat3(1.0)) return;

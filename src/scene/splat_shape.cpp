@@ -57,6 +57,18 @@ glm::dmat3 right_handed(glm::dmat3 u) {
     return u;
 }
 
+void check_transform(const glm::dmat4& matrix) {
+    for (int column = 0; column < 4; ++column)
+        for (int row = 0; row < 4; ++row)
+            if (!std::isfinite(matrix[column][row]))
+                throw InputError("the transform has an entry that is not finite");
+    if (matrix[0][3] != 0 || matrix[1][3] != 0 || matrix[2][3] != 0 || matrix[3][3] != 1)
+        throw InputError("the transform is not affine: its last row is not 0 0 0 1");
+    const double determinant = glm::determinant(glm::dmat3(matrix));
+    if (determinant == 0 || !std::isfinite(determinant))
+        throw InputError("the transform flattens space: its determinant is " + std::to_string(determinant));
+}
+
 glm::dmat3 covariance_of(const Gaussians& g, size_t i) {
     const float* q = &g.quaternions[4 * i];
     const glm::dmat3 rotation(glm::normalize(glm::dquat(q[0], q[1], q[2], q[3])));

@@ -3,6 +3,7 @@
 #pragma once
 #include <cstddef>
 #include <glm/mat3x3.hpp>
+#include <glm/mat4x4.hpp>
 
 #include "ewa/gaussians.h"
 
@@ -17,6 +18,9 @@ struct Decomposition {
 };
 
 Decomposition decompose(glm::dmat3 a);
+
+/// Throws InputError unless the transform is finite and affine, and does not flatten space.
+void check_transform(const glm::dmat4& matrix);
 
 /// Replaces columns of length 0 so that the three are a right-handed orthonormal frame. An axis may change
 /// its sign, which does not change the covariance.

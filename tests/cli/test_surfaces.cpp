@@ -6,12 +6,14 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numbers>
 
 #include "cli/expect.h"
 #include "ewa/image.h"
 #include "ewa/splat_files.h"
+#include "io/gltf/document.h"
 #include "io/meshes/mesh_files.h"
 
 namespace {
@@ -158,7 +160,49 @@ TEST(Mesh, HasTheLengthThatIsKnown) {
         return ewa::io::read_mesh(folder / name).triangles.at(7).corners[1];
     };
     EXPECT_LT(glm::length(corner("b.glb") - 10.0 * corner("a.glb")), 1e-4);
+    // The points are those before the transform.
+    expect_success(mesh(folder, "c.glb",
+                        {"--voxel", "0.08", "--transform", "scale=-3", "--scale-to", "0,0,1,0,0,-1,20"}));
+    const auto mirrored = ewa::io::read_mesh(folder / "c.glb").triangles.at(7);
+    EXPECT_LT(glm::length(mirrored.corners[2] + 10.0 * corner("a.glb")), 1e-4);
     expect_failure(mesh(folder, "c.glb", {"--scale-to", "1,2,3"}), 2, "--scale-to");
+}
+
+/// The corners of the box of all that the nodes of a glTF place, in the file's world.
+std::array<glm::dvec3, 2> gltf_box(const std::filesystem::path& path) {
+    const ewa::io::GltfDocument document(path, ewa::io::GltfContent::meshes);
+    std::array<glm::dvec3, 2> box{glm::dvec3(1e300), glm::dvec3(-1e300)};
+    ewa::io::visit_nodes(document, glm::dmat4(1), [&](int node, const glm::dmat4& place) {
+        const int mesh = document.model().nodes.at(size_t(node)).mesh;
+        if (mesh < 0) return;
+        for (const auto& primitive : document.mesh(mesh, "a node").primitives)
+            document.read(document.accessor(primitive.attributes.at("POSITION"), "positions"), "positions",
+                          [&](size_t, const double* v) {
+                              const glm::dvec3 at(place * glm::dvec4(v[0], v[1], v[2], 1));
+                              box = {glm::min(box[0], at), glm::max(box[1], at)};
+                          });
+    });
+    return box;
+}
+
+TEST(Mesh, LiesWhereTheSplatsOfAGlbLie) {
+    const Prepared folder;
+    const std::vector<std::string> steps = {"--transform", "move=5,2,1", "--transform", "turn=1,0,0,90"};
+    std::vector<std::string> convert = {"convert", folder / "shell.ply", folder / "splats.glb"};
+    convert.insert(convert.end(), steps.begin(), steps.end());
+    expect_success(run_ewa(convert));
+    expect_success(run_ewa({"mesh", folder / "shell.ply", "-o", folder / "m.glb", "--voxel", "0.08",
+                            "--quiet", steps[0], steps[1], steps[2], steps[3]}));
+    const auto splats = gltf_box(folder / "splats.glb"), made = gltf_box(folder / "m.glb");
+    EXPECT_LT(glm::distance(splats[0], {-6, 0, 1}), 0.01) << "x and y are turned: y is up";
+    for (size_t k = 0; k < 2; ++k) EXPECT_LT(glm::distance(splats[k], made[k]), 0.1);
+
+    expect_success(mesh(folder, "z.glb", {"--voxel", "0.08", "--up", "z", steps[0], steps[1]}));
+    const auto upright = gltf_box(folder / "z.glb");
+    EXPECT_NEAR(0.5 * (upright[0].y + upright[1].y), 1, 0.3) << "z of the shell is its height";
+    expect_failure(mesh(folder, "m.ply", {"--up", "z"}), 2, "--up is for .glb and .obj");
+    expect_failure(mesh(folder, "m.obj", {"--up", "north"}), 2, "is not an axis");
+    expect_failure(mesh(folder, "m.obj", {"--transform", "scale=0"}), 2, "flattens space");
 }
 
 /// What shows the back of the shell through its front is nearer to the middle by the mean depth.
@@ -217,6 +261,46 @@ TEST(Mesh, OfA360Image) {
     EXPECT_NE(outcome.out.find("in 1 part, voxels of 0.05, watertight"), std::string::npos) << outcome.out;
     dataset("ORTHOGRAPHIC");
     expect_failure(made(), 2, "a.png has parallel rays; name other cameras with --cameras");
+}
+
+/// A fisheye sees what no pinhole shows at once: by the sides of a cube, and nothing beyond its image.
+TEST(Mesh, OfAFisheye) {
+    const Prepared folder;
+    std::filesystem::create_directories(folder / "fish/images");
+    ewa::save_image(folder / "fish/images/a.png", ewa::Image(128, 128, 3));
+    const double degrees = 220, radius = 64, fl = radius / (degrees / 2 * std::numbers::pi / 180);
+    write_file(
+        folder / "fish/transforms.json",
+        nlohmann::json{{"camera_model", "OPENCV_FISHEYE"},
+                       {"fl_x", fl},
+                       {"fl_y", fl},
+                       {"cx", 64},
+                       {"cy", 64},
+                       {"w", 128},
+                       {"h", 128},
+                       {"frames",
+                        {{{"file_path", "images/a.png"},
+                          {"transform_matrix", {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}}}}}}
+            .dump());
+    const Outcome outcome = run_ewa({"mesh", folder / "shell.ply", "-o", folder / "m.ply", "--cameras",
+                                     folder / "fish", "--voxel", "0.05"});
+    expect_success(outcome);
+    EXPECT_EQ(outcome.out.find("coarse"), std::string::npos) << outcome.out;
+    // The camera looks along -z. Its corners see about 156 degrees from there, and its sides 110.
+    double farthest = -2, nearest = 2;
+    for (const auto& t : ewa::io::read_mesh(folder / "m.ply").triangles) {
+        farthest = std::max(farthest, t.corners[0].z);
+        nearest = std::min(nearest, t.corners[0].z);
+    }
+    EXPECT_LT(nearest, -0.9);
+    EXPECT_GT(farthest, 0.5) << "the corners see behind the camera";
+    EXPECT_LT(farthest, 0.97) << "nothing sees straight behind";
+    const Outcome coarse =
+        run_ewa({"mesh", folder / "shell.ply", "-o", folder / "m.ply", "--cameras", folder / "fish"});
+    expect_success(coarse);
+    EXPECT_NE(coarse.out.find("are coarse: the mesh is "), std::string::npos) << coarse.out;
+    EXPECT_NE(coarse.out.find(" of them from corner to corner; --voxel 0.0"), std::string::npos)
+        << coarse.out;
 }
 
 TEST(Mesh, SaysWhereFewerTrianglesWouldTearIt) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "ewa/error.h"
+#include "io/gltf/mesh.h"
 #include "io/meshes/mesh_files.h"
 #include "mesh/distance.h"
 #include "mesh/mesh_files.h"
@@ -76,6 +77,34 @@ TEST(MeshReaders, WhatEwaWritesIsTheSameInAllFormats) {
                 const glm::dvec3 at = m.origin + glm::dvec3(m.positions[m.triangles[i][k]]);
                 EXPECT_LT(glm::length(read[i][k] - at), 1e-5) << name;
             }
+    }
+}
+
+TEST(MeshReaders, AGlbAndAnObjStandUprightAndComeBack) {
+    const TempFolder folder;
+    scene::TriangleMesh m;
+    m.origin = {1, 2, 3};
+    m.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    m.normals.assign(3, {0, 0, 1});
+    m.triangles = {{0, 1, 2}};
+    const std::pair<glm::dvec3, glm::dvec3> cases[] = {// up, where origin + (1, 0, 0) is in the file
+                                                       {{0, -1, 0}, {-2, -2, 3}}, {{0, 1, 0}, {2, 2, 3}},
+                                                       {{0, 0, 1}, {2, 3, -2}},   {{0, 0, -1}, {2, -3, 2}},
+                                                       {{1, 0, 0}, {-2, 2, 3}},   {{-1, 0, 0}, {2, -2, 3}}};
+    for (const auto& [up, wanted] : cases) {
+        mesh::save_mesh(folder / "a.glb", m, up);
+        EXPECT_LT(glm::length(io::read_gltf_mesh(folder / "a.glb").triangles.at(0).corners[1] - wanted),
+                  1e-12);
+        mesh::save_mesh(folder / "a.obj", m, up);
+        std::string text = test::file_bytes(folder / "a.obj");
+        text.replace(0, text.find('\n'), "# another program");
+        folder.write("b.obj", text);
+        EXPECT_LT(glm::length(io::read_mesh(folder / "b.obj").triangles.at(0).corners[1] - wanted), 1e-12);
+        for (const char* name : {"a.glb", "a.obj"})
+            EXPECT_LT(
+                glm::length(io::read_mesh(folder / name).triangles.at(0).corners[1] - glm::dvec3(2, 2, 3)),
+                1e-12)
+                << name;
     }
 }
 

@@ -236,9 +236,11 @@ TEST(MeshFiles, AGlbIsReadAgain) {
     ASSERT_EQ(read.triangles.size(), m.triangles.size());
     for (size_t i = 0; i < read.triangles.size(); ++i)
         for (size_t k = 0; k < 3; ++k)
-            EXPECT_LT(glm::length(read.triangles[i].corners[k] - m.origin -
-                                  glm::dvec3(m.positions[m.triangles[i][k]])),
-                      1e-12);
+            EXPECT_LT(
+                glm::length(read.triangles[i].corners[k] -
+                            glm::dvec3(-1, -1, 1) * (m.origin + glm::dvec3(m.positions[m.triangles[i][k]]))),
+                1e-12)
+                << "y is up in a glTF";
     EXPECT_EQ(read.triangles[0].colors[0] & 0xff00ffu, 0x3700ffu);  // 128 in sRGB is 0.216 in linear light
     EXPECT_TRUE(read.materials[read.triangles[0].material].unlit);
     EXPECT_EQ(mesh::topology_of(mesh::joined(read)).parts, 1u);

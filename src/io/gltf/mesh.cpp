@@ -37,10 +37,10 @@ class MeshReader {
   public:
     explicit MeshReader(const GltfDocument& document) : document_(document), model_(document.model()) {}
 
-    scene::MeshScene read() {
+    scene::MeshScene read(const glm::dmat4& world = glm::dmat4(1.0)) {
         check_extensions();
         read_materials(document_, scene_, texture_sets_);
-        visit_nodes(document_, glm::dmat4(1.0), [&](int index, const glm::dmat4& matrix) {
+        visit_nodes(document_, world, [&](int index, const glm::dmat4& matrix) {
             const tinygltf::Node& node = model_.nodes[size_t(index)];
             where_ = "node " + std::to_string(index);
             if (node.mesh >= 0) add_mesh(node.mesh, matrix);
@@ -251,6 +251,23 @@ class MeshReader {
 scene::MeshScene read_gltf_mesh(const std::filesystem::path& path) {
     const GltfDocument document(path, GltfContent::meshes);
     return MeshReader(document).read();
+}
+
+scene::MeshScene read_gltf_mesh_of_splats(const std::filesystem::path& path) {
+    const GltfDocument document(path, GltfContent::meshes);
+    const tinygltf::Value& extras = document.model().asset.extras;
+    glm::dquat turn(1, 0, 0, 0);
+    if (extras.IsObject() && extras.Get(kTurnOfSplats).ArrayLen() == 4) {
+        const tinygltf::Value& q = extras.Get(kTurnOfSplats);
+        turn = {q.Get(3).GetNumberAsDouble(), q.Get(0).GetNumberAsDouble(), q.Get(1).GetNumberAsDouble(),
+                q.Get(2).GetNumberAsDouble()};
+    }
+    return MeshReader(document).read(glm::dmat4(undone_turn(turn)));
+}
+
+glm::dmat3 undone_turn(const glm::dquat& turn) {
+    if (!(std::abs(glm::length(turn) - 1) < 1e-6)) return glm::dmat3(1);
+    return glm::mat3_cast(glm::conjugate(glm::normalize(turn)));
 }
 
 bool is_gltf_mesh(const std::filesystem::path& path) try {

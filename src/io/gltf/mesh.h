@@ -2,6 +2,7 @@
 // glTF 2.0 scenes of triangles, as .glb or .gltf. Buffers and images are files beside it or embedded.
 #pragma once
 #include <filesystem>
+#include <glm/gtc/quaternion.hpp>
 #include <glm/mat4x4.hpp>
 #include <string>
 #include <vector>
@@ -24,6 +25,14 @@ class GltfDocument;
 /// names the file and the byte, or the mesh, node, material or accessor and its property. A file with splats
 /// and without triangles is an InputError too.
 scene::MeshScene read_gltf_mesh(const std::filesystem::path& path);
+
+/// The same in the world of the splats that the mesh was made of, if write_glb_mesh wrote it.
+scene::MeshScene read_gltf_mesh_of_splats(const std::filesystem::path& path);
+
+/// The rotation from the world of the splats to the file's, x, y, z and w: in "extras" of the "asset", and in a comment of an OBJ.
+inline constexpr const char* kTurnOfSplats = "rotation_from_splats";
+/// Back from the file's world. Numbers that are no rotation turn nothing.
+glm::dmat3 undone_turn(const glm::dquat& turn);
 
 /// Whether the file is a glTF whose meshes have triangles and no splats. False for anything else.
 bool is_gltf_mesh(const std::filesystem::path& path);

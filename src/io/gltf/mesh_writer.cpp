@@ -12,6 +12,7 @@
 #include "ewa/error.h"
 #include "io/gltf/document.h"
 #include "io/gltf/glb_file.h"
+#include "io/gltf/mesh.h"
 #include "scene/color.h"
 
 namespace ewa::io {
@@ -52,7 +53,7 @@ struct BufferLayout {
     }
 };
 
-MeshJson structure_of(const scene::TriangleMesh& mesh, BufferLayout& layout) {
+MeshJson structure_of(const scene::TriangleMesh& mesh, const glm::dquat& turn, BufferLayout& layout) {
     const size_t vertices = mesh.positions.size();
     MeshJson attributes = MeshJson::object();
     attributes["POSITION"] =
@@ -78,16 +79,20 @@ MeshJson structure_of(const scene::TriangleMesh& mesh, BufferLayout& layout) {
     const MeshJson material = {{"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}},
                                {"doubleSided", true},
                                {"extensions", {{"KHR_materials_unlit", MeshJson::object()}}}};
-    return {{"asset", {{"version", "2.0"}, {"generator", "ewa " EWA_VERSION}}},
-            {"extensionsUsed", {"KHR_materials_unlit"}},
-            {"scene", 0},
-            {"scenes", {{{"nodes", {0}}}}},
-            {"nodes", {{{"mesh", 0}, {"translation", {mesh.origin.x, mesh.origin.y, mesh.origin.z}}}}},
-            {"meshes", {{{"primitives", {primitive}}}}},
-            {"materials", {material}},
-            {"accessors", layout.accessors},
-            {"bufferViews", layout.views},
-            {"buffers", {{{"byteLength", layout.bytes}}}}};
+    const glm::dvec3 origin = turn * mesh.origin;
+    const MeshJson rotation = {turn.x, turn.y, turn.z, turn.w};
+    return {
+        {"asset",
+         {{"version", "2.0"}, {"generator", "ewa " EWA_VERSION}, {"extras", {{kTurnOfSplats, rotation}}}}},
+        {"extensionsUsed", {"KHR_materials_unlit"}},
+        {"scene", 0},
+        {"scenes", {{{"nodes", {0}}}}},
+        {"nodes", {{{"mesh", 0}, {"rotation", rotation}, {"translation", {origin.x, origin.y, origin.z}}}}},
+        {"meshes", {{{"primitives", {primitive}}}}},
+        {"materials", {material}},
+        {"accessors", layout.accessors},
+        {"bufferViews", layout.views},
+        {"buffers", {{{"byteLength", layout.bytes}}}}};
 }
 
 template <class Element>
@@ -97,9 +102,10 @@ void write_array(core::AtomicFile& file, const std::vector<Element>& values) {
 
 }  // namespace
 
-void write_glb_mesh(const std::filesystem::path& path, const scene::TriangleMesh& mesh) {
+void write_glb_mesh(const std::filesystem::path& path, const scene::TriangleMesh& mesh,
+                    const glm::dquat& turn) {
     BufferLayout layout;
-    const std::string text = structure_of(mesh, layout).dump();
+    const std::string text = structure_of(mesh, turn, layout).dump();
     write_glb(path, text, layout.bytes, "write a .ply, or fewer triangles", [&](core::AtomicFile& file) {
         write_array(file, mesh.positions);
         write_array(file, mesh.normals);

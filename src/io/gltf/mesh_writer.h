@@ -2,13 +2,16 @@
 // A mesh as a binary glTF 2.0.
 #pragma once
 #include <filesystem>
+#include <glm/gtc/quaternion.hpp>
 
 #include "scene/triangle_mesh.h"
 
 namespace ewa::io {
 
 /// Positions, normals, and colours in linear light; the material is unlit (KHR_materials_unlit), because the colours hold the light of the
-/// scene. The node's translation is mesh.origin. The same mesh gives the same bytes. Throws InputError above 4 GiB, RunError (disk).
-void write_glb_mesh(const std::filesystem::path& path, const scene::TriangleMesh& mesh);
+/// scene. The node has the mesh's origin and `turn`, which turns the world of the splats into glTF's; read_mesh undoes it. The same mesh
+/// gives the same bytes. Throws InputError above 4 GiB, RunError (disk).
+void write_glb_mesh(const std::filesystem::path& path, const scene::TriangleMesh& mesh,
+                    const glm::dquat& turn = {1, 0, 0, 0});
 
 }  // namespace ewa::io

@@ -24,7 +24,7 @@ bool is_mesh(const std::filesystem::path& path) {
 scene::MeshScene read_mesh(const std::filesystem::path& path) {
     const std::string extension = mesh_extension(path);
     if (extension == ".obj") return read_obj_mesh(path);
-    return extension == ".ply" ? read_ply_mesh(path) : read_gltf_mesh(path);
+    return extension == ".ply" ? read_ply_mesh(path) : read_gltf_mesh_of_splats(path);
 }
 
 }  // namespace ewa::io

@@ -10,7 +10,7 @@ namespace ewa::io {
 /// Whether the file is a mesh: a glTF whose meshes have triangles and no splats, a PLY with faces, or any .obj.
 bool is_mesh(const std::filesystem::path& path);
 
-/// Reads the triangles of such a file in its world. A glTF gives all that read_gltf_mesh reads, and the other formats give
+/// Reads the triangles of such a file in its world; those that ewa mesh has turned, in the world of the splats. A glTF gives all that read_gltf_mesh reads, and the other formats give
 /// corners alone. Faces of more corners become fans. Triangles with a corner that is not finite are skipped and counted. The limits are
 /// those of read_gltf_mesh. Throws InputError that names the byte, or the place in the glTF.
 scene::MeshScene read_mesh(const std::filesystem::path& path);

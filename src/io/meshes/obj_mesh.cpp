@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Wavefront OBJ: "v x y z" is a vertex and "f a b c" a face of corners such as 7, 7/2, 7//3 or 7/2/3. The first number counts
-// vertices from 1, or from the last one backwards if it is negative. A backslash continues a line. Other lines say nothing of the shape.
+// vertices from 1, or from the last one backwards if it is negative. A backslash continues a line. A comment of ewa mesh has the turn that
+// the reader undoes. Other lines say nothing of the shape.
 // tinyobjloader takes a number that it cannot read for 0.
 #include "core/file_reader.h"
 #include "core/text.h"
+#include "io/gltf/mesh.h"
 #include "io/meshes/faces.h"
 #include "io/meshes/mesh_files.h"
 
@@ -39,6 +41,16 @@ glm::dvec3 position_of(const core::FileReader& reader, std::string_view rest) {
     return position;
 }
 
+/// The turn that the comment names, if it does.
+void find_turn(std::string_view comment, glm::dmat3& undone) {
+    const size_t at = comment.find(kTurnOfSplats);
+    if (at == std::string_view::npos) return;
+    std::string_view rest = comment.substr(at + std::string_view(kTurnOfSplats).size());
+    glm::dvec4 q(0);
+    for (int i = 0; i < 4; ++i) q[i] = core::parse_number(core::next_word(rest)).value_or(0);
+    undone = undone_turn(glm::dquat(q.w, q.x, q.y, q.z));
+}
+
 /// The index from 0 of a face's corner.
 double corner_of(const core::FileReader& reader, std::string_view word, size_t positions) {
     const auto number = core::parse_integer<int64_t>(word.substr(0, word.find('/')));
@@ -52,11 +64,14 @@ scene::MeshScene read_obj_mesh(const std::filesystem::path& path) {
     core::FileReader reader(path);
     FaceCollector faces(reader.size(), [&](const std::string& text) { reader.fail(text); });
     std::vector<double> corners;
+    glm::dmat3 undone(1);
     for (std::string line; read_joined_line(reader, line);) {
         std::string_view rest = line;
         const std::string_view keyword = core::next_word(rest);
         if (keyword == "v") {
-            faces.add_position(position_of(reader, rest));
+            faces.add_position(undone * position_of(reader, rest));
+        } else if (keyword == "#") {
+            find_turn(rest, undone);
         } else if (keyword == "f") {
             corners.clear();
             for (std::string_view word = core::next_word(rest); !word.empty(); word = core::next_word(rest))
