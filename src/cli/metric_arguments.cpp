@@ -58,6 +58,10 @@ Measures MetricArguments::measures() const {
         result.protocol = Protocol::inria;
         if (list.empty()) list = "lpips_vgg";
     }
+    if (lpips_weights.empty() && core::lower(metrics).find("lpips") != std::string::npos)
+        throw InputError(
+            "--metrics " + metrics +
+            ": LPIPS needs its networks; scripts/lpips-weights FILE makes them for --lpips-weights FILE");
     try {
         if (!list.empty())
             result.meter = Meter(metrics_named(list), lpips_weights, result.protocol == Protocol::inria);
@@ -84,9 +88,8 @@ void add_metric_options(CLI::App& app, MetricArguments& arguments) {
             },
             ""))
         ->type_name("LIST");
-    app.add_option(
-           "--lpips-weights", arguments.lpips_weights,
-           "Networks of LPIPS, as scripts/lpips-weights writes them. Without them LPIPS is not computed")
+    app.add_option("--lpips-weights", arguments.lpips_weights,
+                   "Networks of LPIPS, as scripts/lpips-weights writes them. LPIPS needs them")
         ->type_name("FILE");
 }
 
@@ -130,7 +133,8 @@ std::string lpips_note(const std::vector<Figure>& figures, const std::filesystem
             missing += (missing.empty() ? "" : " and ") + figure.name;
     if (missing.empty()) return "";
     return missing + (weights.empty()
-                          ? " not computed: --lpips-weights FILE names the networks\n"
+                          ? " not computed: --lpips-weights FILE names the networks, which "
+                            "scripts/lpips-weights makes\n"
                           : " not computed: the file lacks the network, or an image is too small\n");
 }
 

@@ -100,7 +100,9 @@ TEST_F(Metrics, AMaskLimitsFigures) {
 }
 
 TEST_F(Metrics, LpipsIsNotComputedWithoutItsWeights) {
-    const Outcome outcome = eval({"--metrics", "lpips"});
+    for (const char* asked : {"lpips", "flip,lpips_vgg"})
+        expect_failure(eval({"--metrics", asked}), 2, "scripts/lpips-weights FILE makes them");
+    const Outcome outcome = eval({"--metrics", "all"});
     expect_success(outcome);
     EXPECT_NE(outcome.out.find("lpips_vgg and lpips_alex not computed: --lpips-weights FILE"),
               std::string::npos);
