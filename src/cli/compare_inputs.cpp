@@ -184,8 +184,9 @@ void resolve_runs(CLI::App& app, CompareInputs& inputs) {
     const fs::path of_first = refined[0] ? *refined[0] : refined[1].value_or(fs::path());
     inputs.refined_a = refined[0].value_or(of_first);
     inputs.refined_b = refined[1].value_or(of_first);
+    const fs::path other = inputs.cameras;
     if (inputs.cameras.empty()) inputs.cameras = dataset_of(*first);
-    use_options_of(*first, app);
+    use_options_of(*first, app, other);
 }
 
 Sides open_sides(const CompareInputs& inputs) {

@@ -122,6 +122,7 @@ Action add_eval(CLI::App& app) {
     add_view_options(app, arguments->views);
     return [&app, arguments] {
         arguments->run = resolve_views(app, arguments->views);
+        arguments->appearance.run = live::run_of_splats(arguments->views.splats);
         return run(*arguments);
     };
 }

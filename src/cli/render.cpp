@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <memory>
 #include <optional>
@@ -18,6 +19,7 @@
 #include "cli/render_picture.h"
 #include "cli/render_views.h"
 #include "cli/run_inputs.h"
+#include "core/messages.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
@@ -49,7 +51,12 @@ struct RenderArguments {
     bool contact_sheet = false, quiet = false;
     // The run that SPLATS names; empty: none.
     std::optional<live::Run> run;
-    bool cameras_of_run = false;
+    bool cameras_of_run = false, run_is_folder = false;
+};
+
+struct DrawnScene {
+    const Gaussians& gaussians;
+    const RenderOptions& options;
 };
 
 /// The scene, and the options to draw it with.
@@ -67,10 +74,39 @@ void note_skipped(Progress& progress, uint32_t skipped) {
         progress.note("skipped " + core::counted(skipped, "splat") + " with a value that is not finite");
 }
 
+/// Counts the views that show nothing.
+class EmptyViews {
+  public:
+    explicit EmptyViews(const std::string& mode) : what_(mode == "median-depth" ? "surface" : "splat") {}
+    void add(bool empty) {
+        if (empty && empty_++ == 0) first_ = views_;
+        ++views_;
+    }
+    /// Says how many there are, and where the scene is. files: one a view, or one of all.
+    void warn(const Gaussians& gaussians, const std::vector<fs::path>& files) const {
+        if (empty_ == 0) return;
+        const bool together = files.size() == 1;
+        const std::string file = core::one_line(files[together ? 0 : first_].string());
+        std::string text =
+            views_ == 1 ? fmt::format("{} shows no {}", file, what_)
+                        : fmt::format("{} of {} views show no {}, the first is {}", empty_, views_, what_,
+                                      together ? fmt::format("view {} of {}", first_ + 1, file) : file);
+        if (const scene::Box box = scene::framed_box(gaussians); box.low.x <= box.high.x)
+            text += fmt::format(": the scene is within {:.3g} of {:.6g},{:.6g},{:.6g}",
+                                0.5 * glm::length(box.high - box.low), box.center().x, box.center().y,
+                                box.center().z);
+        core::warn(text);
+    }
+
+  private:
+    const char* what_;
+    size_t views_ = 0, empty_ = 0, first_ = 0;
+};
+
 /// Renders the views into the files. appearances: of each, or none. Returns the exit status.
-int write_images(const RenderArguments& arguments, Renderer& renderer, Footprint kernel, ViewPath views,
-                 const std::vector<fs::path>& files, const std::vector<Appearance>& appearances,
-                 Progress& progress) {
+int write_images(const RenderArguments& arguments, const DrawnScene& scene, Renderer& renderer,
+                 ViewPath views, const std::vector<fs::path>& files,
+                 const std::vector<Appearance>& appearances, Progress& progress) {
     std::optional<ContactSheet> sheet;
     if (arguments.contact_sheet) {
         std::ranges::transform(views.cameras, views.cameras.begin(), thumbnail_of);
@@ -80,10 +116,13 @@ int write_images(const RenderArguments& arguments, Renderer& renderer, Footprint
     const std::vector<Camera> cameras = views.cameras;
     RenderOutput output({arguments.mode, arguments.format, arguments.picture.transparent}, files, progress,
                         std::move(sheet));
-    PictureTaker taker(arguments.picture, renderer, drawing_of(arguments.mode), kernel, std::move(views));
+    PictureTaker taker(arguments.picture, renderer, drawing_of(arguments.mode), scene.options.kernel,
+                       std::move(views));
+    EmptyViews empty(arguments.mode);
     for (size_t i = 0; i < cameras.size(); ++i) {
         if (interrupted()) return kInterruptedStatus;
         std::vector<Rendering> eyes = taker.take(i);
+        empty.add(std::ranges::all_of(eyes, is_empty));
         if (!appearances.empty() && arguments.mode == "color")
             for (Rendering& eye : eyes)
                 eye.color = arguments.picture.transparent
@@ -95,6 +134,8 @@ int write_images(const RenderArguments& arguments, Renderer& renderer, Footprint
     }
     output.finish();
     note_skipped(progress, taker.skipped());
+    progress.clear();
+    empty.warn(scene.gaussians, files);
     if (arguments.contact_sheet)
         progress.note(
             fmt::format("{}: {}", arguments.output.string(), core::counted(cameras.size(), "view")));
@@ -187,7 +228,7 @@ int render_dataset_views(RenderArguments arguments) {
     Renderer renderer(open_device(arguments.device), gaussians, options);
     const InterruptWatch watch;
     Progress progress("rendered", static_cast<int>(frames.size()), "frames", arguments.quiet);
-    return write_images(arguments, renderer, options.kernel, {std::move(cameras)}, files, appearances,
+    return write_images(arguments, {gaussians, options}, renderer, {std::move(cameras)}, files, appearances,
                         progress);
 }
 
@@ -207,23 +248,32 @@ scene::FramingHints hints_of(const std::optional<Dataset>& dataset) {
 }
 
 /// The film of these views. Returns the exit status.
-int write_film(const RenderArguments& arguments, Renderer& renderer, const RenderOptions& options,
-               const ViewPath& views, const std::string& encoder, Progress& progress) {
+int write_film(const RenderArguments& arguments, const DrawnScene& scene, Renderer& renderer,
+               const ViewPath& views, const std::string& encoder, const std::optional<Appearance>& appearance,
+               Progress& progress) {
     const PictureArguments& picture = arguments.picture;
     const std::vector<Camera>& cameras = views.cameras;
     Film film(arguments.output, cameras[0].width * (picture.stereo == "side-by-side" ? 2 : 1),
               cameras[0].height * (picture.stereo == "top-bottom" ? 2 : 1), encoder);
-    PictureTaker taker(picture, renderer, Drawing::color, options.kernel, views);
+    PictureTaker taker(picture, renderer, Drawing::color, scene.options.kernel, views);
+    EmptyViews empty(arguments.mode);
     for (size_t i = 0; i < cameras.size(); ++i) {
         if (interrupted()) return kInterruptedStatus;
-        if (picture.several())
-            film.add(screen_bytes(joined_eyes(taker.take(i), picture.stereo).color));
-        else
-            film.add(renderer.render_bytes(cameras[i], {.render = options}));
+        if (picture.several() || appearance) {
+            std::vector<Rendering> eyes = taker.take(i);
+            empty.add(std::ranges::all_of(eyes, is_empty));
+            Image color = joined_eyes(std::move(eyes), picture.stereo).color;
+            film.add(screen_bytes(appearance ? with_appearance(std::move(color), *appearance) : color));
+        } else {
+            film.add(renderer.render_bytes(cameras[i], {.render = scene.options}));
+            empty.add(renderer.splats_drawn() == 0);
+        }
         progress.update(int(i) + 1);
     }
     film.finish();
     note_skipped(progress, renderer.skipped_nonfinite());
+    progress.clear();
+    empty.warn(scene.gaussians, {arguments.output});
     progress.note(fmt::format("{}: {} frames, {:.1f} s", arguments.output.string(), cameras.size(),
                               double(cameras.size()) / kFilmRate));
     return 0;
@@ -248,6 +298,8 @@ int render_free_views(RenderArguments arguments) {
     const Dataset* const known = dataset ? &*dataset : nullptr;
     std::vector<fs::path> files{arguments.output};
     if (output != ViewsOutput::folder) check_renders(arguments, files, known);
+    const std::optional<Appearance> appearance =
+        appearance_of_new_views(arguments.appearance, arguments.run_is_folder ? arguments.run : std::nullopt);
     const Gaussians gaussians = load_scene(arguments, options);
     if (dataset && !dataset->frames.empty()) {
         glm::dvec3 sum(0);
@@ -269,15 +321,28 @@ int render_free_views(RenderArguments arguments) {
     Renderer renderer(open_device(arguments.device), gaussians, options);
     const InterruptWatch watch;
     Progress progress("rendered", int(views.cameras.size()), "views", arguments.quiet);
-    if (film) return write_film(arguments, renderer, options, views, encoder, progress);
-    return write_images(arguments, renderer, options.kernel, views, files, {}, progress);
+    const DrawnScene scene{gaussians, options};
+    if (film) return write_film(arguments, scene, renderer, views, encoder, appearance, progress);
+    const std::vector<Appearance> appearances(appearance ? views.cameras.size() : 0,
+                                              appearance.value_or(Appearance()));
+    return write_images(arguments, scene, renderer, views, files, appearances, progress);
+}
+
+/// of_frames: an option that only a dataset's views have.
+[[noreturn]] void refuse_frames(const CLI::App& app, const std::string& of_frames, bool run) {
+    if (!run) throw InputError(of_frames + " needs --cameras DATASET");
+    std::string other = "a film";
+    for (const char* option : {"--size", "--look-at", "--up", "--orbit", "--views"})
+        if (app.count(option) > 0) other = option;
+    throw InputError(of_frames + " is of the images of the run, and " + other +
+                     " of other views: leave one out" +
+                     (other == "--size" ? "; --max-width makes the images smaller" : ""));
 }
 
 /// Completes the arguments by the run that SPLATS may name, and chooses whose cameras are used.
 int run(CLI::App& app, RenderArguments& arguments) {
     std::string of_frames;  // a given option that only a dataset's views have
-    for (const char* option :
-         {"--frames", "--test-every", "--downscale", "--max-width", "--exposures", "--appearance-of"})
+    for (const char* option : {"--frames", "--test-every", "--downscale", "--max-width"})
         if (app.count(option) > 0) of_frames = option;
     if (arguments.lens == "native" || arguments.lens == "undistort") of_frames = "--lens " + arguments.lens;
     if (arguments.mode == "depth" && arguments.draw.integrator == "march")
@@ -290,15 +355,14 @@ int run(CLI::App& app, RenderArguments& arguments) {
         throw InputError("--codec: only a film has one, such as -o film.mp4");
     SplatInput input = splat_input(arguments.splats);
     arguments.splats = input.file;
-    if (input.run) use_options_of(*input.run, app);
+    arguments.appearance.run = input.run ? input.run : live::run_of_splats(arguments.splats);
+    if (!arguments.cameras.empty()) arguments.cameras = dataset_input(arguments.cameras);
+    if (input.run) use_options_of(*input.run, app, arguments.cameras);
     if (const auto use = core::find_value(scene::kLensWords, arguments.lens))
         arguments.lens_use = *use;
     else
         arguments.views.lens = lens_of(arguments.lens);
-    if (!arguments.cameras.empty()) {
-        arguments.cameras = dataset_input(arguments.cameras);
-        return render_dataset_views(arguments);
-    }
+    if (!arguments.cameras.empty()) return render_dataset_views(arguments);
     const ViewsOutput output = views_output(arguments.output);
     const bool free = any_given(arguments.views) || (arguments.views.lens && of_frames.empty()) ||
                       output == ViewsOutput::film ||
@@ -309,8 +373,9 @@ int run(CLI::App& app, RenderArguments& arguments) {
         arguments.cameras_of_run = true;
         return render_dataset_views(arguments);
     }
-    if (!of_frames.empty()) throw InputError(of_frames + " needs --cameras DATASET");
-    arguments.run = input.run ? std::move(input.run) : live::run_of_splats(arguments.splats);
+    if (!of_frames.empty()) refuse_frames(app, of_frames, input.run.has_value());
+    arguments.run_is_folder = input.run.has_value();
+    arguments.run = arguments.appearance.run;
     return render_free_views(arguments);
 }
 

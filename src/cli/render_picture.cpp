@@ -203,6 +203,11 @@ std::vector<Rendering> PictureTaker::take(size_t i) {
     return eyes;
 }
 
+bool is_empty(const Rendering& rendering) {
+    const Image& shown = rendering.median_depth.pixels.empty() ? rendering.alpha : rendering.median_depth;
+    return std::ranges::all_of(shown.pixels, [](float value) { return value == 0; });
+}
+
 Rendering joined_eyes(std::vector<Rendering> eyes, const std::string& stereo) {
     Rendering& first = eyes[0];
     if (eyes.size() == 1) return std::move(first);

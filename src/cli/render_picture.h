@@ -67,6 +67,9 @@ class PictureTaker {
     uint32_t skipped_ = 0;
 };
 
+/// Whether it shows no splat, or no surface where it has the depth of surfaces.
+bool is_empty(const Rendering& rendering);
+
 /// Both eyes in one image, as --stereo names it. One eye stays as it is.
 Rendering joined_eyes(std::vector<Rendering> eyes, const std::string& stereo);
 

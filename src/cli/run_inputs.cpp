@@ -12,6 +12,7 @@
 #include "ewa/error.h"
 #include "io/datasets/dataset_folders.h"
 #include "report/run_file_names.h"
+#include "scene/names.h"
 
 namespace ewa::cli {
 namespace {
@@ -29,10 +30,13 @@ SplatInput splat_input(const fs::path& path) {
     if (!core::is_folder(path)) return {path, {}};
     const std::string name = core::one_line(path.string());
     std::optional<live::Run> run = live::find_run(path);
-    if (!run)
+    if (!run) {
+        const std::string runs = live::runs_in(path);
         throw InputError(name +
                          ": a folder without splats; expected a splat file, or the folder of a training run "
-                         "with splats.ply in it");
+                         "with splats.ply in it" +
+                         (runs.empty() ? "" : ", such as " + runs));
+    }
     if (run->splats.empty())
         throw InputError(
             name +
@@ -63,8 +67,24 @@ fs::path dataset_input(const fs::path& path) {
     return run ? dataset_of(*run) : path;
 }
 
-void use_options_of(const live::Run& run, CLI::App& app) {
+namespace {
+
+/// px of the widest image that the run was trained on; 0 where its dataset is not found.
+int trained_width(const live::Run& run, int downscale) try {
+    int width = 0;
+    for (const Frame& frame : load_cameras_as_trained(dataset_of(run), {}).frames)
+        width = std::max(width, std::max(frame.source.width, frame.camera.width) / downscale);
+    return width;
+} catch (const InputError&) {
+    return 0;
+}
+
+}  // namespace
+
+void use_options_of(const live::Run& run, CLI::App& app, const fs::path& other) {
     const fs::path config = run.folder / "config.json";
+    std::error_code none;
+    const bool elsewhere = !other.empty() && !fs::equivalent(other, run.dataset, none);
     for (const char* name : {"points", "nearest", "integrator", "kernel", "background", "loss", "downscale",
                              "max-width", "masks", "lens", "test-every"}) {
         const auto value = run.config.find(name);
@@ -76,6 +96,13 @@ void use_options_of(const live::Run& run, CLI::App& app) {
                            ": sky.json is missing; the splats are drawn over black");
             continue;  // DrawArguments::load finds it
         }
+        // A factor says nothing of the sizes of other images.
+        if (name == std::string_view("downscale") && elsewhere && value->is_number_integer() &&
+            app.count("--downscale") + app.count("--max-width") == 0)
+            if (const int width = trained_width(run, std::max(1, value->get<int>())); width > 0) {
+                apply_config_value(app, "max-width", width, config);
+                continue;
+            }
         const CLI::Option* const points = app.get_option_no_throw("--points");
         if (name == std::string_view("nearest") && (!points || points->count() == 0)) continue;
         apply_config_value(app, name, *value, config);
@@ -115,37 +142,62 @@ fs::path appearance_file(const std::string& which, const std::optional<live::Run
 
 }  // namespace
 
+namespace {
+
+struct KnownAppearances {
+    fs::path file;
+    std::map<std::string, Appearance> images = {};
+    std::optional<Appearance> others = {};  // of images that are not there, or of all
+};
+
+KnownAppearances known_appearances(const AppearanceArguments& arguments,
+                                   const std::optional<live::Run>& run) {
+    KnownAppearances known{
+        appearance_file(arguments.file, run || arguments.of.empty() ? run : arguments.run)};
+    if (known.file.empty() && !arguments.of.empty())
+        throw InputError("--appearance-of: there is no appearance.json; --exposures FILE names one");
+    if (known.file.empty()) return known;
+    known.images = load_appearances(known.file);
+    std::vector<Appearance> all;
+    std::vector<std::string> names;
+    for (const auto& [name, appearance] : known.images) {
+        all.push_back(appearance);
+        names.push_back(name);
+    }
+    known.others = new_view_appearance(all);
+    if (arguments.of.empty()) return known;
+    const int named = scene::index_of_name(names, arguments.of);
+    if (named < 0)
+        throw InputError("--appearance-of " + core::one_line(arguments.of) + ": no image of " +
+                         core::one_line(known.file.string()) + core::did_you_mean(arguments.of, names));
+    known.others = all[size_t(named)];
+    return known;
+}
+
+}  // namespace
+
 std::vector<Appearance> appearances_of(const AppearanceArguments& arguments,
                                        const std::optional<live::Run>& run, const Dataset& dataset,
                                        const std::vector<int>& frames) {
-    const fs::path file = appearance_file(arguments.file, run);
-    if (file.empty() && !arguments.of.empty())
-        throw InputError("--appearance-of: there is no appearance.json; --exposures FILE names one");
-    if (file.empty()) return {};
-    const auto known = load_appearances(file);
-    const auto has_appearance = [&](const Frame& frame) { return known.contains(frame.name); };
-    if (arguments.file != "auto" && std::ranges::none_of(dataset.frames, has_appearance))
-        throw InputError(core::one_line(file.string()) + ": has no exposure of an image of " +
+    const KnownAppearances known = known_appearances(arguments, run);
+    const auto has_appearance = [&](const Frame& frame) { return known.images.contains(frame.name); };
+    if (!known.file.empty() && arguments.file != "auto" && arguments.of.empty() &&
+        std::ranges::none_of(dataset.frames, has_appearance))
+        throw InputError(core::one_line(known.file.string()) + ": has no exposure of an image of " +
                          core::one_line(dataset.root.string()) + "; --exposures none uses none");
-    std::vector<Appearance> all;
-    for (const auto& [name, appearance] : known) all.push_back(appearance);
-    std::optional<Appearance> other = new_view_appearance(all);
-    if (!arguments.of.empty()) {
-        const auto named = known.find(arguments.of);
-        std::vector<std::string> names;
-        for (const auto& [name, appearance] : known) names.push_back(name);
-        if (named == known.end())
-            throw InputError("--appearance-of " + core::one_line(arguments.of) + ": no image of " +
-                             core::one_line(file.string()) + core::did_you_mean(arguments.of, names));
-        other = named->second;
-    }
-    if (!other) return {};
+    if (!known.others) return {};
     std::vector<Appearance> appearances;
     for (const int index : frames) {
-        const auto found = known.find(dataset.frames[size_t(index)].name);
-        appearances.push_back(found == known.end() || !arguments.of.empty() ? *other : found->second);
+        const auto found = known.images.find(dataset.frames[size_t(index)].name);
+        appearances.push_back(found == known.images.end() || !arguments.of.empty() ? *known.others
+                                                                                   : found->second);
     }
     return appearances;
+}
+
+std::optional<Appearance> appearance_of_new_views(const AppearanceArguments& arguments,
+                                                  const std::optional<live::Run>& run) {
+    return known_appearances(arguments, run).others;
 }
 
 std::optional<live::Run> resolve_views(CLI::App& app, ViewArguments& arguments) {
@@ -162,7 +214,7 @@ std::optional<live::Run> resolve_views(CLI::App& app, ViewArguments& arguments) 
         arguments.dataset = dataset_of(*input.run);
     }
     if (!input.run) return std::nullopt;
-    use_options_of(*input.run, app);
+    use_options_of(*input.run, app, own_dataset ? fs::path() : arguments.dataset);
     std::error_code none;
     if (!own_dataset && !fs::equivalent(arguments.dataset, input.run->dataset, none)) return std::nullopt;
     const std::string frames = input.run->text("frames");

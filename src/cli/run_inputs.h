@@ -35,8 +35,9 @@ std::filesystem::path dataset_input(const std::filesystem::path& path);
 std::filesystem::path dataset_of(const live::Run& run);
 
 /// Gives --kernel, --background, --downscale, --max-width, --masks, --lens and --test-every the run's values, where `app` has the option
-/// and the command line does not. Throws InputError for a value that the option refuses.
-void use_options_of(const live::Run& run, CLI::App& app);
+/// and the command line does not. other: a dataset in place of the run's; its images become as wide as those that the run was trained on,
+/// where they are wider. Empty: none. Throws InputError for a value that the option refuses.
+void use_options_of(const live::Run& run, CLI::App& app, const std::filesystem::path& other = {});
 
 /// cameras.json of the run. Empty if its cameras are those of the dataset. Warns if they should be refined, and the file
 /// is missing.
@@ -49,6 +50,7 @@ Dataset cameras_of_run(const live::Run& run);
 struct AppearanceArguments {
     std::string file = "auto";  // or "none", or "auto": the file beside the splats of a run, if it is there
     std::string of;  // the training image whose appearance all others get; empty: see new_view_appearance
+    std::optional<live::Run> run = {};  // of the splats, where `of` is searched; empty: none
 };
 
 /// --exposures and --appearance-of of ewa eval and ewa render.
@@ -61,6 +63,10 @@ void add_appearance_options(CLI::App& app, AppearanceArguments& arguments);
 std::vector<Appearance> appearances_of(const AppearanceArguments& arguments,
                                        const std::optional<live::Run>& run, const Dataset& dataset,
                                        const std::vector<int>& frames);
+
+/// The appearance of views that no image has. run: as above. Empty: none. Throws InputError.
+std::optional<Appearance> appearance_of_new_views(const AppearanceArguments& arguments,
+                                                  const std::optional<live::Run>& run);
 
 /// Replaces a run's folder among SPLATS and DATASET. Without DATASET, it is that of the run, also of a run that SPLATS
 /// is a file of. The run's options are used as in use_options_of, unless both arguments are files. Throws InputError,

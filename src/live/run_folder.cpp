@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "live/run_folder.h"
 
+#include <algorithm>
+
 #include "core/folders.h"
 #include "core/json.h"
 #include "core/text.h"
@@ -111,6 +113,20 @@ std::optional<fs::path> run_of_file(const fs::path& file) {
             return folder.empty() ? "." : folder;
     }
     return std::nullopt;
+}
+
+std::string runs_in(const fs::path& folder) {
+    constexpr size_t kNamed = 3;
+    std::vector<fs::path> runs;
+    std::error_code error;
+    for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
+        if (is_run(at->path())) runs.push_back(at->path());
+    std::ranges::sort(runs);
+    std::string text;
+    for (size_t i = 0; i < std::min(runs.size(), kNamed); ++i)
+        text += (i > 0 ? ", " : "") + core::one_line(runs[i].string());
+    if (runs.size() > kNamed) text += " and " + std::to_string(runs.size() - kNamed) + " more";
+    return text;
 }
 
 }  // namespace ewa::live

@@ -47,6 +47,9 @@ std::optional<std::filesystem::path> base_of(const std::filesystem::path& run,
 /// any folder above the run.
 std::optional<Run> find_run(const std::filesystem::path& folder);
 
+/// The runs in this folder, such as "out/a, out/b and 3 more". Empty if there are none.
+std::string runs_in(const std::filesystem::path& folder);
+
 /// The run that wrote this splat file: it is splats.ply, or one that --keep keeps, and config.json is beside it. Empty for any other path.
 std::optional<Run> run_of_splats(const std::filesystem::path& splats);
 

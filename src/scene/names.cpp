@@ -19,18 +19,10 @@ int checked_index(const Dataset& dataset, int index) {
                      core::counted(dataset.frames.size(), "frame") + ", numbered from 0 in name order");
 }
 
-/// The index of the frame of this name, or -1. Without its folder or its extension, only one frame may have it.
-int index_of_name(const Dataset& dataset, const std::string& name) {
-    int found = -1, count = 0;
-    for (int i = 0; i < std::ssize(dataset.frames); ++i) {
-        const fs::path own = dataset.frames[size_t(i)].name;
-        if (own == name) return i;
-        const fs::path bare = fs::path(own).replace_extension();
-        if (bare != name && own.filename() != name && bare.filename() != name) continue;
-        found = i;
-        ++count;
-    }
-    return count == 1 ? found : -1;
+std::vector<std::string> names_of(const Dataset& dataset) {
+    std::vector<std::string> names;
+    for (const Frame& frame : dataset.frames) names.push_back(frame.name);
+    return names;
 }
 
 /// The first and the last frame of an item of the list.
@@ -39,7 +31,7 @@ std::pair<int, int> range_of(const Dataset& dataset, const std::string& item, co
         const int checked = checked_index(dataset, *index);
         return {checked, checked};
     }
-    if (const int named = index_of_name(dataset, item); named >= 0) return {named, named};
+    if (const int named = index_of_name(names_of(dataset), item); named >= 0) return {named, named};
     const size_t dash = std::min(item.find('-'), item.size());
     const auto first = core::parse_integer<int>(std::string_view(item).substr(0, dash));
     const auto last =
@@ -57,6 +49,19 @@ std::pair<int, int> range_of(const Dataset& dataset, const std::string& item, co
 }
 
 }  // namespace
+
+int index_of_name(const std::vector<std::string>& names, const std::string& name) {
+    int found = -1, count = 0;
+    for (int i = 0; i < std::ssize(names); ++i) {
+        const fs::path own = names[size_t(i)];
+        if (own == name) return i;
+        const fs::path bare = fs::path(own).replace_extension();
+        if (bare != name && own.filename() != name && bare.filename() != name) continue;
+        found = i;
+        ++count;
+    }
+    return count == 1 ? found : -1;
+}
 
 std::vector<int> frames_named(const Dataset& dataset, const std::string& list) {
     std::vector<int> frames;

@@ -263,6 +263,42 @@ TEST_F(Views, AFilmGoesToFfmpegFrameByFrame) {
     EXPECT_EQ(read_file(folder / "short.mkv").size(), size_t(5) * 8 * 6 * 4);
 }
 
+/// One line says it, also of many views, and where the scene is.
+TEST_F(Views, ThatShowNothingAreSaid) {
+    const auto warned = [&](const Names& more, const std::string& text,
+                            const Circumstances& circumstances = {}) {
+        const Outcome outcome = render(more, circumstances);
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        EXPECT_NE(outcome.err.find(text), std::string::npos) << "'" << text << "' is not in: " << outcome.err;
+        EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+        EXPECT_NE(outcome.err.find(": the scene is within "), std::string::npos) << outcome.err;
+    };
+    const Names away{"--look-at", "1000,0,0,2000,0,0", "--size", "24x16"};
+    const auto with = [&](Names more) {
+        more.insert(more.begin(), away.begin(), away.end());
+        return more;
+    };
+    for (const char* mode : {"color", "alpha", "depth", "normal"})
+        warned(with({"-o", folder / "x.png", "--mode", mode}), "x.png shows no splat");
+    warned(with({"-o", folder / "x.exr", "--mode", "median-depth"}), "x.exr shows no surface");
+    warned(with({"-o", folder / "x.png", "--lens", "ortho"}), "x.png shows no splat");
+    warned(with({"-o", folder / "x.png", "--background", "1,1,1"}), "x.png shows no splat");
+    warned(with({"-o", folder / "x.png", "--integrator", "march"}), "x.png shows no splat");
+    warned(with({"-o", folder / "x.png", "--points"}), "x.png shows no splat");
+    // An orbit about a point far away.
+    warned({"--look-at", "1000,0,0,1001,0,0", "--orbit", "4", "--size", "24x16", "-o", folder / "d"},
+           "of 4 views show no splat, the first is ");
+    warned({"--look-at", "1000,0,0,1001,0,0", "--orbit", "4", "--size", "24x16", "-o", folder / "f.mp4"},
+           "show no splat, the first is view ", with_ffmpeg("for last; do :; done\ncat > \"$last\"\n"));
+    // Some of a folder's views.
+    const Camera sees = scene::look_at({0, 0, -6}, {0, 0, 0}, {0, -1, 0}, 48, 32);
+    const Camera not_any = scene::look_at({0, 0, -900}, {0, 0, -1000}, {0, -1, 0}, 48, 32);
+    io::write_views(folder / "three.json", {{"1", sees, {}}, {"2", not_any, {}}, {"3", not_any, {}}});
+    warned({"--views", folder / "three.json", "-o", folder / "d"},
+           "2 of 3 views show no splat, the first is " + (folder / "d/00001.png"));
+    expect_success(render({"--views", saved_views(), "-o", folder / "d"}));
+}
+
 TEST_F(Views, AFilmThatFailsIsOneLineAndLeavesNothing) {
     const Names film{"--orbit", "3", "--size", "300x200", "-o", folder / "film.mp4"};
     const Circumstances none{.environment = {{"PATH", folder / "nowhere"}}};
