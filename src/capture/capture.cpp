@@ -383,7 +383,9 @@ fs::path dataset_of_images(const fs::path& folder) try {
 
 void check_training_input(const fs::path& path) {
     if (const fs::path dataset = dataset_of_images(path); !dataset.empty()) {
-        const std::string name = core::one_line(fs::proximate(dataset).string());
+        // As it was typed: an absolute path from elsewhere would become a row of ../
+        const std::string name =
+            core::one_line((path.is_absolute() ? dataset : fs::proximate(dataset)).string());
         throw InputError(name + " has the cameras of " + core::one_line(path.string()) + ": ewa train " +
                          name + "; to search them again, ewa cameras " + core::one_line(path.string()) +
                          " -o DIR");

@@ -22,6 +22,7 @@
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/run.h"
+#include "io/datasets/dataset_folders.h"
 #include "live/run_folder.h"
 #include "ranks/open.h"
 #include "report/chart.h"
@@ -73,12 +74,6 @@ void add_run_options(CLI::App& app, TrainArguments& arguments) {
     }
 }
 
-struct Quality {
-    const char* name;
-    int steps;
-};
-constexpr std::array<Quality, 3> kQualities{{{"low", 2000}, {"medium", 7000}, {"high", 30000}}};
-
 /// Reads the config, if there is one. Then sets the steps of --quality, unless they are given themselves. A quality of the
 /// command line goes before steps of the config.
 void apply_config_and_quality(CLI::App& app, TrainArguments& arguments) {
@@ -86,13 +81,21 @@ void apply_config_and_quality(CLI::App& app, TrainArguments& arguments) {
     size_t given = app.count("--steps");
     if (!arguments.config.empty()) apply_config(app, arguments.config);
     if (!on_command_line) given = app.count("--steps");
-    for (const Quality& quality : kQualities)
-        if (quality.name == arguments.quality && given == 0) arguments.run.train.steps = quality.steps;
+    if (const auto steps = core::find_value(train::kQualities, arguments.quality); steps && given == 0)
+        arguments.run.train.steps = *steps;
 }
 
 bool is_mesh_scene(const fs::path& path) {
     const std::string extension = core::lower(path.extension().string());
     return extension == ".gltf" || extension == ".glb";
+}
+
+/// A folder of runs is no dataset, and a run in it may be meant.
+void refuse_runs(const fs::path& path) {
+    if (!core::is_folder(path) || is_capture(path) || io::is_dataset_folder(path)) return;
+    if (const std::string runs = live::runs_in(path); !runs.empty())
+        throw InputError(core::one_line(path.string()) + ": not a dataset, but it has the training runs " +
+                         runs + "; ewa train RUN --resume continues one");
 }
 
 /// Notes what a dataset will be made from: a mesh scene, photos or a video. The run's folder has its name.
@@ -102,6 +105,7 @@ void note_scene(TrainArguments& arguments) {
     if (is_mesh_scene(run.dataset)) {
         run.scene = run.dataset;
     } else {
+        refuse_runs(run.dataset);
         check_training_input(run.dataset);
         // The run's name is the last part of the path, which "photos/" and "." do not have.
         if (is_capture(run.dataset))
@@ -157,9 +161,12 @@ void check_before_scene(const TrainArguments& arguments) {
                 fmt::format("--max-splats {}: training starts with a splat for each point that "
                             "COLMAP finds, which are {} or more",
                             most, kLeastPoints));
-        if (const ImageSize size = smallest_image(options.scene); size.width > 0)
+        if (const ImageSize size = smallest_image(options.scene); size.width > 0) {
             train::check_downscale(options.downscale, options.downscale, size.width, size.height,
                                    "the smallest image");
+            if (options.max_width > 0 && size.width > options.max_width * options.downscale)
+                train::check_max_width(options.max_width, size.width, size.height, "the smallest image");
+        }
     }
     check_serve(arguments.output.serve);
     open_device(options.device);
@@ -259,7 +266,7 @@ Action add_train(CLI::App& app, const std::string& command_line) {
     add_run_options(app, *arguments);
     app.add_option("--quality", arguments->quality,
                    "low: 2000 steps. medium: 7000. high: 30000, the default. --steps goes before it")
-        ->transform(one_of({"low", "medium", "high"}));
+        ->transform(one_of(core::words_of(train::kQualities)));
     app.add_flag("--accuracy", arguments->accuracy,
                  "At the end, measure error against run time for the report, as ewa bench --accuracy does");
     app.add_option(

@@ -22,12 +22,11 @@ const std::map<std::string, std::string>& subjects() {
         const auto add = [&made](const char* subject, std::initializer_list<const char*> names) {
             for (const char* name : names) made[name] = subject;
         };
-        add("Data", {"cameras",   "frame",       "split",        "transform", "exposures",    "appearance-of",
-                     "crop",      "min-opacity", "max-sh",       "sort",      "splats",       "cases",
-                     "decimate",  "level",       "bake-sky",     "views",     "size",         "look-at",
-                     "up",        "orbit",       "film-seconds", "matching",  "scene-splats", "visible",
-                     "view-time", "aperture",    "focus",        "shutter",   "stereo",       "eye-distance",
-                     "geo",       "scale-to"});
+        add("Data", {"cameras",      "frame",        "split",   "transform", "exposures", "appearance-of",
+                     "max-sh",       "sort",         "splats",  "cases",     "decimate",  "level",
+                     "bake-sky",     "views",        "size",    "look-at",   "up",        "orbit",
+                     "film-seconds", "matching",     "visible", "view-time", "aperture",  "focus",
+                     "shutter",      "scene-splats", "stereo",  "geo",       "scale-to",  "eye-distance"});
         add("Quality",
             {"quality", "antialias", "integrator", "samples", "runs", "training-steps", "blur-samples"});
         add("Output", {"output",     "format",    "mode",        "json",        "svg",           "heat-map",
@@ -35,7 +34,7 @@ const std::map<std::string, std::string>& subjects() {
                        "ranks",      "quiet",     "verbose",     "results",     "compare",       "threshold",
                        "max-error",  "resume",    "force",       "allow-empty", "protocol",      "voxel",
                        "triangles",  "distance",  "transparent", "codec",       "contact-sheet", "gltf-spz",
-                       "unbundled",  "unbounded", "collision"});
+                       "unbundled",  "unbounded", "collision",   "title"});
         for (const train::RunOption& option : train::run_options())
             if (!option.subject.empty()) made[option.name] = option.subject;
         return made;
@@ -99,9 +98,10 @@ std::string usage_error(const CLI::App& app, const CLI::App& command, const CLI:
     const std::vector<std::string> commands = command_names(app);
     if (&app == &command && argc > 1 && argv[1][0] != '-') {
         const std::string text = std::string("unknown command '") + argv[1] + "'";
-        if (argv[1] == std::string_view("view") || argv[1] == std::string_view("viewer"))
-            return text + "; the window is the program ewa-view" +
-                   (argc > 2 ? ": ewa-view " + std::string(argv[2]) : "");
+        for (const char* window : {"view", "viewer", "gui", "ui", "window", "open", "show"})
+            if (argv[1] == std::string_view(window))
+                return text + "; the window is the program ewa-view" +
+                       (argc > 2 ? ": ewa-view " + std::string(argv[2]) : "");
         return text + core::did_you_mean(argv[1], commands);
     }
     if (options || dynamic_cast<const CLI::ExtrasError*>(&error))

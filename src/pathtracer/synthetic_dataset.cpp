@@ -47,21 +47,23 @@ void check(const SyntheticOptions& o) {
             throw InputError(std::string(what) + ": " + std::to_string(value) + " is not in " +
                              std::to_string(low) + " .. " + std::to_string(high));
     };
-    within("views", o.views.value_or(0), 0, kMostViews);
-    within("width", o.width, 1, 16384);
-    within("height", o.height, 1, 16384);
-    within("samples", o.samples, 1, 65536);
-    within("points", o.points, 0, 10000000);
-    if (!scene::is_native(o.lens)) throw InputError("lens: splats cannot be rendered through it");
+    within("--views", o.views.value_or(0), 0, kMostViews);
+    within("--size: the width", o.width, 1, 16384);
+    within("--size: the height", o.height, 1, 16384);
+    within("--samples", o.samples, 1, 65536);
+    within("--points", o.points, 0, 10000000);
+    if (!scene::is_native(o.lens)) throw InputError("--lens: splats cannot be rendered through it");
     if (!(o.fisheye_degrees > 0 && o.fisheye_degrees <= 360))
-        throw InputError("lens: the angle is not in 0 .. 360");
+        throw InputError("--lens: the angle is not in 0 .. 360");
     if (o.lens.lens == Lens::equirectangular && o.width != 2 * o.height)
-        throw InputError("lens: a 360 degree image is twice as wide as high");
+        throw InputError(
+            "--lens equirect: a 360 degree image is twice as wide as high, as with --size 512x256");
     if (o.rolling_shutter && !(std::abs(o.rolling_shutter->degrees) <= 90))
-        throw InputError("rolling shutter: a readout turns by at most 90 degrees");
+        throw InputError("--rolling-shutter: a readout turns by at most 90 degrees");
     if (o.rolling_shutter && !(o.rolling_shutter->percent >= 0 && o.rolling_shutter->percent <= 100))
-        throw InputError("rolling shutter: a readout moves by 0 .. 100 % of the distance");
-    if (o.exposure && !(std::abs(*o.exposure) <= 60)) throw InputError("exposure: is not in -60 .. 60 stops");
+        throw InputError("--rolling-shutter: a readout moves by 0 .. 100 % of the distance");
+    if (o.exposure && !(std::abs(*o.exposure) <= 60))
+        throw InputError("--exposure: is not in -60 .. 60 stops");
 }
 
 /// What a position in the image sees at this depth. limit: scene::lens_limit(camera).

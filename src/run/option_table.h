@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/words.h"
 #include "run/run_option.h"
 
 namespace ewa::train {
@@ -23,6 +24,9 @@ std::string value_text(const RunOption& option, const RunOptions& options);
 bool is_listed(const RunOption& option, const RunOptions& options);
 /// The options that are listed, under their names: what config.json holds.
 nlohmann::ordered_json to_config(const RunOptions& options);
+
+/// The steps that --quality stands for.
+inline const core::Words<int> kQualities{{"low", 2000}, {"medium", 7000}, {"high", 30000}};
 
 /// "none", "adc", "mcmc" or "auto".
 std::string name_of(Strategy strategy);

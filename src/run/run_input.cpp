@@ -346,8 +346,23 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
     return start;
 }
 
+namespace {
+
+constexpr int kLeastSide = 16;  // px; SSIM's window has 11
+
+}  // namespace
+
+void check_max_width(int most, int width, int height, const std::string& image) {
+    const double shape = double(height) / width;
+    const auto high = [&](int wide) { return int(std::lround(wide * shape)); };
+    if (std::min(most, high(most)) >= kLeastSide) return;
+    const int enough = int(std::ceil(kLeastSide / std::min(1.0, shape)));
+    throw InputError(fmt::format(
+        "--max-width {} leaves {}x{} pixels of {}; a side needs {} or more, as with --max-width {}", most,
+        most, std::max(1, high(most)), image, kLeastSide, enough));
+}
+
 void check_downscale(int factor, int left, int width, int height, const std::string& image) {
-    constexpr int kLeastSide = 16;  // px; SSIM's window has 11
     const int across = std::max(1, width / left), down = std::max(1, height / left);
     if (factor == 1 || std::min(across, down) >= kLeastSide) return;
     throw InputError(fmt::format(
@@ -384,6 +399,9 @@ RunInput load_run(const RunOptions& options) {
         const Frame& frame = input.dataset.frames[size_t(i)];
         check_downscale(options.downscale, frame.downscale, frame.pinhole.width, frame.pinhole.height,
                         "the image " + frame.name);
+        if (frame.reduced)
+            check_max_width(options.max_width, frame.source.width, frame.source.height,
+                            "the image " + frame.name);
     }
     if (options.skip_blurred || options.weigh_blurred) {
         const std::string remark = handle_blurred(input.dataset, input.split, options);

@@ -56,6 +56,9 @@ void check_without_dataset(const RunOptions& options);
 /// that is still to be applied to this size.
 void check_downscale(int factor, int left, int width, int height, const std::string& image);
 
+/// The same of --max-width, for an image of this shape that is wider.
+void check_max_width(int most, int width, int height, const std::string& image);
+
 /// `count` splats, spread evenly over the part of viewed_sphere(frames) that lies in at least one frustum. If
 /// that part is too small to hit, a splat lies on a random ray of a camera, at most the sphere's radius away.
 /// Colours are grey with a little noise, and scales are as in gaussians_from_points. Each splat is a pure

@@ -151,7 +151,8 @@ TEST(Dataset, IsRenderedThroughLenses) {
     const Outcome square = run_ewa({"dataset", kScenes + "tea_table.gltf", "-o", folder / "no", "--lens",
                                     "equirect", "--size", "96x96"});
     EXPECT_EQ(square.status, 2);
-    EXPECT_NE(square.err.find("a 360 degree image is twice as wide as high"), std::string::npos)
+    EXPECT_NE(square.err.find("--lens equirect: a 360 degree image is twice as wide as high"),
+              std::string::npos)
         << square.err;
     for (const char* wrong : {"fishey", "fisheye:x", "opencv", "opencv:1,2,3", "equirect:2", "fisheye:400",
                               "fisheye:1e-30", "opencv:1e300"})

@@ -440,6 +440,80 @@ TEST_F(Runs, KeepTheLimitOfTheImagesWidth) {
                 read_json(run + "/summary.json")["test_psnr"], 1e-6);
 }
 
+TEST_F(Runs, AWidthThatIsTooSmallIsRefused) {
+    const Outcome small = run_ewa({"train", folder / "data", "-o", folder / "o", "--max-width", "10"});
+    expect_failure(small, 2,
+                   "--max-width 10 leaves 10x7 pixels of the image images/0.png; a side needs 16 or more");
+    const std::string enough = small.err.substr(small.err.find("as with --max-width ") + 20);
+    expect_success(run_ewa({"train", folder / "data", "-o", folder / "o", "--steps", "1", "--quiet",
+                            "--max-width", enough.substr(0, enough.find_first_not_of("0123456789"))}));
+}
+
+/// The run's --downscale says nothing of images of other sizes.
+TEST_F(Runs, CamerasOfAnotherDatasetHaveSensibleSizes) {
+    const std::string run = train("run");  // --downscale 2: of 48x32
+    const auto width = [&](const Names& more) {
+        Names all{"render", run, "--frames", "0", "--quiet", "-o", folder / "x.png"};
+        all.insert(all.end(), more.begin(), more.end());
+        expect_success(run_ewa(all));
+        return load_image(folder / "x.png").width;
+    };
+    EXPECT_EQ(width({}), 24);
+    EXPECT_EQ(width({"--cameras", folder / "data"}), 24);
+    // Another capture: half and twice as large.
+    fs::copy(folder / "data", folder / "other", fs::copy_options::recursive);
+    const auto resize = [&](int factor, int part) {
+        auto json = read_json(folder / "data/transforms.json");
+        for (const char* key : {"w", "h", "fl_x", "fl_y", "cx", "cy"})
+            if (json.contains(key)) json[key] = json[key].get<double>() * factor / part;
+        write_file(folder / "other/transforms.json", json.dump());
+        for (const auto& file : fs::directory_iterator(folder / "other/images")) {
+            Image image = load_image(folder / "data/images" / file.path().filename());
+            save_image(file.path(), Image(image.width * factor / part, image.height * factor / part, 3));
+        }
+    };
+    resize(1, 2);
+    EXPECT_EQ(width({"--cameras", folder / "other"}), 24);
+    resize(2, 1);
+    EXPECT_EQ(width({"--cameras", folder / "other"}), 24) << "as large as the run was trained";
+    EXPECT_EQ(width({"--cameras", folder / "other", "--downscale", "1"}), 96);
+    EXPECT_EQ(width({"--cameras", folder / "other", "--max-width", "40"}), 40);
+    // Where the run's dataset is gone, the other one is taken for it.
+    fs::rename(folder / "data", folder / "moved");
+    EXPECT_EQ(width({"--cameras", folder / "moved"}), 24);
+}
+
+TEST_F(Runs, AnOrbitHasTheAppearanceOfAnImage) {
+    const std::string run = train("run", {"--appearance", "ppisp"});
+    const auto drawn = [&](const Names& more) {
+        Names all{"render", run,       "--look-at", "0,0,-4,0,0,0",  "--size",
+                  "24x16",  "--quiet", "-o",        folder / "x.png"};
+        all.insert(all.end(), more.begin(), more.end());
+        expect_success(run_ewa(all));
+        return load_image(folder / "x.png").pixels;
+    };
+    const auto of_one = drawn({"--appearance-of", "images/1.png"}), plain = drawn({"--exposures", "none"});
+    EXPECT_NE(of_one, plain);
+    EXPECT_EQ(of_one, drawn({"--appearance-of", "1"})) << "the name without its folder and extension";
+    EXPECT_NE(of_one, drawn({"--appearance-of", "3.png"}));
+    EXPECT_NE(of_one, drawn({})) << "the mean of the images";
+    // Through the cameras of another dataset, too.
+    fs::copy(folder / "data", folder / "other", fs::copy_options::recursive);
+    const auto other = [&](const Names& more) {
+        Names all{"render", run,       "--cameras", folder / "other", "--frames",
+                  "0",      "--quiet", "-o",        folder / "y.png"};
+        all.insert(all.end(), more.begin(), more.end());
+        expect_success(run_ewa(all));
+        return load_image(folder / "y.png").pixels;
+    };
+    EXPECT_NE(other({"--appearance-of", "1.png"}), other({}));
+    expect_failure(run_ewa({"render", folder / "s.ply", "--appearance-of", "1.png", "-o", folder / "z.png"}),
+                   2, "--exposures FILE names one");
+    expect_failure(
+        run_ewa({"render", run, "--frames", "0", "--size", "20x30", "-o", folder / "z.png"}), 2,
+        "--frames is of the images of the run, and --size of other views: leave one out; --max-width");
+}
+
 TEST_F(Runs, InfoConvertGradAndCompareTakeThem) {
     const std::string run = train("run");
     const Outcome info = run_ewa({"info", run});
@@ -475,6 +549,15 @@ TEST_F(Runs, WhatIsMissingIsNamed) {
     expect_failure(run_ewa({"eval", folder / "data"}), 2, "a folder without splats");
     expect_failure(run_ewa({"eval", folder / "s.ply"}), 2, "DATASET is required");
     expect_failure(run_ewa({"info", folder / "empty"}), 2, "config.json");
+    fs::create_directories(folder / "out");
+    fs::rename(train("one"), folder / "out/one");
+    for (const char* other : {"two", "three", "four"})
+        fs::copy(folder / "out/one", folder / "out" / fs::path(other));
+    const std::string runs =
+        (folder / "out/four") + ", " + (folder / "out/one") + ", " + (folder / "out/three");
+    expect_failure(run_ewa({"train", folder / "out", "-o", folder / "t"}), 2,
+                   "has the training runs " + runs + " and 1 more; ewa train RUN --resume continues one");
+    expect_failure(run_ewa({"render", folder / "out", "-o", folder / "x.png"}), 2, "such as " + runs);
 
     fs::create_directories(folder / "begun");
     write_file(folder / "begun/config.json", R"({"dataset": "gone"})");

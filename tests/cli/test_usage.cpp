@@ -141,6 +141,8 @@ INSTANTIATE_TEST_SUITE_P(
                  "unexpected argument: pic.png; -o pic.png names the output"},
         WrongUse{{"view", "/a.ply"},
                  "unknown command 'view'; the window is the program ewa-view: ewa-view /a.ply"},
+        WrongUse{{"gui", "/a.ply"}, "the window is the program ewa-view: ewa-view /a.ply"},
+        WrongUse{{"ui"}, "unknown command 'ui'; the window is the program ewa-view (see"},
         WrongUse{{"help", "nothere"}, "unknown command 'nothere'"}, WrongUse{{"help", "train", "x"}, "help"},
         WrongUse{{"render", "/a.ply", "-o", "o.png", "--size", "16384x16384"},
                  "of at most 16384 a side and 134 million pixels"}));
