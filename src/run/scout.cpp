@@ -188,6 +188,13 @@ std::string leave_out_passers_by(const std::shared_ptr<gpu::Device>& device, Run
     Ranks& ranks = *input.options.ranks;
     const auto found = uint64_t(known.has_value());
     const bool scouts = ranks.gather(std::span(&found, 1)).front() == 0;
+    // A run of fewer steps shows what single images have even more faintly than the scout.
+    const int enough = scout_options(input).steps / 2, steps = input.options.train.steps;
+    if (scouts && steps < enough)
+        return fmt::format(
+            "robust: nothing is masked, since {} show too little of what single images have; "
+            "{} or more search for it",
+            core::counted(uint64_t(steps), "step"), enough);
     const Masks own = scouts ? scouted_masks(device, input, observer) : known.value_or(Masks());
     const Masks masks = unpacked(portions::from_rank_0(ranks, packed(own)));
     if (masks.empty()) return {};

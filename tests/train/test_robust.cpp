@@ -207,10 +207,28 @@ TEST(Robust, LeavesAlmostNothingOutWhereImagesAgree) {
     EXPECT_EQ(file_bytes(folder / "robust/splats.ply"), file_bytes(folder / "plain/splats.ply"));
 }
 
+constexpr int kFewestSteps = 150;  // with a scout, which takes 300 here
+
+TEST(Robust, AShortRunHasNoScout) {
+    TempFolder folder;
+    RunOptions plain = visited().run(folder / "plain", false),
+               robust = visited().run(folder / "robust", true);
+    plain.train.steps = robust.train.steps = kFewestSteps - 1;
+    run_training(plain);
+    Notes notes;
+    run_training(robust, notes);
+    EXPECT_EQ(
+        std::ranges::count(notes.lines,
+                           "robust: nothing is masked, since 149 steps show too little of what single images "
+                           "have; 150 or more search for it"),
+        1);
+    EXPECT_EQ(file_bytes(folder / "robust/splats.ply"), file_bytes(folder / "plain/splats.ply"));
+}
+
 TEST(Robust, ContinuesWithTheMasksOfItsFolder) {
     TempFolder folder;
     RunOptions whole = visited().run(folder / "whole", true), cut = visited().run(folder / "cut", true);
-    whole.train.steps = cut.train.steps = 40;
+    whole.train.steps = cut.train.steps = kFewestSteps;
     run_training(whole);
     cut.resume = true;
     Notes early;  // stops while the masks are looked for
@@ -248,7 +266,7 @@ TEST(Robust, RanksHaveTheSameMasks) {
     const auto train = [&](const char* name, int ranks, int last_step) {
         run_ranks(ranks, [&](std::shared_ptr<Ranks> group) {
             RunOptions options = visited().run(folder / name, true);
-            options.train.steps = 40;
+            options.train.steps = kFewestSteps;
             options.train.batch = 2;
             options.train.bands = 2;
             options.resume = true;
@@ -272,7 +290,7 @@ TEST(Robust, ALimitOfTheDevicesMemoryHoldsForBothTrainings) {
     TempFolder folder;
     RunOptions usual = visited().run(folder / "usual", true),
                limited = visited().run(folder / "limited", true);
-    usual.train.steps = limited.train.steps = 20;
+    usual.train.steps = limited.train.steps = kFewestSteps;
     limited.train.device_memory_bytes = uint64_t(1) << 30;
     run_training(usual);
     run_training(limited);
