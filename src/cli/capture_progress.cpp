@@ -26,8 +26,6 @@ constexpr int kMostByLook = 1000;                // photos, with Matching::autom
 // Costs on the machine of docs/performance.md, used until this machine has measured its own.
 constexpr double kSearchPerPixel = 0.8e-6;  // s
 constexpr double kPointsPerPixel = 0.1;     // first splats, of the pixels of one photo
-constexpr double kSplatsPerPixel = 0.6;     // at most, times the square root of the photos
-constexpr double kOnGpu = 0.02;             // of the time on a CPU
 
 }  // namespace
 
@@ -71,19 +69,16 @@ void CaptureProgressLine::update(const CaptureProgress& now) {
 }
 
 CaptureProgressLine::After training_after(const RunOptions& options) {
-    TrainOptions train = options.train;
-    if (train.strategy == Strategy::automatic) train.strategy = strategy_for(train.steps);
-    const double speed = device_info(*open_device(options.device)).type == "cpu" ? 1 : kOnGpu;
-    return [train, speed, shrink = double(options.downscale) * options.downscale](int photos, double search) {
+    const bool on_cpu = device_info(*open_device(options.device)).type == "cpu";
+    return [train = options.train, on_cpu, shrink = double(options.downscale) * options.downscale](
+               int photos, double search) {
         const double pixels = search / kSearchPerPixel / shrink;
-        const double most = kSplatsPerPixel * pixels * std::sqrt(double(photos));
-        const auto limit = double(std::min<uint32_t>(train.max_splats, 1000000000));
-        const train::ForecastScene scene{.pixels = pixels,
-                                         .photos = size_t(photos),
-                                         .splats = uint32_t(std::min(kPointsPerPixel * pixels, limit)),
-                                         .evaluated = size_t(std::min(photos, 40)),
-                                         .max_splats = uint32_t(std::min(most, limit))};
-        return speed * train::Forecast(scene, train).on_reference();
+        const double splats = std::min(kPointsPerPixel * pixels, 1e9);
+        return train::usual_seconds({.pixels = pixels,
+                                     .photos = size_t(photos),
+                                     .splats = uint32_t(splats),
+                                     .evaluated = size_t(std::min(photos, 40))},
+                                    train, on_cpu);
     };
 }
 

@@ -19,8 +19,10 @@ constexpr double kEvaluation = 0.75;   // of a step, for each evaluated view
 constexpr int kUntimed = 3;            // first steps, in which kernels are compiled
 constexpr int kEnoughSteps = 30, kFewSteps = 5;
 constexpr double kEnoughSeconds = 0.5;
-constexpr double kForgotten = 0.99;  // factor of what is known, for each step
-constexpr size_t kRefinements = 4;   // the last ones, whose mean the next ones add
+constexpr double kForgotten = 0.99;      // factor of what is known, for each step
+constexpr double kSplatsPerPixel = 0.6;  // at most, times the square root of the photos
+constexpr double kOnGpu = 0.02;          // of the time on a CPU
+constexpr size_t kRefinements = 4;       // the last ones, whose mean the next ones add
 
 }  // namespace
 
@@ -113,6 +115,14 @@ double Forecast::of_steps(int steps) const {
 
 double Forecast::on_reference() const {
     return cost_from(options_, 0, scene_.splats, scene_.max_splats);
+}
+
+double usual_seconds(ForecastScene scene, TrainOptions options, bool on_cpu) {
+    if (options.strategy == Strategy::automatic) options.strategy = strategy_for(options.steps);
+    const double most = kSplatsPerPixel * scene.pixels * std::sqrt(double(scene.photos));
+    scene.max_splats = uint32_t(std::min({most, double(options.max_splats), 1e9}));
+    scene.splats = std::min(scene.splats, scene.max_splats);
+    return (on_cpu ? 1 : kOnGpu) * Forecast(scene, options).on_reference();
 }
 
 }  // namespace ewa::train

@@ -166,11 +166,13 @@ void App::panel() {
     const PanelFacts facts{
         .scene = state_.scene,
         .device = state_.device_name,
+        .on_cpu = state_.on_cpu,
         .picture = shown_.renders.shown().get(),
         .views = navigation_.views,
         .run = session_.live_run.update(),
+        .run_folder = session_.live_run.folder(),
         .drawing = !shown_.renders.settled(),
-        .note = state_.message.note,
+        .note = state_.message.noting(Clock::now()) ? std::string() : state_.message.note,
         .image_failure = shown_.image_failure(),
         .psnr = shown_.psnr(),
         .times = state_.loop.times,
@@ -205,8 +207,8 @@ void App::draw_overlays() {
     if (shown_.comparing()) draw_comparison(settings.comparison, places, settings.wipe);
     const Rectangle area = state_.picture_area();
     const std::optional<Headline> words = session_.headline();
-    if (words) draw_headline(*words, area);
-    if (session_.empty())
+    if (words && !state_.help) draw_headline(*words, area);
+    if (session_.empty() && !state_.help)
         if (const auto wanted = draw_open_buttons(area)) session_.dialog.ask(*wanted);
     if (session_.search.running() && draw_search(session_.search.progress(), area)) session_.search.cancel();
     if (const std::string text = session_.banner(); !text.empty()) draw_banner(text, area);

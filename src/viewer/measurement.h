@@ -24,8 +24,8 @@ struct Measurement {
     /// With the numbers that --scale-to of `ewa convert` takes. complete().
     std::string text() const {
         const glm::dvec3 &a = points[0], &b = points[1];
-        return fmt::format("distance {:.6g} of the points {:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g}",
-                           distance(), a.x, a.y, a.z, b.x, b.y, b.z);
+        return fmt::format("distance {}; points {:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g}", label(), a.x, a.y,
+                           a.z, b.x, b.y, b.z);
     }
 };
 

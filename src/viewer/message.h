@@ -8,7 +8,7 @@ namespace ewa::viewer {
 
 struct Message {
     using Clock = std::chrono::steady_clock;
-    std::string note;  // the last one; the panel keeps showing it
+    std::string note;  // the last one; the panel shows it after the picture
     Clock::time_point note_until{}, hint_until{};
 
     void say(const std::string& text) {

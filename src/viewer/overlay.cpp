@@ -143,6 +143,7 @@ void draw_help(bool& open) {
     const float line = ImGui::GetTextLineHeight();
     ImGui::SetNextWindowPos(ImVec2(size.x / 2, size.y / 2), ImGuiCond_Always, ImVec2(0.5f, 0.5f));
     ImGui::SetNextWindowSizeConstraints(ImVec2(0, 0), size);  // a longer list scrolls
+    ImGui::SetNextWindowBgAlpha(1);                           // other text lies behind it
     ImGui::PushStyleVar(ImGuiStyleVar_CellPadding, ImVec2(line / 2, 1));
     if (ImGui::Begin("Keys", &open, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse) &&
         ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit)) {

@@ -2,6 +2,7 @@
 // The panel at the left of the window. Each of its rows keeps its place: a row that has nothing to say is empty. The
 // functions change only their arguments.
 #pragma once
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,13 +20,15 @@ namespace ewa::viewer {
 struct PanelFacts {
     const OpenedScene& scene;
     const std::string& device;
+    std::optional<bool> on_cpu;    // whether the device is one; empty: not known
     const RenderedFrame* picture;  // null: none yet
     const std::vector<io::NamedView>& views;
-    const live::Update* run;     // null: no training run
-    bool drawing;                // a better frame follows
-    const std::string& note;     // the last message
-    std::string image_failure;   // why there is no image
-    std::optional<double> psnr;  // of this view against the image
+    const live::Update* run;           // null: no training run
+    std::filesystem::path run_folder;  // of that run; may be empty
+    bool drawing;                      // a better frame follows
+    std::string note;                  // the last message, once it is not over the picture
+    std::string image_failure;         // why there is no image
+    std::optional<double> psnr;        // of this view against the image
     const SessionTimes& times;
     std::optional<float> film;  // share of the film that is written; empty: no film
     glm::dvec3 up;
@@ -45,7 +48,8 @@ struct PanelSettings {
     bool measure = false;    // clicks choose points, whose distance is shown
     float film_seconds = 2;  // from one view to the next
     float text_scale = 1;    // times the size that the monitor asks for
-    int train_steps = 0;     // of a training that the window starts
+    int train_steps =
+        0;  // of a training that the window starts: a row of train::kQualities, or another number
 };
 
 /// What the user asked for in the panel.

@@ -8,7 +8,11 @@
 #include <numeric>
 
 #include "core/text.h"
+#include "core/typing.h"
+#include "run/forecast.h"
+#include "run/option_table.h"
 #include "viewer/panel.h"
+#include "viewer/training.h"
 
 namespace ewa::viewer {
 namespace {
@@ -90,9 +94,59 @@ void show_curves(const live::Status& status) {
     plot("held-out PSNR", psnr, "held-out PSNR %.2f dB");
 }
 
+/// What the window offers, in the order of train::kQualities.
+constexpr std::array kQualityNames{"quick look", "good", "best"};
+
+std::string rough_text(double seconds) {
+    constexpr double kMinute = 60, kHour = 3600;
+    if (seconds < 1.5 * kMinute) return "a minute";
+    if (seconds < 1.5 * kHour) return std::to_string(std::lround(seconds / kMinute)) + " min";
+    return std::to_string(std::lround(seconds / kHour)) + " h";
+}
+
+/// The name with the time that such a training usually takes, if the device is known.
+std::string quality_text(const PanelFacts& facts, const char* name, int steps) {
+    const Dataset& dataset = *facts.scene.dataset;
+    if (!facts.on_cpu || dataset.frames.empty()) return name;
+    const Camera& camera = dataset.frames.front().camera;
+    const size_t photos = dataset.frames.size();
+    TrainOptions options;
+    options.steps = steps;
+    const double seconds = train::usual_seconds({.pixels = double(camera.width) * camera.height,
+                                                 .photos = photos,
+                                                 .splats = uint32_t(facts.scene.gaussians->size()),
+                                                 .evaluated = photos / 8},
+                                                options, *facts.on_cpu);
+    return std::string(name) + ", about " + rough_text(seconds);
+}
+
+void choose_training(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
+    std::vector<std::string> texts;
+    std::string present = core::counted(uint64_t(settings.train_steps), "step");
+    for (size_t i = 0; i < kQualityNames.size(); ++i) {
+        const int steps = train::kQualities[i].second;
+        texts.push_back(quality_text(facts, kQualityNames[i], steps));
+        if (steps == settings.train_steps) present = texts.back();
+    }
+    ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x);
+    if (ImGui::BeginCombo("##quality", present.c_str())) {
+        for (size_t i = 0; i < texts.size(); ++i)
+            if (ImGui::Selectable(texts[i].c_str(), texts[i] == present))
+                settings.train_steps = train::kQualities[i].second;
+        ImGui::EndCombo();
+    }
+    actions.train = ImGui::Button("Train splats");
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(ImGui::GetTextLineHeight() * 5);
+    if (ImGui::InputInt("steps", &settings.train_steps, 0))
+        settings.train_steps = std::clamp(settings.train_steps, 1, kMostSteps);
+}
+
 std::string remark_of(const PanelFacts& facts) {
     const live::Update& run = *facts.run;
     if (!run.problem.empty()) return run.problem;
+    if (run.status.state == live::State::done && run.status.step == run.status.steps)
+        return how_to_share(facts.run_folder);
     if (run.status.state == live::State::done) return "";
     if (run.connected) return run.status.commands ? "" : "watching; --token lets you pause and save";
     if (facts.scene.points) return "no splats are saved yet; --serve or --save-every lets the picture move";
@@ -110,12 +164,7 @@ void draw_text_box(const char* name, const std::string& text, int lines) {
 }
 
 void draw_training(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
-    if (!facts.run) {
-        if (ImGui::InputInt("steps", &settings.train_steps, 0))
-            settings.train_steps = std::clamp(settings.train_steps, 1, kMostSteps);
-        actions.train = ImGui::Button("Train splats");
-        return;
-    }
+    if (!facts.run) return choose_training(facts, settings, actions);
     const live::Update& run = *facts.run;
     show_progress(run);
     show_step(facts);

@@ -140,7 +140,7 @@ void RenderThread::prepare(const Work& work) {
         renderer_.reset();
         coarse_renderer_.reset();
         device_ = open_();
-        report([&](News& news) { news.device = device_info(*device_).name; });
+        report([&](News& news) { news.device = device_info(*device_); });
     }
     if (scene_ && !scene_is_up_) upload(scene_->density);
 }

@@ -93,7 +93,7 @@ class RenderThread {
     struct News {
         std::shared_ptr<const RenderedFrame> picture;  // the last complete frame, or null
         std::exception_ptr failure;                    // why the last request failed, if it did
-        std::optional<std::string> device;             // its name, once it is open
+        std::optional<DeviceInfo> device;              // once it is open
         std::vector<SurfacePoint> points;              // in order, since the last take_news()
         std::shared_ptr<const FullRender> full;        // the last one, or null
         std::vector<std::filesystem::path> written;    // files, since the last take_news()

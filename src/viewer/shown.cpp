@@ -36,7 +36,10 @@ void Shown::enter_scene() {
 
 void Shown::take_renders() {
     const Renders::News news = renders.take();
-    if (news.device) state_.device_name = *news.device;
+    if (news.device) {
+        state_.device_name = news.device->name;
+        state_.on_cpu = news.device->type == "cpu";
+    }
     if (news.failure) {
         if (state_.scripted() || !renders.shown()) std::rethrow_exception(news.failure);
         navigation_.film.reset();

@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "core/process.h"
+#include "core/text.h"
 #include "ewa/error.h"
 
 extern char** environ;
@@ -59,9 +60,18 @@ std::optional<int> TrainProcess::status() {
     return status_;
 }
 
+std::string how_to_share(const fs::path& folder) {
+    if (folder.empty()) return "";
+    const std::string name = core::one_line(folder.lexically_normal().string());
+    const bool quoted = name.find_first_of(" '\"$&()") != std::string::npos;
+    return "to share it: ewa convert " + (quoted ? '"' + name + '"' : name) +
+           " scene.html makes a page for any browser";
+}
+
 void LiveRun::watch(const live::WhatToWatch& what, TrainProcess* trainer) {
     watcher_.reset();  // the old watcher stops before the update is replaced
     trainer_ = trainer;
+    folder_ = what.folder;
     update_ = {};
     watcher_ = std::make_unique<live::Watcher>(what, wake_);
 }

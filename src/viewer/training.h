@@ -35,6 +35,9 @@ class TrainProcess {
     std::optional<int> status_;
 };
 
+/// The command that makes a page of the run in this folder; empty without a folder.
+std::string how_to_share(const std::filesystem::path& folder);
+
 /// The training run that the window watches, if any.
 class LiveRun {
   public:
@@ -56,12 +59,14 @@ class LiveRun {
         std::shared_ptr<const Gaussians> splats;  // new ones, at least one; or null
     };
     News take();
+    const std::filesystem::path& folder() const { return folder_; }  // may be empty
     void command(const std::string& command);
     /// The exit status of a trainer that failed before the run was done.
     std::optional<int> failure() const;
 
   private:
     TrainProcess* trainer_ = nullptr;
+    std::filesystem::path folder_;
     std::function<void()> wake_;
     live::Update update_;
     std::unique_ptr<live::Watcher> watcher_;

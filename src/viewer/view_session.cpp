@@ -133,7 +133,14 @@ void ViewSession::take_live() {
                    "; see the terminal for the reason");
     // A screenshot waits for its full frame, which new splats would start again.
     if (state_.loop.capture && navigation_.framed) return;
+    const auto done = [&] {
+        const live::Update* run = live_run.update();
+        return run && run->status.state == live::State::done && run->status.step == run->status.steps;
+    };
+    const bool before = done();
     const LiveRun::News news = live_run.take();
+    if (live_run.own() && !before && done())
+        state_.say("the training is done; " + how_to_share(live_run.folder()));
     if (news.any) state_.redraw();
     const live::Update* run = live_run.update();
     if (run && !run->problem.empty() && run->status.steps == 0 && !live_failed_) {

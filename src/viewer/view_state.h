@@ -97,6 +97,7 @@ struct ViewState {
     OpenedScene scene;
     PanelSettings settings;
     std::string device_name;
+    std::optional<bool> on_cpu;  // whether the device is one; empty: it is not open
     Message message;
     Loop loop;
     bool panel_beside = true;  // in a window with room for the panel

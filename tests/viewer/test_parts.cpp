@@ -279,7 +279,7 @@ TEST(Measurement, IsOfTheLastTwoPoints) {
     measurement.add({1, 5, 7});
     EXPECT_EQ(measurement.distance(), 5);
     EXPECT_EQ(measurement.label(), "5");
-    EXPECT_EQ(measurement.text(), "distance 5 of the points 1,2,3,1,5,7");
+    EXPECT_EQ(measurement.text(), "distance 5; points 1,2,3,1,5,7");
     measurement.add({0, 0, 0});
     EXPECT_FALSE(measurement.complete());
     EXPECT_EQ(measurement.points.size(), 1u);
