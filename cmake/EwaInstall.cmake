@@ -91,6 +91,7 @@ install(FILES shaders/shared/constants.h DESTINATION ${CMAKE_INSTALL_DOCDIR}/sha
 
 if(TARGET ewa-view)
     install(FILES desktop/ewa-view.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications)
+    install(FILES desktop/ewa-view.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/mime/packages) # so that a double click opens a file
     install(FILES desktop/ewa-view.svg DESTINATION ${CMAKE_INSTALL_DATADIR}/icons/hicolor/scalable/apps)
 endif()
 
