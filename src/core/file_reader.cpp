@@ -15,7 +15,8 @@ namespace ewa::core {
 
 namespace {
 constexpr size_t kBufferBytes = size_t(1) << 20;
-}
+constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";  // of Windows' editors, before text in UTF-8
+}  // namespace
 
 FileReader::FileReader(const std::filesystem::path& path) : name_(one_line(path.string())) {
     struct stat status {};
@@ -105,6 +106,11 @@ std::string FileReader::read_zero_terminated(size_t limit, std::string_view what
 
 bool FileReader::read_line(std::string& line, size_t limit) {
     line.clear();
+    if (offset_ == 0 && remaining() >= kByteOrderMark.size()) {
+        fill(kByteOrderMark.size());
+        if (std::memcmp(buffer_.data() + begin_, kByteOrderMark.data(), kByteOrderMark.size()) == 0)
+            take(kByteOrderMark.size(), "the mark");
+    }
     if (remaining() == 0) return false;
     while (remaining() > 0) {
         fill(1);
@@ -132,7 +138,8 @@ void FileReader::require_room(uint64_t count, uint64_t bytes_each, std::string_v
 std::string read_text_file(const std::filesystem::path& path) {
     FileReader reader(path);
     const size_t size = static_cast<size_t>(reader.size());
-    return std::string(reinterpret_cast<const char*>(reader.take(size, "the text")), size);
+    const std::string_view text(reinterpret_cast<const char*>(reader.take(size, "the text")), size);
+    return std::string(text.substr(text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0));
 }
 
 }  // namespace ewa::core

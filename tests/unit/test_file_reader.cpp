@@ -91,4 +91,18 @@ TEST(Text, ParsesNumbers) {
         EXPECT_FALSE(core::parse_integer<uint8_t>(wrong)) << wrong;
 }
 
+TEST(FileReader, SkipsAByteOrderMark) {
+    const TempFolder folder;
+    const std::string mark = "\xef\xbb\xbf";
+    const auto path = folder.write("a.txt", mark + "one\n" + mark + "two\n");
+    core::FileReader reader(path);
+    std::string line;
+    EXPECT_TRUE(reader.read_line(line, 10));
+    EXPECT_EQ(line, "one");
+    EXPECT_TRUE(reader.read_line(line, 10));
+    EXPECT_EQ(line, mark + "two");
+    EXPECT_EQ(core::read_text_file(path), "one\n" + mark + "two\n");
+    EXPECT_EQ(core::read_text_file(folder.write("short", "\xef\xbb")), "\xef\xbb");
+}
+
 }  // namespace

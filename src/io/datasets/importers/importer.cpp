@@ -99,7 +99,9 @@ bool begins_as_open_mvg(std::string_view head) {
 std::string head_of(const fs::path& file) try {
     core::FileReader reader(file);
     const size_t size = size_t(std::min<uint64_t>(reader.size(), kHeadBytes));
-    return {reinterpret_cast<const char*>(reader.take(size, "the beginning")), size};
+    const std::string_view head(reinterpret_cast<const char*>(reader.take(size, "the beginning")), size);
+    constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";  // of Windows' editors
+    return std::string(head.substr(head.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0));
 } catch (const InputError&) {
     return {};
 }
