@@ -9,23 +9,13 @@
 #include "ewa/error.h"
 #include "scene/camera.h"
 #include "scene/lens.h"
+#include "scene/mask.h"
 
 namespace ewa {
 
 namespace {
 
-/// One value that is not finite would make the loss and every gradient of its view not finite.
-void check_finite(const Image& image, const std::filesystem::path& path) {
-    const auto bad = std::find_if(image.pixels.begin(), image.pixels.end(),
-                                  [](float value) { return !std::isfinite(value); });
-    if (bad == image.pixels.end()) return;
-    const auto pixel = (bad - image.pixels.begin()) / image.channels;
-    throw InputError(core::one_line(path.string()) + ": the pixel at column " +
-                     std::to_string(pixel % image.width) + ", row " + std::to_string(pixel / image.width) +
-                     " holds a value that is not finite; replace it by a number, or remove the image");
-}
-
-/// The image with its alpha multiplied by the mask's red (grey) channel. The mask is sampled at the image's
+/// The image with its alpha multiplied by the mask. The mask is sampled at the image's
 /// size.
 Image with_mask(const Image& image, const Image& mask) {
     Image result(image.width, image.height, 4);
@@ -49,12 +39,10 @@ Image channels_of(const Image& image, int first, int count) {
 }
 
 Image load_file(const Frame& frame) {
-    Image image = load_image(frame.image_path);
-    check_finite(image, frame.image_path);
+    Image image = scene::load_finite_image(frame.image_path);
     if (frame.masks == MaskUse::none) return image.channels == 3 ? image : channels_of(image, 0, 3);
     if (frame.mask_path.empty()) return image;
-    const Image mask = load_image(frame.mask_path);
-    check_finite(mask, frame.mask_path);
+    const Image mask = scene::load_mask(frame.mask_path);
     if (!same_aspect(image.width, image.height, mask.width, mask.height))
         throw InputError(core::one_line(frame.mask_path.string()) + ": the mask is " +
                          std::to_string(mask.width) + " x " + std::to_string(mask.height) +
