@@ -197,6 +197,7 @@ void add_remarks(RunInput& input, const StartSource& source) {
     if (input.options.init == "sfm" && dataset.points.positions.empty())
         input.remarks.push_back("the dataset has no points: training starts from " +
                                 start_without_points(source));
+    if (!source.skipped.empty()) input.remarks.push_back(source.skipped);
     if (input.options.init == "stereo")
         input.notes.push_back("training starts from " + start_without_points(source));
     if (const size_t points = dataset.points.positions.size();
@@ -292,11 +293,6 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
     const std::filesystem::path file = options.init_folder / options.init;
     Gaussians start;
     if (options.init == "sfm") {
-        if (dataset.dropped_points > 0)
-            throw InputError(
-                fmt::format("{}: a coordinate is not finite ({} such points in all); remove them, or start "
-                            "from --init random",
-                            dataset.first_dropped_point, dataset.dropped_points));
         PointCloud measured;
         if (dataset.points.positions.empty())
             measured = points_of_depth_maps(dataset, frames, first_splats(options), options.train.seed);
@@ -325,9 +321,9 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
     } else if (from == StartsFrom::file && io::is_point_cloud(file)) {
         const io::PlyPoints cloud = io::read_points_ply(file);
         if (cloud.dropped.count > 0)
-            throw InputError(
-                fmt::format("{}: a coordinate is not finite ({} such points in all); remove them",
-                            cloud.dropped.first, cloud.dropped.count));
+            found.skipped = fmt::format("{} of {} skipped, since a coordinate is not finite: {}",
+                                        core::counted(uint64_t(cloud.dropped.count), "point"), options.init,
+                                        cloud.dropped.first);
         start = splats_of(cloud.points, options, dataset, frames);
     } else if (from == StartsFrom::file) {
         refuse_dense_start(options, options.init);

@@ -40,10 +40,11 @@ enum class StartsFrom { points, depth_maps, stereo, random, file };
 struct StartSource {
     StartsFrom from = StartsFrom::file;
     size_t points = 0, images = 0;  // of stereo
+    std::string skipped;            // what of a file is skipped, and why; empty: nothing is
 };
 
 /// The first splats that the options ask for. frames: indices of the training frames. options: with a concrete
-/// SH degree. source: tells where they come from. Throws InputError (a point that is not finite, a splat file or an image that
+/// SH degree. source: tells where they come from. Throws InputError (a splat file or an image that
 /// cannot be read, too many splats, --init stereo of images that agree on no depths).
 Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames,
                          StartSource* source = nullptr);

@@ -44,6 +44,23 @@ TEST(Inputs, DatasetsThatAreNone) {
     EXPECT_FALSE(fs::exists(folder / "out"));
 }
 
+/// Of COLMAP's points as text, one has a coordinate that is no number.
+TEST(Inputs, PointsThatAreNotFiniteAreSkipped) {
+    const Folder folder;
+    const std::string model = folder / "data/sparse/0/";
+    fs::create_directories(model);
+    fs::create_directories(folder / "data/images");
+    write_file(model + "cameras.txt", "1 PINHOLE 48 32 50 50 24 16\n");
+    write_file(model + "images.txt", "1 1 0 0 0 0 0 4 1 a.png\n\n2 1 0 0 0 1 0 4 1 b.png\n\n");
+    write_file(model + "points3D.txt", "1 0 0 0 9 9 9 0\n2 nan 0 0 9 9 9 0\n3 1 0 0 9 9 9 0\n");
+    for (const char* name : {"a.png", "b.png"})
+        ewa::save_image(folder / ("data/images/" + std::string(name)), ewa::Image(48, 32, 3));
+    const Outcome trained =
+        run_ewa({"train", folder / "data", "-o", folder / "out", "--steps", "1", "--dense-start", "off"});
+    expect_success(trained);
+    EXPECT_NE(trained.out.find("2 splats to start from"), std::string::npos) << trained.out;
+}
+
 /// What a name may do to the terminal that it is printed on.
 TEST(Inputs, NamesAreShownWithoutTheirControls) {
     const Folder folder;
