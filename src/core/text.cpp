@@ -9,12 +9,25 @@
 #include <memory>
 #include <utility>
 
+#include "core/composed.h"
+
 namespace ewa::core {
 
 namespace {
 constexpr std::string_view kBlanks = " \t\r\n\v\f";
 
-/// The first character in UTF-8 and its number of bytes, which is 0 if the bytes are not UTF-8.
+/// The number of bytes to display unchanged: of a character that neither controls a terminal, nor ends a
+/// line, nor changes the direction of text.
+size_t shown_bytes(std::string_view text) {
+    const auto [c, bytes] = first_character(text);
+    const auto in = [c = c](uint32_t low, uint32_t high) { return c >= low && c <= high; };
+    const bool control =
+        c < 0x20 || in(0x7f, 0x9f) || in(0x200e, 0x200f) || in(0x2028, 0x202e) || in(0x2066, 0x2069);
+    return control ? 0 : bytes;
+}
+
+}  // namespace
+
 std::pair<uint32_t, size_t> first_character(std::string_view text) {
     const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
     if (byte(0) < 0x80) return {byte(0), 1};
@@ -28,18 +41,6 @@ std::pair<uint32_t, size_t> first_character(std::string_view text) {
     constexpr uint32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};  // with that many bytes
     return {character, character >= kLeast[bytes] && character <= 0x10ffff ? bytes : 0};
 }
-
-/// The number of bytes to display unchanged: of a character that neither controls a terminal, nor ends a
-/// line, nor changes the direction of text.
-size_t shown_bytes(std::string_view text) {
-    const auto [c, bytes] = first_character(text);
-    const auto in = [c = c](uint32_t low, uint32_t high) { return c >= low && c <= high; };
-    const bool control =
-        c < 0x20 || in(0x7f, 0x9f) || in(0x200e, 0x200f) || in(0x2028, 0x202e) || in(0x2066, 0x2069);
-    return control ? 0 : bytes;
-}
-
-}  // namespace
 
 std::string one_line(std::string_view text) {
     constexpr char kDigits[] = "0123456789abcdef";

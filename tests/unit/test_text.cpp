@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "core/composed.h"
 #include "core/terminal.h"
 #include "core/text.h"
 
@@ -53,6 +54,22 @@ TEST(Text, HelpBreaksBetweenWords) {
               "  -o, --out  " + repeated(5) + "\n" + std::string(13, ' ') + twelve + "\n");
     EXPECT_EQ(help_text(std::string(13, ' ') + repeated(6), 13),
               std::string(13, ' ') + repeated(5) + "\n" + std::string(13, ' ') + twelve + "\n");
+}
+
+TEST(Text, LettersWithMarksAsOneCharacter) {
+    const std::pair<const char*, const char*> cases[] = {
+        {"cafe\xcc\x81", "caf\xc3\xa9"},                           // acute
+        {"e\xcc\x82\xcc\x81", "\xe1\xba\xbf"},                     // circumflex and acute
+        {"\xe3\x81\x8b\xe3\x82\x99", "\xe3\x81\x8c"},              // Hiragana ka with a voiced mark
+        {"\xe1\x84\x92\xe1\x85\xa1\xe1\x86\xab", "\xed\x95\x9c"},  // Hangul han
+        {"\xd0\xb8\xcc\x86", "\xd0\xb9"},                          // Cyrillic short i
+        {"plain", "plain"},
+        {"x\xcc\x81", "x\xcc\x81"},
+        {"e\xcc", "e\xcc"}};
+    for (const auto& [apart, whole] : cases) {
+        EXPECT_EQ(ewa::core::composed(apart), whole);
+        EXPECT_EQ(ewa::core::composed(whole), whole);
+    }
 }
 
 }  // namespace
