@@ -16,8 +16,8 @@
 namespace ewa {
 
 /// The use of masks. A mask is white where the image counts. There are three sources of masks:
-/// - A file in masks/ (beside images/) with the image's name. Its extension may be replaced by .png or followed
-///   by .png.
+/// - A file in masks/ (beside images/) with the image's name. Its extension may be another or followed by .png, and the name may have
+///   _mask. A mask that is alone in masks/, under another name, is for all images.
 /// - A frame's mask_path in transforms.json.
 /// - The image's own alpha.
 enum class MaskUse {
@@ -78,6 +78,15 @@ struct PointCloud {
     std::vector<std::array<uint8_t, 3>> colors;  // sRGB
 };
 
+/// How many things of a kind a dataset has, and how many of them are used.
+struct UsedOf {
+    std::string what;  // "photo", "mask", "depth map", "point" or "model"
+    std::string where =
+        {};  // the folder of the photos, relative to the dataset's, if it is not images; empty: it is
+    uint64_t used = 0, found = 0;
+    std::string why = {};  // the first that is not used, and why; empty: all are
+};
+
 struct Dataset {
     std::filesystem::path root;
     std::vector<std::filesystem::path> files;  // of cameras and points; the frames name images and masks
@@ -91,7 +100,11 @@ struct Dataset {
     bool color_depends_on_view = true;
     std::string format, program;     // of the cameras; the program may be unknown, and empty
     std::vector<std::string> notes;  // what of the cameras' file is skipped
+    std::vector<UsedOf> used;        // what was found, and is used; only what is there
 };
+
+/// One line on Dataset::used: "8 of 8 photos, 0 of 8 masks (masks/0.png matches no photo), 200 points".
+std::string used_text(const Dataset& dataset);
 
 struct DatasetOptions {
     int downscale = 1;  // >= 1
@@ -105,10 +118,14 @@ struct DatasetOptions {
 };
 
 /// Loads a dataset. There are four kinds of paths:
-/// - A folder with a COLMAP model (.bin or .txt, in sparse/0, sparse or the folder itself) and images/.
+/// - A folder with a COLMAP model (.bin or .txt, in sparse/0 and so on, sparse, the folder itself, or a workspace such as dense/0) and
+///   images. Of several models, the one with the most images counts.
 /// - A folder with transforms.json, or with transforms_train.json and transforms_test.json.
 /// - A folder with the cameras of another program: Metashape, RealityScan, OpenSfM, OpenDroneMap, OpenMVG, Polycam or Record3D.
 /// - One of these files. src/io/datasets/transforms.cpp has the dialects, and src/io/datasets/importers/ the other formats.
+///
+/// Images are searched in images/, input/ and the folder itself. Their names may differ in extension and case from those of the
+/// cameras' file, and folders in its paths may be gone.
 ///
 /// Camera axes follow the OpenCV convention; the world frame is the file's own. With need_images, frames
 /// without a file are skipped and counted. Each other file has the model's size, or that size resized by one

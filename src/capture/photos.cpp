@@ -15,12 +15,12 @@
 #include "ewa/error.h"
 #include "ewa/image.h"
 #include "image/image_files.h"
+#include "io/datasets/importers/image_finder.h"
 
 namespace ewa::capture {
 namespace {
 
 namespace fs = std::filesystem;
-using core::is_file;
 
 constexpr uint64_t kDecodingBytes = uint64_t(2) << 30;  // that all threads together may hold
 constexpr size_t kWholeLens = 10;                       // photos that determine four terms of distortion
@@ -30,21 +30,13 @@ bool is_heic(const fs::path& path) {
     return extension == ".heic" || extension == ".heif";
 }
 
-/// Whether ewa has made the folder: a training run, or a dataset of photos. Its pictures are no photos.
-bool is_made(const fs::path& folder) {
-    return is_file(folder / "capture.json") ||
-           (is_file(folder / "config.json") &&
-            (is_file(folder / "metrics.jsonl") || is_file(folder / "checkpoint.ewa") ||
-             is_file(folder / "splats.ply")));
-}
-
 /// Whether a folder between `folder` and the file in it was made by ewa. known: the answers so far.
 bool below_made(const fs::path& folder, const fs::path& name, std::map<fs::path, bool>& known) {
     const fs::path parent = name.parent_path();
     if (parent.empty()) return false;
     const auto found = known.find(parent);
     if (found != known.end()) return found->second;
-    return known[parent] = is_made(folder / parent) || below_made(folder, parent, known);
+    return known[parent] = io::is_made_by_ewa(folder / parent) || below_made(folder, parent, known);
 }
 
 /// COLMAP takes the names as lines, without the blanks around them.

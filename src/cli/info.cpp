@@ -198,9 +198,17 @@ Json dataset_json(const Dataset& dataset, const Split& split, double extent) {
                            {"cy", group.camera.cy},
                            {"lens", lens_name(group.lens).word},
                            {"distorted", group.distorted}});
+    Json used = Json::array();
+    for (const UsedOf& kind : dataset.used)
+        used.push_back({{"what", kind.what},
+                        {"used", kind.used},
+                        {"found", kind.found},
+                        {"where", kind.where},
+                        {"why", kind.why}});
     Json json{{"kind", dataset.format},
               {"program", dataset.program},
               {"notes", dataset.notes},
+              {"used", used},
               {"frames", dataset.frames.size()},
               {"missing_images", dataset.missing_images},
               {"cameras", cameras},
@@ -246,6 +254,7 @@ void info_dataset(const fs::path& path, const fs::path& named, int test_every, b
     fmt::print("{}\nkind            {}\n", core::one_line(named.string()), dataset.format);
     if (!dataset.program.empty()) fmt::print("program         {}\n", core::one_line(dataset.program));
     for (const std::string& note : dataset.notes) fmt::print("note            {}\n", core::one_line(note));
+    fmt::print("used            {}\n", used_text(dataset));
     fmt::print("frames          {} ({} train, {} test with --test-every {})\n", dataset.frames.size(),
                split.train.size(), split.test.size(), test_every);
     if (dataset.missing_images > 0)

@@ -150,16 +150,22 @@ std::optional<std::string> idle_ranks_remark(const TrainOptions& options, int ra
         (ranks + options.batch - 1) / options.batch);
 }
 
-/// Depth maps that the loss does not compare are dropped, and noted.
-void settle_depths(RunInput& input) {
-    if (input.options.train.loss.depth > 0) return;
-    uint64_t maps = 0;
-    for (Frame& frame : input.dataset.frames) {
-        maps += !frame.depth_path.empty();
-        frame.depth_path.clear();
+/// What of the dataset the run uses. Depth maps that the loss does not compare are dropped.
+void settle_used(RunInput& input, const StartSource& source) {
+    Dataset& dataset = input.dataset;
+    const auto drop = [&](std::string_view what, const std::string& why) {
+        for (UsedOf& kind : dataset.used)
+            if (kind.what == what && kind.used > 0) {
+                kind.used = 0;
+                kind.why = why;
+            }
+    };
+    if (input.options.train.loss.depth == 0) {
+        for (Frame& frame : dataset.frames) frame.depth_path.clear();
+        if (source.from != StartsFrom::depth_maps) drop("depth map", "--loss depth=2 compares them");
     }
-    if (maps > 0)
-        input.notes.push_back(core::counted(maps, "depth map") + " not used; --loss depth=2 compares them");
+    if (input.options.init != "sfm") drop("point", "--init " + input.options.init);
+    input.notes.insert(input.notes.begin(), used_text(dataset));
 }
 
 /// What the user should know of the cameras in INRIA's layout.
@@ -189,7 +195,7 @@ std::string start_without_points(const StartSource& source) {
 
 void add_remarks(RunInput& input, const StartSource& source) {
     const Dataset& dataset = input.dataset;
-    settle_depths(input);
+    settle_used(input, source);
     if (const auto remark = idle_ranks_remark(input.options.train, input.options.ranks->size()))
         input.remarks.push_back(*remark);
     if (input.without_view_dependence())
@@ -216,10 +222,6 @@ void add_remarks(RunInput& input, const StartSource& source) {
                                             core::is_or_are(missing)));
     for (const std::string& image : dataset.unreadable)
         input.remarks.push_back("skipped, since it cannot be read: " + image);
-    if (dataset.dropped_points > 0)
-        input.remarks.push_back(fmt::format("{} with a coordinate that is not finite {} skipped",
-                                            core::counted(uint64_t(dataset.dropped_points), "point"),
-                                            core::is_or_are(uint64_t(dataset.dropped_points))));
     if (input.options.train.render.kernel == Footprint::density)
         input.notes.emplace_back(
             "opacities in splats.ply are fitted to 3DGS's kernel, so that other viewers show about the same");

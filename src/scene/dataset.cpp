@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "scene/camera.h"
 #include "scene/lens.h"
@@ -63,6 +64,20 @@ TrainingImage load_training_image(const Frame& frame, const std::array<float, 3>
     const Image image = load_frame_image(frame);
     if (image.channels == 3 || !frame.alpha_weighs()) return {over_background(image, background), {}};
     return {channels_of(image, 0, 3), channels_of(image, 3, 1)};
+}
+
+std::string used_text(const Dataset& dataset) {
+    std::string text;
+    for (const UsedOf& kind : dataset.used) {
+        // Points and models are many or one, and seldom left out.
+        const bool all = kind.used == kind.found && kind.what != "photo" && kind.what != "mask" &&
+                         kind.what != "depth map";
+        text += (text.empty() ? "" : ", ") + (all ? "" : std::to_string(kind.used) + " of ") +
+                core::counted(kind.found, kind.what);
+        if (!kind.where.empty()) text += " in " + kind.where;
+        if (!kind.why.empty()) text += " (" + kind.why + ")";
+    }
+    return text;
 }
 
 Split split_frames(const Dataset& dataset, int test_every) {

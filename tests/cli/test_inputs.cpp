@@ -44,21 +44,50 @@ TEST(Inputs, DatasetsThatAreNone) {
     EXPECT_FALSE(fs::exists(folder / "out"));
 }
 
+/// In the first lines of a training, and in `ewa info`.
+TEST(Inputs, WhatOfADatasetIsUsed) {
+    const Folder folder;
+    make_dataset(folder / "data", {"0.png", "1.png", "2.png", "3.png"});
+    fs::remove(folder / "data/images/3.png");
+    fs::create_directory(folder / "data/masks");
+    const ewa::Image mask(48, 32, 1);
+    for (const char* name : {"a.png", "b.png"})
+        ewa::save_image(folder / ("data/masks/" + std::string(name)), mask);
+    const std::string used =
+        "3 of 4 photos (images/3.png is missing), 0 of 2 masks (masks/a.png matches no photo)";
+    const Outcome trained =
+        run_ewa({"train", folder / "data", "-o", folder / "out", "--steps", "1", "--init", "random"});
+    expect_success(trained);
+    EXPECT_NE(trained.out.find("\n" + used + "\n"), std::string::npos) << trained.out;
+    const Outcome info = run_ewa({"info", folder / "data"});
+    expect_success(info);
+    EXPECT_NE(info.out.find("used            " + used + "\n"), std::string::npos) << info.out;
+    const Outcome json = run_ewa({"info", folder / "data", "--json"});
+    const auto kinds = nlohmann::json::parse(json.out)["used"];
+    ASSERT_EQ(kinds.size(), 2u);
+    EXPECT_EQ(kinds[0]["what"], "photo");
+    EXPECT_EQ(kinds[0]["used"], 3);
+    EXPECT_EQ(kinds[1]["found"], 2);
+    EXPECT_EQ(kinds[1]["why"], "masks/a.png matches no photo");
+}
+
 /// Of COLMAP's points as text, one has a coordinate that is no number.
 TEST(Inputs, PointsThatAreNotFiniteAreSkipped) {
     const Folder folder;
     const std::string model = folder / "data/sparse/0/";
     fs::create_directories(model);
-    fs::create_directories(folder / "data/images");
     write_file(model + "cameras.txt", "1 PINHOLE 48 32 50 50 24 16\n");
     write_file(model + "images.txt", "1 1 0 0 0 0 0 4 1 a.png\n\n2 1 0 0 0 1 0 4 1 b.png\n\n");
     write_file(model + "points3D.txt", "1 0 0 0 9 9 9 0\n2 nan 0 0 9 9 9 0\n3 1 0 0 9 9 9 0\n");
     for (const char* name : {"a.png", "b.png"})
-        ewa::save_image(folder / ("data/images/" + std::string(name)), ewa::Image(48, 32, 3));
+        ewa::save_image(folder / ("data/" + std::string(name)), ewa::Image(48, 32, 3));
     const Outcome trained =
         run_ewa({"train", folder / "data", "-o", folder / "out", "--steps", "1", "--dense-start", "off"});
     expect_success(trained);
     EXPECT_NE(trained.out.find("2 splats to start from"), std::string::npos) << trained.out;
+    EXPECT_NE(trained.out.find("2 of 2 photos, 2 of 3 points (" + model + "points3D.txt:2 is not finite)"),
+              std::string::npos)
+        << trained.out;
 }
 
 /// What a name may do to the terminal that it is printed on.

@@ -10,6 +10,7 @@
 #include "ewa/error.h"
 #include "input.h"
 #include "io/datasets/image_records.h"
+#include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/importer.h"
 
 namespace {
@@ -21,7 +22,9 @@ namespace fs = std::filesystem;
 constexpr const char* kFiles[] = {"cameras" EWA_COLMAP, "images" EWA_COLMAP, "points3D" EWA_COLMAP};
 
 io::ImageRecords read_model(const fs::path& folder) {
-    return io::read_colmap(folder, folder / "images");
+    const io::ColmapModel model{.folder = folder, .dataset = folder, .extension = EWA_COLMAP};
+    const io::ImageFinder finder = io::image_finder(model);
+    return io::read_colmap(model, &finder);
 }
 #elif defined(EWA_IMPORTED)
 constexpr const char* kFiles[] = {EWA_IMPORTED, "points.ply"};

@@ -197,7 +197,7 @@ TEST(Colmap, EveryCutOfTextIsReadOrRefused) {
     const auto load = [&] { load_dataset(model.folder.path(), {}); };
     EXPECT_NO_THROW(load());
     EXPECT_LE(test::read_every_cut(c, cameras, load), 3u);
-    EXPECT_LE(test::read_every_cut(i, images, load), 2u);
+    EXPECT_LE(test::read_every_cut(i, images, load), 6u) << "b is the label of b.png";
     EXPECT_GE(test::read_every_cut(p, points, load), 2u);
 }
 
@@ -265,17 +265,20 @@ TEST(Colmap, RefusesImpossibleImages) {
         {image(1, {1, 0, kNan, 0, 1, 2, 3}, 3, "b.png"), "not finite"},
         {image(1, {1, 0, 0, 0, 1, HUGE_VAL, 3}, 3, "b.png"), "not finite"},
         {image(1, kPose, 4, "b.png"), "camera 4"},
-        {image(1, kPose, 3, "/etc/passwd"), "outside"},
-        {image(1, kPose, 3, "../b.png"), "outside"},
-        {image(1, kPose, 3, "sub/../../b.png"), "outside"},
-        {image(1, kPose, 3, "..\\b.png"), "outside"},
-        {image(1, kPose, 3, "C:\\b.png"), "outside"},
-        {image(1, kPose, 3, ""), "outside"},
+        {image(1, kPose, 3, ".."), "no file's name"},
+        {image(1, kPose, 3, "images/"), "no file's name"},
+        {image(1, kPose, 3, ""), "no file's name"},
         {image(1, kPose, 3, std::string(5000, 'n')), "longer"}};
     for (const auto& [bytes, part] : cases) {
         Model model;
         model.images = list({bytes});
         model.refuse({"images.bin: byte", part});
+    }
+    // Paths of other machines are names in the folder.
+    for (const char* name : {"/etc/passwd", "../../passwd", "C:\\passwd"}) {
+        Model outside;
+        outside.images = list({image(1, kPose, 3, name)});
+        outside.refuse({"none of the 1 images exists", "images/passwd"});
     }
     Model inside;
     inside.images = list({image(1, {1e-200, 0, 0, 0, 1, 2, 3}, 3, "sub/../b.png")});
@@ -291,11 +294,11 @@ TEST(Colmap, LinksLeadOutOfNoFolder) {
     model.images = list({image(1, kPose, 3, "out/b.png")});
     model.write();
     fs::create_symlink(elsewhere.path(), model.folder / "images/out");
-    model.refuse({"images.bin: byte", "out/b.png", "link out of the dataset's folder"});
+    model.refuse({"images.bin: ", "out/b.png", "link out of the dataset's folder"});
     model.images = list({image(1, kPose, 3, "b.png")});
     fs::remove(model.folder / "images/b.png");
     fs::create_symlink(elsewhere / "b.png", model.folder / "images/b.png");
-    model.refuse({"images.bin: byte", "b.png", "link out of the dataset's folder"});
+    model.refuse({"images.bin: ", "b.png", "link out of the dataset's folder"});
     fs::remove_all(model.folder / "images");
     fs::create_symlink(elsewhere.path(), model.folder / "images");
     EXPECT_EQ(model.load().missing_images, 0);
@@ -363,7 +366,7 @@ TEST(ColmapWriter, WhatIsWrittenIsReadBack) {
     scene::set_equirectangular(images.back().camera);
     const PointCloud points{{{1, 2, 3}, {-4.5, 1e-3, 7}}, {{1, 2, 3}, {255, 0, 128}}};
     io::write_colmap(folder / "sparse/0", images, points);
-    const io::ImageRecords read = io::read_colmap(folder / "sparse/0", folder / "images");
+    const io::ImageRecords read = io::read_colmap({folder / "sparse/0"});
     ASSERT_EQ(read.images.size(), images.size());
     for (size_t i = 0; i < images.size(); ++i) {
         SCOPED_TRACE(images[i].name);
@@ -381,7 +384,7 @@ TEST(ColmapWriter, WhatIsWrittenIsReadBack) {
     EXPECT_EQ(read.points.colors, points.colors);
     // The camera with the fewest parameters, alone.
     io::write_colmap(folder / "one", {images.back()}, {});
-    EXPECT_EQ(io::read_colmap(folder / "one", folder / "images").images.size(), 1u);
+    EXPECT_EQ(io::read_colmap({folder / "one"}).images.size(), 1u);
 }
 
 TEST(Dataset, MissingImages) {

@@ -203,7 +203,7 @@ TEST(DepthMap, NamesWhatIsWrong) {
     scene.folder.write("maps/a.npy", "");
     scene.refuse({"maps/a.npy: is no depth map; .exr and .png"});
     scene.model["frames"][0]["depth_file_path"] = "../a.png";
-    scene.refuse({"frame 0", "\"depth_file_path\"", "leaves the file's folder"});
+    scene.refuse({(scene.folder / "a.png").string(), "there is no such file"});
 }
 
 }  // namespace

@@ -13,11 +13,11 @@
 
 #include "core/file_reader.h"
 #include "core/folders.h"
-#include "core/sandboxed_path.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/datasets/colmap_lens.h"
 #include "io/datasets/image_records.h"
+#include "io/datasets/importers/image_finder.h"
 #include "scene/native_lens.h"
 
 namespace ewa::io {
@@ -30,22 +30,25 @@ using Fail = std::function<void(const std::string&)>;
 /// Collects a model and checks its ids. Errors go to the Fail of the file that is being read.
 class ColmapBuilder {
   public:
-    explicit ColmapBuilder(std::filesystem::path images) : images_(std::move(images)) {
-        result_.folder = images_;
-    }
-
     void add_camera(uint32_t id, const ColmapLens& lens, uint64_t width, uint64_t height,
                     const std::vector<double>& parameters, const Fail& fail);
     /// pose: qw qx qy qz tx ty tz, world to camera.
     void add_image(uint32_t id, const std::array<double, 7>& pose, uint32_t camera_id,
                    const std::string& name, const Fail& fail);
     /// images: ids of those that saw the point. Others than the model's do not count. `where` is called for the first dropped point.
-    void add_point(const glm::dvec3& position, const std::array<uint8_t, 3>& color,
+    bool add_point(const glm::dvec3& position, const std::array<uint8_t, 3>& color,
                    const std::vector<uint32_t>& images, const std::function<std::string()>& where) {
-        if (!io::add_point(result_.points, result_.dropped, position, color, where)) return;
+        if (!io::add_point(result_.points, result_.dropped, position, color, where)) return false;
         for (const uint32_t id : images)
             if (const auto image = image_of_.find(id); image != image_of_.end())
                 result_.images[image->second].seen.push_back(uint32_t(result_.points.positions.size() - 1));
+        return true;
+    }
+    /// Of all points, times the scale.
+    void set_colors(const std::vector<std::array<float, 3>>& colors, float scale) {
+        for (size_t i = 0; i < colors.size(); ++i)
+            for (size_t k = 0; k < 3; ++k)
+                result_.points.colors[i][k] = uint8_t(std::lround(colors[i][k] * scale));
     }
     ImageRecords take() { return std::move(result_); }
 
@@ -54,7 +57,6 @@ class ColmapBuilder {
         Camera camera;
         Distortion distortion;
     };
-    std::filesystem::path images_;
     std::map<uint32_t, CameraModel> cameras_;
     std::map<uint32_t, size_t> image_of_;  // by id: of result_.images
     ImageRecords result_;
@@ -94,10 +96,7 @@ void ColmapBuilder::add_camera(uint32_t id, const ColmapLens& lens, uint64_t wid
 void ColmapBuilder::add_image(uint32_t id, const std::array<double, 7>& pose, uint32_t camera_id,
                               const std::string& name, const Fail& fail) {
     const std::string image_name = "image \"" + core::one_line(name) + "\"";
-    const auto inside = core::name_inside(name);
-    if (!inside) return fail(image_name + " is outside the images folder");
-    if (!core::links_stay_with_images(images_.parent_path(), images_.filename() / *inside))
-        fail(image_name + " is a link out of the dataset's folder; " + core::kLinkAdvice);
+    if (named_path(name).empty()) fail(image_name + " has no file's name");
     const auto camera = cameras_.find(camera_id);
     if (camera == cameras_.end())
         fail(image_name + " refers to camera " + std::to_string(camera_id) + ", which is not defined");
@@ -111,13 +110,25 @@ void ColmapBuilder::add_image(uint32_t id, const std::array<double, 7>& pose, ui
         glm::dquat(pose[0] / largest, pose[1] / largest, pose[2] / largest, pose[3] / largest));
     ImageRecord image;
     image.name = name;
-    image.path = images_ / *inside;
     image.camera = camera->second.camera;
     image.distortion = camera->second.distortion;
     image.camera.rotation = glm::mat3_cast(q);
     image.camera.translation = {pose[4], pose[5], pose[6]};
     image_of_.emplace(id, result_.images.size());
     result_.images.push_back(std::move(image));
+}
+
+/// Gives the images their paths.
+void find_images(const ImageFinder& finder, const std::string& where, ImageRecords& records) {
+    std::vector<std::string> names;
+    for (const ImageRecord& image : records.images) names.push_back(image.name);
+    finder.settle(names);
+    records.folder = finder.folder();
+    for (ImageRecord& image : records.images) {
+        ImageFinder::Found found = finder.find(image.name, where);
+        image.name = std::move(found.name);
+        image.path = std::move(found.path);
+    }
 }
 
 constexpr size_t kMaxName = 4096;
@@ -269,78 +280,131 @@ void read_text_cameras(const std::filesystem::path& path, ColmapBuilder& builder
     }
 }
 
+/// Whether the line has observations: triples of numbers. A line of an image ends in a name instead, which is hardly ever numbers.
+bool is_observations(std::string_view line) {
+    constexpr size_t kEnough = 12;  // words; images have ten before the second word of their name
+    const std::string_view last = core::trim(line).substr(core::trim(line).find_last_of(" \t") + 1);
+    size_t words = 0;
+    for (std::string_view rest = line; words <= kEnough; ++words) {
+        const std::string_view word = core::next_word(rest);
+        if (word.empty()) break;
+        if (!core::parse_number(word)) return false;
+    }
+    return core::parse_number(last) && (words > kEnough || words % 3 == 0);
+}
+
+/// Calls `visit` at each line of an image. Some programs leave out the lines of observations, or the empty ones.
+template <class Visit>
+void visit_text_images(Lines& lines, const Visit& visit) {
+    for (bool more = lines.next_entry(); more;) {
+        visit();
+        more = lines.next_entry();
+        if (more && is_observations(lines.rest())) more = lines.next_entry();
+    }
+}
+
 // # IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME, then a line of observations that may be empty.
 void read_text_images(const std::filesystem::path& path, ColmapBuilder& builder) {
     Lines lines(path);
     const Fail fail = [&](const std::string& text) { lines.fail(text); };
-    while (lines.next_entry()) {
+    visit_text_images(lines, [&] {
         const auto id = lines.value<uint32_t>("image id");
         std::array<double, 7> pose;
         for (double& value : pose) value = lines.value<double>("pose");
         const auto camera_id = lines.value<uint32_t>("camera id");
         if (lines.rest().empty()) lines.fail("the image has no name");
         builder.add_image(id, pose, camera_id, std::string(lines.rest()), fail);
-        lines.next();
-    }
+    });
 }
 
 // # POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]
 void read_text_points(const std::filesystem::path& path, ColmapBuilder& builder) {
+    constexpr float kGrey = 128;
     Lines lines(path);
+    std::vector<std::array<float, 3>> colors;  // integers, or with decimals, up to 255 or to 1
+    float largest = 0;
+    bool whole = true;
     while (lines.next_entry()) {
         lines.value<uint64_t>("point id");
         glm::dvec3 position;
         for (int axis = 0; axis < 3; ++axis) position[axis] = lines.value<double>("coordinate");
-        std::array<uint8_t, 3> color;
-        for (uint8_t& channel : color) channel = lines.value<uint8_t>("colour");
-        lines.value<double>("reprojection error");
+        std::array<float, 3> color{kGrey, kGrey, kGrey};
+        for (size_t k = 0; k < 3 && !(k == 0 && lines.rest().empty()); ++k) {
+            color[k] = float(lines.value<double>("colour"));
+            if (!(color[k] >= 0 && color[k] <= 255)) lines.fail("a colour is not in 0..255");
+            largest = std::max(largest, color[k]);
+            whole = whole && color[k] == std::floor(color[k]);
+        }
+        // Other programs write other tracks, or neither an error nor a track.
+        if (!lines.rest().empty()) lines.value<double>("reprojection error");
         std::vector<uint32_t> images;
-        // Other programs write other tracks, or none.
         while (const auto id = core::parse_integer<uint32_t>(lines.word())) {
             images.push_back(*id);
             lines.word();  // which of the image's observations it is
         }
-        builder.add_point(position, color, images, [&] { return lines.where(); });
+        if (builder.add_point(position, {}, images, [&] { return lines.where(); })) colors.push_back(color);
     }
+    builder.set_colors(colors, !whole && largest <= 1 ? 255 : 1);
+}
+
+/// The file of the model, in any case of its name; empty if there is none.
+std::filesystem::path file_of(const ColmapModel& model, const std::string& name) {
+    const std::filesystem::path file = entry_in(model.folder, name);
+    return core::is_file(file) ? file : std::filesystem::path();
+}
+
+/// The points of the model's kind, else of the other.
+void read_points(const ColmapModel& model, ColmapBuilder& builder,
+                 std::vector<std::filesystem::path>& files) {
+    for (const std::string& extension :
+         {model.extension, std::string(model.extension == ".bin" ? ".txt" : ".bin")})
+        if (const auto file = file_of(model, "points3D" + extension); !file.empty()) {
+            (extension == ".bin" ? read_binary_points : read_text_points)(file, builder);
+            files.push_back(file);
+            return;
+        }
 }
 
 }  // namespace
 
-std::optional<std::filesystem::path> find_colmap_model(const std::filesystem::path& root) {
-    std::error_code ignored;
-    for (const std::filesystem::path& folder : {root / "sparse" / "0", root / "sparse", root})
-        for (const char* extension : {".bin", ".txt"})
-            if (std::filesystem::exists(folder / (std::string("cameras") + extension), ignored) &&
-                std::filesystem::exists(folder / (std::string("images") + extension), ignored))
-                return folder;
-    return std::nullopt;
+uint64_t count_images(const ColmapModel& model) try {
+    const std::filesystem::path file = file_of(model, "images" + model.extension);
+    if (model.extension == ".bin") return core::FileReader(file).read<uint64_t>("images");
+    Lines lines(file);
+    uint64_t count = 0;
+    visit_text_images(lines, [&] { ++count; });
+    return count;
+} catch (const InputError&) {
+    return 0;
 }
 
-ImageRecords read_colmap(const std::filesystem::path& model, const std::filesystem::path& images) {
-    ColmapBuilder builder(images);
-    const bool binary =
-        std::filesystem::exists(model / "cameras.bin") && std::filesystem::exists(model / "images.bin");
-    const std::filesystem::path points = model / (binary ? "points3D.bin" : "points3D.txt");
-    (binary ? read_binary_cameras : read_text_cameras)(model / (binary ? "cameras.bin" : "cameras.txt"),
-                                                       builder);
-    (binary ? read_binary_images : read_text_images)(model / (binary ? "images.bin" : "images.txt"), builder);
-    if (std::filesystem::exists(points)) (binary ? read_binary_points : read_text_points)(points, builder);
+ImageRecords read_colmap(const ColmapModel& model, const ImageFinder* images) {
+    ColmapBuilder builder;
+    const bool binary = model.extension == ".bin";
+    const std::filesystem::path cameras_file = entry_in(model.folder, "cameras" + model.extension),
+                                images_file = entry_in(model.folder, "images" + model.extension);
+    (binary ? read_binary_cameras : read_text_cameras)(cameras_file, builder);
+    (binary ? read_binary_images : read_text_images)(images_file, builder);
+    std::vector<std::filesystem::path> files{cameras_file, images_file};
+    read_points(model, builder, files);
     ImageRecords records = builder.take();
     records.format = "COLMAP";
     // The images of a rig have their whole pose in the list of images, too.
-    if (core::is_file(model / (binary ? "rigs.bin" : "rigs.txt")))
+    if (!file_of(model, "rigs" + model.extension).empty())
         records.program = "COLMAP 3.12 or later, which writes rigs";
-    // The dense cloud of COLMAP's stereo fusion replaces points that the model lacks.
-    if (const std::filesystem::path dense = images.parent_path() / "fused.ply";
-        records.points.positions.empty() && records.dropped.count == 0 && core::is_file(dense)) {
-        PlyPoints cloud = read_points_ply(dense);
-        records.points = std::move(cloud.points);
-        records.dropped = std::move(cloud.dropped);
-        records.files.push_back(dense);
+    records.files = std::move(files);
+    if (!images) return records;
+    find_images(*images, core::one_line(images_file.string()), records);
+    // The first of them replaces points that the model lacks.
+    for (const std::filesystem::path& cloud :
+         {entry_in(model.folder, "points3D.ply"), entry_in(model.dataset, "points3D.ply"),
+          records.folder.parent_path() / "fused.ply"}) {
+        if (!records.points.positions.empty() || records.dropped.count > 0 || !core::is_file(cloud)) continue;
+        PlyPoints read = read_points_ply(cloud);
+        records.points = std::move(read.points);
+        records.dropped = std::move(read.dropped);
+        records.files.push_back(cloud);
     }
-    const std::string extension = binary ? ".bin" : ".txt";
-    for (const char* file : {"cameras", "images", "points3D"})
-        records.files.push_back(model / (file + extension));
     return records;
 }
 

@@ -9,9 +9,12 @@
 #include "core/folders.h"
 #include "core/sandboxed_path.h"
 #include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "image/image_files.h"
+#include "io/datasets/companions.h"
 #include "io/datasets/image_records.h"
+#include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/importer.h"
 #include "scene/camera.h"
 #include "scene/intrinsics.h"
@@ -68,43 +71,6 @@ void leave_out_damaged(ImageFile& file, const std::string& name, Dataset& datase
     dataset.unreadable.push_back(core::one_line(name + " (" + fault + ")"));
 }
 
-fs::path find_mask_in(const fs::path& masks, const fs::path& inside) {
-    fs::path replaced = inside, added = inside;
-    replaced.replace_extension(".png");
-    added += ".png";
-    for (const fs::path& name : {added, replaced, inside})
-        if (has_file(masks, name)) return masks / name;
-    return {};
-}
-
-/// The mask file of an image: its copy in masks_K, the model's, or the one in masks. Empty if there is none.
-fs::path find_mask(const io::ImageRecord& image, const fs::path& folder, int downscale) {
-    const fs::path inside = image.path.lexically_relative(folder), root = folder.parent_path();
-    const bool below = !inside.empty() && *inside.begin() != "..";
-    if (below && downscale > 1) {
-        const fs::path small = find_mask_in(root / ("masks_" + std::to_string(downscale)), inside);
-        if (!small.empty()) return small;
-    }
-    if (!image.mask.empty() && is_file(image.mask)) return image.mask;
-    return below ? find_mask_in(root / "masks", inside) : fs::path();
-}
-
-/// The depth map of an image: the model's, or the one in depth or depths. Empty if there is none.
-fs::path find_depth(const io::ImageRecord& image, const fs::path& folder) {
-    if (!image.depth.empty()) return image.depth;
-    const fs::path inside = image.path.lexically_relative(folder), root = folder.parent_path();
-    if (inside.empty() || *inside.begin() == "..") return {};
-    for (const char* maps : {"depth", "depths"})
-        for (const char* type : {".exr", ".png"}) {
-            fs::path replaced = inside, added = inside;
-            replaced.replace_extension(type);
-            added += type;
-            for (const fs::path& name : {added, replaced})
-                if (has_file(root / maps, name)) return root / maps / name;
-        }
-    return {};
-}
-
 /// Resolves MaskUse::automatic once for the whole dataset.
 void settle_masks(Dataset& dataset, MaskUse wanted) {
     const bool files = std::any_of(dataset.frames.begin(), dataset.frames.end(),
@@ -113,6 +79,31 @@ void settle_masks(Dataset& dataset, MaskUse wanted) {
     for (Frame& frame : dataset.frames) {
         frame.masks = wanted;
         if (wanted == MaskUse::none) frame.mask_path.clear();
+    }
+}
+
+/// Gives the frames their masks and depth maps, and notes what was found. records: of the frames.
+void add_companions(const io::ImageRecords& model, const std::vector<const io::ImageRecord*>& records,
+                    const DatasetOptions& options, Dataset& dataset) {
+    using Kind = io::Companions::Kind;
+    for (const Kind kind : {Kind::masks, Kind::depth_maps}) {
+        const auto file_of = [&](Frame& frame) -> fs::path& {
+            return kind == Kind::masks ? frame.mask_path : frame.depth_path;
+        };
+        io::Companions files(kind, model, dataset.root, options.downscale);
+        for (size_t i = 0; i < records.size(); ++i) file_of(dataset.frames[i]) = files.find(*records[i]);
+        const fs::path of_all = files.of_all();
+        std::vector<std::string> bare;
+        for (Frame& frame : dataset.frames) {
+            if (!of_all.empty()) file_of(frame) = of_all;
+            if (file_of(frame).empty()) bare.push_back(frame.name);
+        }
+        UsedOf used = files.used(bare);
+        if (kind == Kind::masks && options.masks == MaskUse::none && used.found > 0) {
+            used.used = 0;
+            used.why = "--masks none";
+        }
+        if (used.found > 0) dataset.used.push_back(std::move(used));
     }
 }
 
@@ -257,16 +248,6 @@ void check_positions(const Dataset& dataset) {
         }
 }
 
-/// The images folder that belongs to a COLMAP model.
-fs::path images_folder(const fs::path& root, const fs::path& model) {
-    if (model != root) return root / "images";
-    // The path is the model's own folder: images/ is beside it, or beside the sparse/ that contains it.
-    const fs::path absolute = fs::absolute(root / "x").parent_path();
-    for (const fs::path& folder : {absolute, absolute.parent_path(), absolute.parent_path().parent_path()})
-        if (is_folder(folder / "images")) return folder / "images";
-    return root / "images";
-}
-
 void append(io::ImageRecords& all, io::ImageRecords more) {
     std::move(more.images.begin(), more.images.end(), std::back_inserter(all.images));
     all.files.insert(all.files.end(), more.files.begin(), more.files.end());
@@ -310,6 +291,29 @@ std::optional<io::ImageRecords> read_split_transforms(const fs::path& path, cons
     return all;
 }
 
+/// The first of these models. Empty if there is none.
+std::optional<io::ImageRecords> read_colmap_at(const fs::path& root,
+                                               const std::vector<io::ColmapModel>& models) {
+    if (models.empty()) return std::nullopt;
+    const auto shown = [&](const io::ColmapModel& model) {
+        return model.folder.lexically_proximate(root).string() + " with " +
+               core::counted(model.images, "image") + (model.extension == ".txt" ? " as text" : "");
+    };
+    const io::ImageFinder finder = io::image_finder(models[0]);
+    io::ImageRecords records = io::read_colmap(models[0], &finder);
+    if (models.size() > 1)
+        records.models = {.what = "model",
+                          .used = 1,
+                          .found = models.size(),
+                          .why = shown(models[0]) + ", not " + shown(models[1])};
+    return records;
+}
+
+bool has_images(const std::optional<io::ImageRecords>& records) {
+    return records && std::ranges::any_of(records->images,
+                                          [](const io::ImageRecord& image) { return is_file(image.path); });
+}
+
 /// The cameras that another program has written; empty if no importer reads the path.
 std::optional<io::ImageRecords> import_model(const fs::path& path, const DatasetOptions& options) {
     std::optional<io::FoundImporter> found = io::find_importer(path);
@@ -347,17 +351,31 @@ io::ImageRecords read_model(const fs::path& path, const DatasetOptions& options)
     }
     if (!is_folder(path))
         throw InputError(core::one_line(path.string()) + ": there is no such file or folder");
-    if (const std::optional<fs::path> model = io::find_colmap_model(path)) {
-        const fs::path images = images_folder(path, *model);
-        const fs::path copies = images.string() + "_" + std::to_string(options.downscale);
-        if (options.need_images && !is_folder(images) && !is_folder(copies))
-            throw InputError(core::one_line(images.string()) + ": the folder of the images is missing");
-        return io::read_colmap(*model, images);
-    }
+    std::optional<io::ImageRecords> colmap = read_colmap_at(path, io::colmap_models(path));
+    if (has_images(colmap)) return std::move(*colmap);
+    // A workspace may have images where the model beside it has none.
+    std::optional<io::ImageRecords> workspace;
+    if (colmap) workspace = read_colmap_at(path, io::colmap_workspaces(path));
+    if (colmap) return std::move(has_images(workspace) ? *workspace : *colmap);
     if (is_file(path / "transforms.json")) return read_transforms_at(path / "transforms.json", options);
     if (auto records = read_split_transforms(path, options)) return std::move(*records);
     if (auto records = import_model(path, options)) return std::move(*records);
+    if (auto records = read_colmap_at(path, io::colmap_workspaces(path))) return std::move(*records);
     refuse_model(path);
+}
+
+[[noreturn]] void refuse_without_images(const std::string& name, const io::ImageRecords& model) {
+    const fs::path& folder = model.folder;
+    std::string text = name + ": none of the " + std::to_string(model.images.size()) +
+                       " images exists, the first being " +
+                       core::one_line(model.images.front().path.string());
+    if (!is_folder(folder)) text += "; the folder of the images is missing";
+    for (const int factor : {2, 4, 8})
+        if (const std::string smaller = folder.filename().string() + "_" + std::to_string(factor);
+            !is_folder(folder) && is_folder(folder.parent_path() / smaller))
+            throw InputError(text + ", and " + core::one_line(smaller) + " is there: --downscale " +
+                             std::to_string(factor) + " takes it");
+    throw InputError(text);
 }
 
 }  // namespace
@@ -383,6 +401,7 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
     note_repeated(model.images, dataset.notes);
     CameraCache cameras(options.lens);
     const bool captured = is_file(dataset.root / "capture.json");
+    std::vector<const io::ImageRecord*> records;
     for (const io::ImageRecord& image : model.images) {
         ImageFile file = find_image(image, model.folder, options.downscale);
         if (captured) leave_out_damaged(file, image.name, dataset);
@@ -390,18 +409,25 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
         const bool usable = image.camera.width > 0 && (file.exists || !options.need_images);
         if (!usable) continue;
         dataset.frames.push_back(make_frame(image, file, options, cameras, name));
+        records.push_back(&image);
         Frame& frame = dataset.frames.back();
-        frame.mask_path = find_mask(image, model.folder, options.downscale);
-        frame.depth_path = find_depth(image, model.folder);
         frame.depth_unit = image.depth_unit;
         if (!image.seen.empty()) frame.seen = std::make_shared<const std::vector<uint32_t>>(image.seen);
     }
+    dataset.used.push_back(io::used_photos(model, dataset));
+    add_companions(model, records, options, dataset);
+    if (const uint64_t points = dataset.points.positions.size() + uint64_t(dataset.dropped_points);
+        points > 0)
+        dataset.used.push_back({.what = "point",
+                                .used = dataset.points.positions.size(),
+                                .found = points,
+                                .why = dataset.dropped_points == 0
+                                           ? std::string()
+                                           : dataset.first_dropped_point + " is not finite"});
+    if (model.models.found > 0) dataset.used.push_back(std::move(model.models));
     settle_masks(dataset, options.masks);
     check_positions(dataset);
-    if (dataset.frames.empty())
-        throw InputError(name + ": none of the " + std::to_string(model.images.size()) +
-                         " images exists, the first being " +
-                         core::one_line(model.images.front().path.string()));
+    if (dataset.frames.empty()) refuse_without_images(name, model);
     return dataset;
 }
 

@@ -38,7 +38,7 @@ bool lies_in(const fs::path& path, const fs::path& folder) {
 /// A dataset's own folder, as images, images_2, masks and sparse are.
 bool is_part_of_dataset(const fs::path& real) {
     const std::string name = real.filename().string();
-    constexpr std::array<std::string_view, 4> kParts{"masks", "sparse", "depth", "depths"};
+    constexpr std::array<std::string_view, 6> kParts{"masks", "mask", "sparse", "depth", "depths", "input"};
     const bool part = name == "images" || name.starts_with("images_") || std::ranges::count(kParts, name) > 0;
     return part && is_dataset_folder(real.parent_path());
 }
@@ -57,7 +57,8 @@ std::set<fs::path> image_folders(const Dataset& dataset) {
 bool is_dataset_folder(const fs::path& folder) {
     for (const char* name : {"transforms.json", "transforms_train.json", "transforms_test.json"})
         if (core::is_file(folder / name)) return true;
-    return find_colmap_model(folder).has_value() || find_importer(folder).has_value();
+    return !colmap_models(folder).empty() || find_importer(folder).has_value() ||
+           !colmap_workspaces(folder).empty();
 }
 
 void check_not_inside_dataset(const std::string& option, const fs::path& folder) {

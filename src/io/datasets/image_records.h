@@ -13,6 +13,8 @@
 
 namespace ewa::io {
 
+class ImageFinder;
+
 /// One image of the model. The image file may not exist.
 struct ImageRecord {
     std::string name;            // Frame::name
@@ -46,6 +48,7 @@ struct ImageRecords {
     bool color_depends_on_view = true;  // Dataset::color_depends_on_view
     std::string format, program;        // Dataset::format, Dataset::program
     std::vector<std::string> notes;     // Dataset::notes
+    UsedOf models;                      // of Dataset::used; none: there is no other
 };
 
 /// Gives the camera of a 360° image its intrinsics: the width shows the whole circle, with as many px per angle along both sides.
@@ -71,15 +74,31 @@ bool is_point_cloud(const std::filesystem::path& path);
 /// Writes a binary PLY of x y z (float32) and red green blue (8 bits). Throws RunError.
 void write_points_ply(const std::filesystem::path& path, const PointCloud& points);
 
-/// The folder below `root` that holds a model, that is cameras and images of one kind. Candidates in this
-/// order: sparse/0, sparse, root itself.
-std::optional<std::filesystem::path> find_colmap_model(const std::filesystem::path& root);
+/// Cameras and images of COLMAP.
+struct ColmapModel {
+    std::filesystem::path folder;        // of the files
+    std::filesystem::path dataset = {};  // the folder that the images are in or below
+    std::filesystem::path originals =
+        {};  // also has them, where they are not undistorted; empty: no other folder has
+    std::string extension = ".bin";  // or .txt
+    uint64_t images = 0;             // only counted where there are several models
+};
 
-/// Reads the model in a folder. Image names are relative to `images`. As in COLMAP, .bin is preferred.
-/// Without points in the model, they are those of fused.ply beside the images, if it is there. World and cameras are as in the file: COLMAP's axes are
+/// The models of a dataset, which are in sparse/0 and so on, sparse or root itself. The one with the most images is first. As in COLMAP,
+/// .bin is preferred.
+std::vector<ColmapModel> colmap_models(const std::filesystem::path& root);
+/// Those of a workspace that is in the folder: dense/0 and so on, dense, undistorted, distorted or colmap.
+std::vector<ColmapModel> colmap_workspaces(const std::filesystem::path& root);
+/// The number of images in the model's file; 0 if it cannot be read.
+uint64_t count_images(const ColmapModel& model);
+/// Searches the images of the model.
+ImageFinder image_finder(const ColmapModel& model);
+
+/// Reads a model. Without `images`, the images have no paths. With them, missing points are those of points3D.ply in its folder or the
+/// dataset's, or of fused.ply beside the images. World and cameras are as in the file: COLMAP's axes are
 /// OpenCV's. Every lens model of COLMAP is supported.
 /// Throws InputError that names the file and the byte (.bin) or line (.txt).
-ImageRecords read_colmap(const std::filesystem::path& model, const std::filesystem::path& images);
+ImageRecords read_colmap(const ColmapModel& model, const ImageFinder* images = nullptr);
 
 /// Whether COLMAP has a lens model for the image: one with these terms, or the whole sphere.
 bool fits_colmap(const ImageRecord& image);

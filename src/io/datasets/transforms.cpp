@@ -12,7 +12,7 @@
 //   rolling_shutter                top-to-bottom, bottom-to-top, left-to-right or right-to-left: the order of the readout. Then the frame has
 //   transform_matrix_start, _end   the poses when the readout leaves the first border and reaches the last one, as transform_matrix,
 //                                  which is not read
-//   file_path                      relative to the file's folder; may lack .png, .jpg or .jpeg
+//   file_path                      relative to the file's folder; may lack its extension, or be that of another machine
 //   mask_path                      the image's mask
 //   depth_file_path                the image's depth map: .exr in world units, or .png of 16 bits
 //   depth_unit_scale_factor        world units of a level of such a .png; 0.001 without
@@ -33,6 +33,7 @@
 #include "core/words.h"
 #include "ewa/error.h"
 #include "io/datasets/image_records.h"
+#include "io/datasets/importers/image_finder.h"
 #include "io/datasets/named_splits.h"
 #include "io/datasets/rotation.h"
 #include "scene/readout.h"
@@ -195,33 +196,38 @@ void add_notes(const json& top, ImageRecords& records) {
             "readout");
 }
 
-/// The file that the entry names under this key, relative to `folder`. Empty if it names none.
+/// The file that the entry names under this key, relative to `folder`: a path of another machine is searched by name. Empty if it
+/// names none.
 std::filesystem::path named_file(const Entry& entry, const char* key, const std::filesystem::path& folder) {
     const std::string name = entry.text(key);
     if (name.empty()) return {};
-    const auto inside = core::name_inside(name);
     const std::string what = std::string("\"") + key + "\" " + name.substr(0, kLongestName);
-    if (!inside) entry.fail(what + " leaves the file's folder; only files in or below it are read");
-    if (!core::links_stay_with_images(folder, *inside))
+    std::filesystem::path inside = named_path(name);
+    if (inside.empty()) entry.fail(what + " names no file");
+    if (!core::is_file(folder / inside) && core::is_file(folder / inside.filename()))
+        inside = inside.filename();
+    if (!core::links_stay_with_images(folder, inside))
         entry.fail(what + " is a link out of the file's folder; " + core::kLinkAdvice);
-    return *inside;
+    return inside;
 }
 
-void find_image(const Entry& entry, const std::filesystem::path& folder, ImageRecord& image) {
-    const std::filesystem::path name = named_file(entry, "file_path", folder);
+/// Finds the images of all frames in and below the folder.
+ImageFinder image_finder(const json& frames, const std::filesystem::path& folder) {
+    ImageFinder finder({{folder, true}});
+    std::vector<std::string> names;
+    for (const json& frame : frames)
+        if (const auto name = frame.find("file_path"); name != frame.end() && name->is_string())
+            names.push_back(name->get<std::string>());
+    finder.settle(names);
+    return finder;
+}
+
+void find_image(const Entry& entry, const ImageFinder& finder, ImageRecord& image) {
+    const std::string name = entry.text("file_path");
     if (name.empty()) entry.fail("\"file_path\" is missing");
-    image.path = folder / name;
-    image.name = name.string();
-    if (core::is_file(image.path)) return;
-    for (const char* extension : {".png", ".jpg", ".jpeg"}) {
-        const std::filesystem::path longer = name.string() + extension;
-        if (!core::is_file(folder / longer)) continue;
-        if (!core::links_stay_with_images(folder, longer))
-            entry.fail(longer.string() + " is a link out of the file's folder; " + core::kLinkAdvice);
-        image.path = folder / longer;
-        image.name = longer.string();
-        return;
-    }
+    ImageFinder::Found found = finder.find(name, entry.where());
+    image.name = std::move(found.name);
+    image.path = std::move(found.path);
 }
 
 void read_depth(const Entry& entry, const std::filesystem::path& folder, ImageRecord& image) {
@@ -353,13 +359,14 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
     result.program = program_of(top);
     add_notes(top, result);
     bool unused_poses = false;
+    const ImageFinder finder = image_finder(*frames, folder);
     for (size_t i = 0; i < frames->size(); ++i) {
         const Entry entry(name + ": frame " + std::to_string(i), top, (*frames)[i]);
         if (!(*frames)[i].is_object()) entry.fail("is not a JSON object");
         ImageRecord image;
         image.split = split;
         image.distortion = read_lens(entry);
-        find_image(entry, folder, image);
+        find_image(entry, finder, image);
         if (const auto mask = named_file(entry, "mask_path", folder); !mask.empty())
             image.mask = folder / mask;
         read_depth(entry, folder, image);

@@ -5,6 +5,7 @@
 #include <array>
 #include <string_view>
 
+#include "core/composed.h"
 #include "core/folders.h"
 #include "core/sandboxed_path.h"
 #include "core/text.h"
@@ -19,26 +20,60 @@ namespace fs = std::filesystem;
 constexpr size_t kMostImages = 200000, kMostFiles = 10 * kMostImages;
 constexpr size_t kShownName = 200;
 
-/// Folders beside the images that hold pictures of another kind.
+/// Folders beside the images that hold pictures of another kind, smaller copies, or the undistorted images of a workspace.
 bool is_of_others(const fs::path& folder) {
+    constexpr std::string_view kOthers[] = {"mask", "depth", "confidence", "."}, kSmaller = "images_";
     const std::string name = core::lower(folder.filename().string());
-    return name.starts_with("mask") || name.starts_with("depth") || name.starts_with("confidence") ||
-           name.starts_with("images_") || name.starts_with(".");
+    if (name.starts_with(kSmaller) &&
+        core::parse_integer<int>(std::string_view(name).substr(kSmaller.size())))
+        return true;
+    return std::ranges::any_of(kOthers, [&](std::string_view other) { return name.starts_with(other); }) ||
+           name == "dense" || name == "undistorted" || is_made_by_ewa(folder);
 }
 
-/// How many parts of the paths are the same, from the end.
+std::vector<std::string> keys_of(const fs::path& folders) {
+    std::vector<std::string> keys;
+    for (const fs::path& part : folders) keys.push_back(name_key(part));
+    return keys;
+}
+
+/// How many parts of the folders' paths are the same, from the end.
 size_t common_parts(const fs::path& a, const fs::path& b) {
-    const std::vector<fs::path> x(a.begin(), a.end()), y(b.begin(), b.end());
+    const std::vector<std::string> x = keys_of(a), y = keys_of(b);
     return size_t(std::mismatch(x.rbegin(), x.rend(), y.rbegin(), y.rend()).first - x.rbegin());
 }
 
-/// Also of paths that were written on Windows.
-std::string with_slashes(std::string name) {
-    std::replace(name.begin(), name.end(), '\\', '/');
-    return name;
+/// The file at the path, which may lack its extension.
+std::optional<fs::path> exact(const fs::path& folder, const fs::path& name) {
+    for (const char* extension : {"", ".png", ".jpg", ".jpeg"})
+        if (fs::path longer = name.string() + extension; core::is_file(folder / longer)) return longer;
+    return std::nullopt;
+}
+
+bool is_below_images(const fs::path& name) {
+    const std::string first = core::lower(name.begin()->string());
+    return first == "images" || first == "input";
 }
 
 }  // namespace
+
+fs::path entry_in(const fs::path& folder, const std::string& name) {
+    std::error_code error;
+    std::string found = name;
+    if (fs::exists(folder / name, error)) return folder / name;
+    for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
+        if (const std::string entry = at->path().filename().string();
+            core::lower(entry) == core::lower(name) && (found == name || entry < found))
+            found = entry;
+    return folder / found;
+}
+
+bool is_made_by_ewa(const fs::path& folder) {
+    return core::is_file(folder / "capture.json") ||
+           (core::is_file(folder / "config.json") &&
+            (core::is_file(folder / "metrics.jsonl") || core::is_file(folder / "checkpoint.ewa") ||
+             core::is_file(folder / "splats.ply")));
+}
 
 bool is_named_as_image(const fs::path& file) {
     static constexpr std::array kExtensions{".jpg",  ".jpeg", ".png", ".tif", ".tiff",
@@ -47,70 +82,141 @@ bool is_named_as_image(const fs::path& file) {
     return std::ranges::find(kExtensions, extension) != kExtensions.end();
 }
 
-ImageFinder::ImageFinder(const fs::path& dataset, const std::vector<std::string>& folders)
-    : place_(dataset), folder_(dataset / "images") {
-    for (const std::string& name : folders)
-        if (core::is_folder(dataset / name)) {
-            place_ = folder_ = dataset / name;
-            own_folder_ = false;
-            break;
-        }
+std::string name_key(const fs::path& name) {
+    return core::lower(core::composed(name.string()));
+}
+
+fs::path named_path(const std::string& name) {
+    if (name.find('\0') != std::string::npos) return {};
+    std::string text = name;
+    std::replace(text.begin(), text.end(), '\\', '/');
+    if (text.size() > 1 && text[1] == ':') text.erase(0, 2);
+    fs::path path;
+    for (const fs::path& part : fs::path(text).lexically_normal())
+        if (part != "/" && part != ".." && part != ".") path /= part;
+    return path.has_filename() ? path : fs::path();
+}
+
+std::vector<fs::path> list_images(const fs::path& folder, bool below, bool (*named)(const fs::path&)) {
+    std::vector<fs::path> names;
     size_t files = 0;
     std::error_code error;
     constexpr auto kOptions = fs::directory_options::skip_permission_denied;
-    for (fs::recursive_directory_iterator at(place_, kOptions, error), end; at != end; at.increment(error)) {
+    for (fs::recursive_directory_iterator at(folder, kOptions, error), end; at != end; at.increment(error)) {
         if (error) break;
-        if (++files > kMostFiles || names_.size() > kMostImages)
-            throw InputError(core::one_line(place_.string()) + ": holds more than 200000 images");
-        if (at->is_directory(error) && is_of_others(at->path())) at.disable_recursion_pending();
-        if (is_named_as_image(at->path()) && core::is_file(at->path()))
-            names_.push_back(at->path().lexically_relative(place_));
+        if (++files > kMostFiles || names.size() > kMostImages)
+            throw InputError(core::one_line(folder.string()) + ": holds more than 200000 images");
+        if (at->is_directory(error) && (!below || is_of_others(at->path()))) at.disable_recursion_pending();
+        if (named(at->path()) && !at->path().filename().string().starts_with("._") &&
+            core::is_file(at->path()))
+            names.push_back(at->path().lexically_relative(folder));
     }
-    std::sort(names_.begin(), names_.end());
-    for (size_t i = 0; i < names_.size(); ++i) {
-        by_name_[core::lower(names_[i].filename().string())].push_back(i);
-        by_stem_[core::lower(names_[i].stem().string())].push_back(i);
-    }
+    std::sort(names.begin(), names.end());
+    return names;
 }
 
-std::vector<size_t> ImageFinder::named(const fs::path& name) const {
-    const auto look = [](const auto& map, const fs::path& key) {
-        const auto found = map.find(core::lower(key.string()));
-        return found == map.end() ? std::vector<size_t>() : found->second;
+ImageFinder::ImageFinder(std::vector<Place> places) : places_(std::move(places)) {}
+
+ImageFinder::ImageFinder(const fs::path& dataset, const std::vector<std::string>& folders) {
+    for (const std::string& name : folders)
+        if (const fs::path folder = entry_in(dataset, name); core::is_folder(folder))
+            places_.push_back({folder});
+    places_.push_back({dataset, true});
+}
+
+fs::path ImageFinder::folder() const {
+    return settled().own ? settled().folder / "images" : settled().folder;
+}
+
+const ImageFinder::Listing& ImageFinder::listing(size_t place) const {
+    const auto [at, is_new] = listings_.try_emplace(place);
+    Listing& list = at->second;
+    if (!is_new) return list;
+    list.names = list_images(places_[place].folder, places_[place].below);
+    for (size_t i = 0; i < list.names.size(); ++i) {
+        list.by_name[name_key(list.names[i].filename())].push_back(i);
+        list.by_stem[name_key(list.names[i].stem())].push_back(i);
+    }
+    return list;
+}
+
+std::vector<fs::path> ImageFinder::matches(size_t place, const fs::path& name, bool strict) const {
+    const fs::path& folder = places_[place].folder;
+    if (const auto there = exact(folder, name)) return {*there};
+    const Listing& list = listing(place);
+    const fs::path above = name.parent_path();
+    // Whoever removes an image from a folder does not want another of the same name from elsewhere.
+    const bool there = strict || (!above.empty() && core::is_folder(folder / above));
+    const auto look = [&](const auto& map, const fs::path& key) {
+        std::vector<fs::path> found;
+        const auto at = map.find(name_key(key));
+        if (at == map.end()) return found;
+        size_t most = 0;
+        for (const size_t i : at->second) found.push_back(list.names[i]);
+        for (const fs::path& each : found) most = std::max(most, common_parts(each.parent_path(), above));
+        std::erase_if(found, [&](const fs::path& each) {
+            const fs::path parent = each.parent_path();
+            return there ? name_key(parent) != name_key(above) : common_parts(parent, above) < most;
+        });
+        if (found.size() > 1 && std::ranges::any_of(found, is_below_images))
+            std::erase_if(found, [](const fs::path& each) { return !is_below_images(each); });
+        return found;
     };
-    std::vector<size_t> found = look(by_name_, name.filename());
-    if (found.empty()) found = look(by_stem_, name.filename());
-    if (found.empty()) found = look(by_stem_, name.stem());
+    std::vector<fs::path> found = look(list.by_name, name.filename());
+    if (found.empty()) found = look(list.by_stem, name.filename());
+    if (found.empty()) found = look(list.by_stem, name.stem());
     return found;
 }
 
-ImageFinder::Found ImageFinder::find(const std::string& text, const std::string& where) const {
-    const std::string shown = "the image \"" + core::one_line(text.substr(0, kShownName)) + "\" ";
-    fs::path name = core::name_inside(with_slashes(text)).value_or(fs::path());
-    if (name.empty()) {
-        const std::string path = with_slashes(text);
-        name = core::name_inside(path.substr(path.rfind('/') + 1)).value_or(fs::path());
-    }
-    if (name.empty()) throw InputError(where + ": " + shown + "has no file's name");
-    std::vector<size_t> found;
-    if (!std::binary_search(names_.begin(), names_.end(), name)) found = named(name);
-    const auto common = [&](size_t i) { return common_parts(names_[i], name); };
+void ImageFinder::settle(const std::vector<std::string>& names) const {
+    std::vector<fs::path> paths;
+    for (const std::string& name : names)
+        if (fs::path path = named_path(name); !path.empty()) paths.push_back(std::move(path));
     size_t most = 0;
-    for (const size_t i : found) most = std::max(most, common(i));
-    std::erase_if(found, [&](size_t i) { return common(i) < most; });
+    for (size_t place = 0; place < places_.size(); ++place) {
+        const fs::path& folder = places_[place].folder;
+        const auto at_path = std::ranges::count_if(
+            paths, [&](const fs::path& path) { return exact(folder, path).has_value(); });
+        const auto found = 2 * size_t(at_path) >= paths.size()
+                               ? paths.size()
+                               : size_t(std::ranges::count_if(paths, [&](const fs::path& path) {
+                                     return matches(place, path, at_path > 0).size() == 1;
+                                 }));
+        if (found <= most) continue;
+        most = found;
+        place_ = place;
+        strict_ = at_path > 0;
+        if (most == paths.size()) return;
+    }
+}
+
+std::optional<ImageFinder::Found> ImageFinder::find_in(size_t place, const fs::path& name,
+                                                       const std::string& where) const {
+    const auto& [folder, own, below] = places_[place];
+    const std::vector<fs::path> found = matches(place, name, strict_);
     if (found.size() > 1)
-        throw InputError(where + ": " + shown + "is one of " + std::to_string(found.size()) + " images in " +
-                         core::one_line(place_.string()) + ", such as " +
-                         core::one_line(names_[found[0]].string()) + " and " +
-                         core::one_line(names_[found[1]].string()) + "; give the images different names");
-    if (found.size() == 1) name = names_[found[0]];
-    const bool inside = own_folder_
-                            ? core::links_stay_with_images(place_, name)
-                            : core::links_stay_with_images(place_.parent_path(), place_.filename() / name);
-    if (!inside)
-        throw InputError(where + ": " + shown + "is a link out of the dataset's folder; " +
-                         core::kLinkAdvice);
-    return {place_ / name, name.string()};
+        throw InputError(where + "is one of " + std::to_string(found.size()) + " images in " +
+                         core::one_line(folder.string()) + ", such as " + core::one_line(found[0].string()) +
+                         " and " + core::one_line(found[1].string()) + "; give the images different names");
+    const fs::path& chosen = found.empty() ? name : found[0];
+    const bool inside = own ? core::links_stay_with_images(folder, chosen)
+                            : core::links_stay_with_images(folder.parent_path(), folder.filename() / chosen);
+    if (!inside) throw InputError(where + "is a link out of the dataset's folder; " + core::kLinkAdvice);
+    if (found.empty()) return std::nullopt;
+    return Found{folder / chosen, chosen.string()};
+}
+
+ImageFinder::Found ImageFinder::find(const std::string& text, const std::string& where) const {
+    const std::string shown = where + ": the image \"" + core::one_line(text.substr(0, kShownName)) + "\" ";
+    const fs::path name = named_path(text);
+    if (name.empty()) throw InputError(shown + "has no file's name");
+    for (size_t place = place_.value_or(0); place < (place_ ? *place_ + 1 : places_.size()); ++place)
+        if (auto found = find_in(place, name, shown)) {
+            place_ = place;
+            return *found;
+        }
+    const fs::path inside = core::name_inside(text).value_or(name.filename());
+    return {settled().folder / inside, inside.string()};
 }
 
 }  // namespace ewa::io

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The images of a dataset whose cameras' file names them as they were on another machine: by path, by file name, or by a label
-// without an extension.
+// The images of a dataset, whose cameras' file may name them as they were on another machine: by a path that is gone, by file name,
+// with another extension or in another case, or by a label without an extension.
 #pragma once
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,36 +12,72 @@ namespace ewa::io {
 
 class ImageFinder {
   public:
-    /// Lists the images in and below the first of these folders of the dataset that exists; without one, those in the dataset's
-    /// own folder. Throws InputError if there are more than 200,000.
+    /// A folder that may hold the images.
+    struct Place {
+        std::filesystem::path folder;
+        bool own = false;   // it holds other things too, such as the images' folder
+        bool below = true;  // also in the folders below it
+    };
+
+    /// The places, the likeliest first. All images are in one of them.
+    explicit ImageFinder(std::vector<Place> places);
+    /// These folders of the dataset, as far as they exist, and then its own.
     ImageFinder(const std::filesystem::path& dataset, const std::vector<std::string>& folders);
+
+    /// Chooses the place by all names of the cameras' file. Without it, the place of the first image that is found counts. Then only
+    /// names without a path that exists are searched in other folders of the place.
+    void settle(const std::vector<std::string>& names) const;
 
     struct Found {
         std::filesystem::path path;
-        std::string name;  // relative to folder()
+        std::string name;  // relative to the place
     };
-    /// A missing image is a path at which no file is. The extension may differ. Among several images with the name, the one
+    /// A missing image is a path at which no file is. Among several images with the name, the one
     /// counts whose path has most in common. Throws InputError that begins with `where` if that is not one image, if the name is no file's,
-    /// or if the image is a link out of the dataset.
+    /// or if the image is a link out of the dataset, or if there are more than 200,000 images.
     Found find(const std::string& name, const std::string& where) const;
 
     /// The folder of the images. It is the dataset's images/ if they lie in the dataset's own folder.
-    const std::filesystem::path& folder() const { return folder_; }
-    /// All images, relative to place(), in the order of names.
-    const std::vector<std::filesystem::path>& names() const { return names_; }
-    /// The folder that was listed.
-    const std::filesystem::path& place() const { return place_; }
+    std::filesystem::path folder() const;
 
   private:
-    std::vector<size_t> named(const std::filesystem::path& name) const;
+    struct Listing {
+        std::vector<std::filesystem::path> names;                     // relative to the place, sorted
+        std::map<std::string, std::vector<size_t>> by_name, by_stem;  // by their keys
+    };
+    const Place& settled() const { return places_[place_.value_or(0)]; }
+    const Listing& listing(size_t place) const;
+    /// The images of a place that have the name.
+    std::vector<std::filesystem::path> matches(size_t place, const std::filesystem::path& name,
+                                               bool strict) const;
+    std::optional<Found> find_in(size_t place, const std::filesystem::path& name,
+                                 const std::string& where) const;
 
-    std::filesystem::path place_, folder_;
-    bool own_folder_ = true;  // whether the images lie in the dataset's own folder
-    std::vector<std::filesystem::path> names_;
-    std::map<std::string, std::vector<size_t>> by_name_, by_stem_;  // in lower case
+    std::vector<Place> places_;
+    mutable std::map<size_t, Listing> listings_;  // by index of the place
+    mutable std::optional<size_t> place_;
+    mutable bool strict_ = false;  // the place has images at the paths that the file names
 };
+
+/// The entry of the folder with this name; else one whose name differs in case alone (ASCII). folder / name if there is none.
+std::filesystem::path entry_in(const std::filesystem::path& folder, const std::string& name);
+
+/// Whether ewa has made the folder: a training run, or a dataset of photos. Its pictures are no photos.
+bool is_made_by_ewa(const std::filesystem::path& folder);
 
 /// Whether the file's name is that of an image that ewa reads.
 bool is_named_as_image(const std::filesystem::path& file);
+
+/// The images in the folder, and in those below it but for folders of other pictures (masks, depth maps, smaller copies) and results
+/// of ewa. Relative to it, in the order of names. named: which files count. Throws InputError if there are more than 200,000.
+std::vector<std::filesystem::path> list_images(
+    const std::filesystem::path& folder, bool below,
+    bool (*named)(const std::filesystem::path&) = is_named_as_image);
+
+/// The name as it is compared: equal for names that differ in case (ASCII), or in how letters with marks are written.
+std::string name_key(const std::filesystem::path& name);
+
+/// The path that a file names, also one of Windows or of another machine, as a path below some folder. Empty if it names no file.
+std::filesystem::path named_path(const std::string& name);
 
 }  // namespace ewa::io
