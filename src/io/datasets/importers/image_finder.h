@@ -37,6 +37,8 @@ class ImageFinder {
     /// or if the image is a link out of the dataset, or if there are more than 200,000 images.
     Found find(const std::string& name, const std::string& where) const;
 
+    /// All images of the place, relative to it and sorted. Without one that is chosen, those of the likeliest place.
+    const std::vector<std::filesystem::path>& names() const { return listing(place_.value_or(0)).names; }
     /// The folder of the images. It is the dataset's images/ if they lie in the dataset's own folder.
     std::filesystem::path folder() const;
 
