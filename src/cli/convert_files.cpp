@@ -12,6 +12,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 #include "io/splats/formats.h"
+#include "io/splats/levels.h"
 #include "io/splats/tileset.h"
 
 namespace ewa::cli {
@@ -48,9 +49,7 @@ uint64_t bytes_of(const std::vector<fs::path>& files) {
 void check_not_a_part(const fs::path& out, const fs::path& input) {
     const fs::path folder = fs::weakly_canonical(input).parent_path();
     const std::string name = folder.filename().string();
-    const bool chunk =
-        name.find('_') != std::string::npos && name.find_first_not_of("0123456789_") == std::string::npos;
-    if ((names_tileset(out) ? io::names_tile_folder(name) : chunk) &&
+    if ((names_tileset(out) ? io::names_tile_folder(name) : io::names_chunk_folder(name)) &&
         folder.parent_path() == fs::weakly_canonical(out).parent_path())
         throw InputError(core::one_line(out.string()) + ": would replace its parts, of which an input, " +
                          core::one_line(input.string()) + ", is one; write to another folder");

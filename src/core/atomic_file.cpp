@@ -105,6 +105,7 @@ AtomicFile::AtomicFile(const std::filesystem::path& path, Readers readers) : tar
 AtomicFile::~AtomicFile() {
     if (descriptor_ >= 0) close(descriptor_);
     if (!temporary_.empty()) unlink(temporary_.c_str());
+    if (claimed_) unlink(target_.c_str());
     if (listed_ >= 0) unfinished[listed_].state = Unfinished::free;
 }
 
@@ -119,12 +120,25 @@ void AtomicFile::write(const void* bytes, size_t count) {
     }
 }
 
+bool AtomicFile::claim(const std::filesystem::path& name) {
+    const int file = open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (file < 0 && errno == EEXIST) return false;
+    if (claimed_) unlink(target_.c_str());
+    claimed_ = false;
+    target_ = name;
+    if (file < 0) fail("cannot be written");
+    close(file);
+    claimed_ = true;
+    return true;
+}
+
 void AtomicFile::commit() {
     // Network and quota file systems may report a full disk only here.
     if (fsync(descriptor_) != 0 && errno != EINVAL && errno != EROFS) fail("cannot be written to disk");
     if (close(std::exchange(descriptor_, -1)) != 0) fail("cannot be written to disk");
     if (rename(temporary_.c_str(), target_.c_str()) != 0) fail("cannot be put in place");
     temporary_.clear();
+    claimed_ = false;
     // The directory holds the new name. The file itself is on disk already, so a failure is no error.
     const std::filesystem::path parent = target_.has_parent_path() ? target_.parent_path() : ".";
     const int directory = open(parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);

@@ -37,6 +37,10 @@ class AtomicFile {
     void write(const void* bytes, size_t count);
     void write(std::string_view text) { write(text.data(), text.size()); }
 
+    /// Takes another name in the same folder in place of the path's, and holds it by an empty file until commit(). False if
+    /// any file has the name already: of several processes, one gets it.
+    bool claim(const std::filesystem::path& name);
+
     /// Flushes everything to disk, then renames. Call once, last.
     void commit();
 
@@ -46,6 +50,7 @@ class AtomicFile {
     std::filesystem::path target_, temporary_;
     int descriptor_ = -1;
     int listed_ = -1;  // for remove_unfinished_files()
+    bool claimed_ = false;
 };
 
 /// Replaces the content of a file. On failure, throws RunError and the file keeps its content.

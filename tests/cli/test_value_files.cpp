@@ -4,6 +4,7 @@
 
 #include <csignal>
 #include <filesystem>
+#include <future>
 
 #include "cli/expect.h"
 #include "cli/faulty.h"
@@ -146,6 +147,39 @@ TEST(ValueFiles, UnpacksASogAndLeavesOtherImagesAlone) {
     const Outcome info = run_ewa({"info", folder / "sog/other.json", "--json"});
     expect_success(info);
     EXPECT_EQ(nlohmann::json::parse(info.out)["variant"], "version 2, unpacked");
+}
+
+/// Several programs write one file. Each result is that of one of them, and nothing else is left.
+TEST(ValueFiles, SeveralWritersAtOnce) {
+    const Folder folder;
+    for (int i = 0; i < 4; ++i) make_splats(folder / std::to_string(i), 1000 + 500 * i);
+    for (const std::string name : {"g.gltf", "meta.json", "lod-meta.json", "tileset.json"})
+        for (int round = 0; round < 3; ++round) {
+            SCOPED_TRACE(name);
+            const std::string out = folder / ("out-" + name + "/" + name);
+            std::vector<std::future<Outcome>> writers;
+            for (int i = 0; i < 4; ++i)
+                writers.push_back(std::async(std::launch::async, [&, i] {
+                    return run_ewa({"convert", folder / std::to_string(i), out, "--quiet"});
+                }));
+            for (auto& writer : writers) expect_success(writer.get());
+            if (name == "tileset.json") continue;
+            const size_t splats = ewa::load_splats(out).size();
+            EXPECT_TRUE(splats >= 1000 && splats <= 2500 && splats % 500 == 0) << splats;
+        }
+}
+
+/// A .gltf of another program keeps its values, which others may use.
+TEST(ValueFiles, LeavesTheValuesOfOtherPrograms) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    const std::vector<std::string> convert{"convert", folder / "s.ply", folder / "g.gltf", "--quiet"};
+    expect_success(run_ewa(convert));
+    std::string text = read_file(folder / "g.gltf");
+    text.replace(text.find("ewa "), 4, "Blender ");
+    write_file(folder / "g.gltf", text);
+    expect_success(run_ewa(convert));
+    EXPECT_EQ(files_below(folder / ""), (Names{"g-2.bin", "g.bin", "g.gltf", "s.ply"}));
 }
 
 /// A kill between two renames leaves values that nobody names. The next conversion takes other names.

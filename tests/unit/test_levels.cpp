@@ -152,6 +152,58 @@ TEST(Levels, TheSameBytesTwice) {
         EXPECT_EQ(test::file_bytes(folder / "a" / file), test::file_bytes(folder / "b" / file)) << file;
 }
 
+TEST(Levels, AnEarlierOneIsReplacedAtOnce) {
+    namespace fs = std::filesystem;
+    const TempFolder folder;
+    SaveOptions options;
+    options.levels = 2;
+    fs::create_directory(folder / "0_0");
+    folder.write("0_0/meta.json", "somebody's");
+    folder.write("0_0/quats.webp", "somebody's");
+    const auto save = [&](size_t splats) {
+        save_splats(folder / "lod-meta.json", wide_scene(splats), options);
+        EXPECT_EQ(load_splats(folder / "lod-meta.json").size(), splats);
+        for (const char* name : {"0_0/meta.json", "0_0/quats.webp"})
+            EXPECT_EQ(test::file_bytes(folder / name), "somebody's") << name;
+    };
+    const auto names = [&] { return read_json(folder / "lod-meta.json")["filenames"]; };
+    save(300);
+    EXPECT_EQ(names(), json({"0_0-2/meta.json", "1_0/meta.json"}));
+    save(200);
+    EXPECT_EQ(names(), json({"0_0-3/meta.json", "1_0-2/meta.json"}));
+    save(100);
+    EXPECT_EQ(names(), json({"0_0-2/meta.json", "1_0/meta.json"}));
+    EXPECT_EQ(test::files_in(folder.path()), 4u);
+    // The chunks of another program's file, and a chunk that somebody has replaced.
+    folder.write("1_0/meta.json", "somebody's");
+    save(100);
+    EXPECT_EQ(test::file_bytes(folder / "1_0/meta.json"), "somebody's");
+    EXPECT_FALSE(fs::exists(folder / "0_0-2"));
+    json other = read_json(folder / "lod-meta.json");
+    const std::string chunk = other["filenames"][0];
+    other["asset"]["generator"] = "another program";
+    folder.write("lod-meta.json", other.dump());
+    save(100);
+    EXPECT_EQ(read_json(folder / chunk)["count"], 100);
+}
+
+TEST(Levels, WhatAKilledOrFailedWritingLeftIsRemoved) {
+    namespace fs = std::filesystem;
+    const TempFolder folder;
+    for (const char* name : {"0_0", "1_0"}) {
+        fs::create_directory(folder / name);
+        folder.write(std::string(name) + "/means_l.webp", "left");
+        folder.write(std::string(name) + "/.ewa-unfinished", "0_0\n");
+    }
+    fs::create_directory(folder / "lod-meta.json");
+    EXPECT_THROW(save_splats(folder / "lod-meta.json", wide_scene(100)), RunError);
+    EXPECT_EQ(test::files_in(folder.path()), 3u);
+    fs::remove(folder / "lod-meta.json");
+    save_splats(folder / "lod-meta.json", wide_scene(100));
+    EXPECT_EQ(test::files_in(folder.path()), 2u);
+    EXPECT_EQ(load_splats(folder / "lod-meta.json").size(), 100u);
+}
+
 TEST(Levels, SmallScenesHaveOneLevel) {
     const TempFolder folder;
     save_splats(folder / "lod-meta.json", wide_scene(100));

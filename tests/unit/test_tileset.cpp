@@ -14,6 +14,7 @@
 #include "core/folders.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "io/splats/part_folders.h"
 #include "support/splat_scenes.h"
 #include "support/temp_folder.h"
 
@@ -213,19 +214,50 @@ TEST(Tileset, TilesOfKilledProcessesAreRemoved) {
     for (const char* name : {"tiles", "tiles-2", "tiles-3", "tiles-4", "tiles-5", "tiles-old"}) {
         fs::create_directories(folder / name);
         std::ofstream(folder / name / "0_0.glb") << "left";
+        std::ofstream(folder / name / io::kUnfinished) << name << "\n";
     }
     std::ofstream(folder / "tiles-3/mine.txt") << "somebody's";
-    std::ofstream(folder / "kept.json") << R"({"root": {"content": {"uri": "tiles-4/0_0.glb"}}})";
+    std::ofstream(folder / "kept.json") << R"({"root": {"content": {"uri": "tiles-4\/0_0.glb"}}})";
     {
         const core::FolderLock used(folder / "tiles-5");
         write(folder, scene, 1);
     }
     for (const char* name : {"tiles", "tiles-2"}) EXPECT_FALSE(fs::exists(folder / name)) << name;
-    for (const char* name : {"tiles-3", "tiles-4", "tiles-5", "tiles-6", "tiles-old"})
+    for (const char* name : {"tiles-3/mine.txt", "tiles-4/0_0.glb", "tiles-5", "tiles-6", "tiles-old"})
         EXPECT_TRUE(fs::exists(folder / name)) << name;
+    EXPECT_FALSE(fs::exists(folder / "tiles-3/0_0.glb"));
     write(folder, scene, 1);
     EXPECT_TRUE(fs::exists(folder / "tiles/0_0.glb"));
     for (const char* name : {"tiles-5", "tiles-6"}) EXPECT_FALSE(fs::exists(folder / name)) << name;
+}
+
+TEST(Tileset, FoldersOfOtherProgramsStay) {
+    namespace fs = std::filesystem;
+    const test::TempFolder folder;
+    const Gaussians scene = test::storable_splats(6, 10, 0);
+    std::ofstream(folder / "tileset.json")
+        << R"({"asset": {"generator": "other"}, "root": {"content": {"uri": "tiles/0_0.glb"}}})";
+    const std::vector<std::string> theirs = {"tiles/0_0.glb", "tiles/5_7.glb", "tiles-2/1_0.glb"};
+    for (const std::string& name : theirs) {
+        fs::create_directories((folder / name).parent_path());
+        std::ofstream(folder / name) << "mine";
+    }
+    for (int again = 0; again < 3; ++again) {
+        write(folder, scene, 1);
+        for (const std::string& name : theirs) EXPECT_EQ(test::file_bytes(folder / name), "mine") << name;
+        EXPECT_EQ(test::files_in(folder.path()), 4u);  // two of theirs, one of ewa's and the tileset.json
+    }
+    // A tile that somebody has put in the place of one of ewa's, and a tileset that names ewa's in another way.
+    const fs::path tile = io::tile_files(folder / "tileset.json").at(0);
+    std::ofstream(tile) << "mine";
+    write(folder, scene, 1);
+    EXPECT_EQ(test::file_bytes(tile), "mine");
+    const fs::path shared = io::tile_files(folder / "tileset.json").at(0);
+    const std::string own = shared.parent_path().filename().string();
+    std::ofstream(folder / "city.json") << R"({"root": {"contents": [{"uri": ")" << own
+                                        << R"(/0_0.glb"}]}, "uri": ")" << own << R"(/{level}_{x}.glb"})";
+    write(folder, scene, 1);
+    EXPECT_TRUE(fs::exists(shared));
 }
 
 TEST(Tileset, FindsTheTilesOfAVeryLargeOne) {

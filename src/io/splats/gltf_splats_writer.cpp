@@ -166,13 +166,16 @@ std::string percent_encoded(const std::string& text) {
 /// Both files are on disk before either is renamed. The new values have another name than the old ones. The rename of
 /// the .gltf thus replaces all of it at once.
 void write_pair(const std::filesystem::path& path, Json root, const ValueWriter& write_values) {
-    const ValueFiles beside = gltf_value_files(path);
-    const std::filesystem::path& buffer = beside.written[0];
-    root["buffers"][0]["uri"] = percent_encoded(buffer.filename().string());
-    core::AtomicFile values(buffer), file(path);
-    write_values(values);
+    const ValueFiles before = gltf_value_files(path);
+    std::vector<std::unique_ptr<core::AtomicFile>> values;
+    values.push_back(std::make_unique<core::AtomicFile>(before.written[0]));
+    write_values(*values[0]);
+    const Paths names = claim_names(values, before.usual);
+    root["buffers"][0]["uri"] = percent_encoded(names[0].filename().string());
+    core::AtomicFile file(path);
     file.write(root.dump(1) + "\n");
-    values.commit();
+    values[0]->commit();
+    const ValueFiles beside = gltf_value_files(path);
     file.commit();
     remove_values(beside);
 }

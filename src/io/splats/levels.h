@@ -13,10 +13,14 @@
 // A bound is the box of the leaf's ellipsoids at one standard deviation, over all levels. The frame is that of an INRIA PLY.
 #pragma once
 #include <cstddef>
+#include <string_view>
 
 namespace ewa::io {
 
 inline constexpr const char* kLevelsName = "lod-meta.json";
 inline constexpr size_t kMostLevels = 32;
+
+/// Whether write_levels makes folders with such a name: LEVEL_CHUNK, or with a number more where that existed.
+bool names_chunk_folder(std::string_view name);
 
 }  // namespace ewa::io

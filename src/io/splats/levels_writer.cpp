@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes streamed SOG, whose layout levels.h describes.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "core/atomic_file.h"
-#include "core/folders.h"
 #include "ewa/splat_edit.h"
 #include "io/splats/formats.h"
 #include "io/splats/levels.h"
+#include "io/splats/part_folders.h"
+#include "io/splats/sog.h"
 #include "io/splats/splat_tree.h"
 #include "scene/decimate.h"
 
@@ -48,10 +49,14 @@ double rounded(double value) {
     return std::strtod(text, nullptr);
 }
 
+bool is_in_chunk(const std::filesystem::path& file) {
+    return file.filename() == kSogMeta || std::ranges::count(kSogImages, without_number(file)) > 0;
+}
+
 class LevelsWriter {
   public:
     LevelsWriter(const std::filesystem::path& path, const SaveOptions& options, size_t splats)
-        : path_(path), options_(options) {
+        : path_(path), options_(options), folders_(path, {level_files, names_chunk_folder, is_in_chunk}) {
         const bool until_coarse = options.levels == 0;
         size_t size = splats;
         do {
@@ -69,9 +74,7 @@ class LevelsWriter {
             if (level > 0) scene::decimate_traced(g, sizes_[level], {.errors = &errors_});
             write_level(g, level);
         }
-        core::AtomicFile file(path_);
-        file.write(meta().dump() + "\n");
-        file.commit();
+        folders_.replace(meta().dump() + "\n");
         std::vector<std::string> remarks;
         if (sizes_.size() > 1) {
             std::string text = "levels of ";
@@ -110,7 +113,7 @@ class LevelsWriter {
     void write_chunk(Gaussians& chunk, size_t level) {
         std::string folder = std::to_string(level);
         folder.append("_").append(std::to_string(chunks_++));
-        core::make_folder(path_.parent_path() / folder);
+        folder = folders_.add(folder);
         SaveOptions options = options_;
         options.progress = {};
         lost_ = write_sog_rows(path_.parent_path() / folder / "meta.json", chunk, options);
@@ -185,6 +188,7 @@ class LevelsWriter {
 
     std::filesystem::path path_;
     const SaveOptions& options_;
+    PartFolders folders_;
     std::vector<size_t> sizes_;  // of the levels
     std::vector<TreeNode> nodes_;
     std::vector<NodeRows> rows_;  // of each node
@@ -194,6 +198,10 @@ class LevelsWriter {
 };
 
 }  // namespace
+
+bool names_chunk_folder(std::string_view name) {
+    return is_pair_of_numbers(without_number(name));
+}
 
 std::vector<std::string> write_levels(const std::filesystem::path& path, Gaussians gaussians,
                                       const SaveOptions& options) {

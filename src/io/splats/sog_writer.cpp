@@ -43,11 +43,9 @@ std::vector<uint32_t> order_of_scene(const Gaussians& gaussians) {
     return order;
 }
 
-/// The files of a SOG: their names and contents. meta.json comes last.
+/// The images of a SOG, and the meta.json that names them.
 class SogPacker {
   public:
-    using Files = std::vector<std::pair<std::string, std::string>>;
-
     SogPacker(const Gaussians& gaussians, const SaveOptions& options, bool morton)
         : g_(gaussians),
           options_(options),
@@ -60,9 +58,8 @@ class SogPacker {
     bool fits() const { return height_ <= kMostWebpSide && width_ <= kMostWebpSide; }
     uint64_t palette() const { return palette_; }  // its rows
 
-    /// images: the names of the images, in the order of kSogImages.
-    Files pack(const Paths& images) {
-        for (const std::filesystem::path& image : images) names_.push_back(image.filename().string());
+    /// The images, in the order of kSogImages.
+    std::vector<std::string> images() {
         meta_["version"] = 2;
         meta_["asset"]["generator"] = "ewa " EWA_VERSION;
         meta_["count"] = g_.size();
@@ -73,17 +70,25 @@ class SogPacker {
         add_rotations();
         add_colors();
         if (g_.sh_degree > 0 && g_.size() > 0) add_sh();
-        files_.emplace_back(kSogMeta, meta_.dump() + "\n");
-        return std::move(files_);
+        return std::move(images_);
+    }
+
+    /// The text of the meta.json for images of these names.
+    std::string meta(const Paths& names) const {
+        ordered_json meta = meta_;
+        for (ordered_json& part : meta)
+            if (part.is_object() && part.contains("files"))
+                for (ordered_json& file : part["files"]) file = names[file.get<size_t>()].filename().string();
+        return meta.dump() + "\n";
     }
 
   private:
     void add_image(const char* part, SogImage image, const std::vector<uint8_t>& rgba, uint64_t width,
                    uint64_t height) {
-        files_.emplace_back(names_[size_t(image)], encode_webp(rgba, width, height));
-        meta_[part]["files"].push_back(names_[size_t(image)]);
+        images_.push_back(encode_webp(rgba, width, height));
+        meta_[part]["files"].push_back(size_t(image));
         const size_t all = g_.sh_degree > 0 ? kSogImages.size() : kSogImages.size() - 2;
-        if (options_.progress) options_.progress(g_.size() * files_.size() / all, g_.size());
+        if (options_.progress) options_.progress(g_.size() * images_.size() / all, g_.size());
     }
 
     /// Adds an image with a pixel per splat, which pixel_of(i) gives.
@@ -180,8 +185,7 @@ class SogPacker {
     const std::vector<uint32_t> order_;
     uint64_t width_ = 0, height_ = 0, palette_ = 0;
     ordered_json meta_;
-    std::vector<std::string> names_;
-    Files files_;
+    std::vector<std::string> images_;
 };
 
 std::vector<std::string> remarks_of(const Gaussians& gaussians, uint64_t palette) {
@@ -220,8 +224,9 @@ std::string pack_sog(const std::filesystem::path& path, const Gaussians& gaussia
                      const SaveOptions& options, std::vector<std::string>& remarks) {
     SogPacker packer = packer_for(path, gaussians, options);
     ArchiveWriter archive;
-    for (const auto& [name, bytes] : packer.pack(Paths(kSogImages.begin(), kSogImages.end())))
-        archive.add(name, bytes);
+    const std::vector<std::string> images = packer.images();
+    for (size_t i = 0; i < images.size(); ++i) archive.add(kSogImages[i], images[i]);
+    archive.add(kSogMeta, packer.meta(Paths(kSogImages.begin(), kSogImages.end())));
     remarks = remarks_of(gaussians, packer.palette());
     return archive.finish();
 }
@@ -237,15 +242,18 @@ namespace {
 std::vector<std::string> write_meta(const std::filesystem::path& path, const Gaussians& gaussians,
                                     const SaveOptions& options, bool morton) {
     SogPacker packer = packer_for(path, gaussians, options, morton);
-    const ValueFiles beside = sog_value_files(path);
-    // All files are on disk before any is renamed, and meta.json comes last. Its rename replaces the SOG at once.
-    std::vector<std::unique_ptr<core::AtomicFile>> files;
-    for (const auto& [name, bytes] : packer.pack(beside.written)) {
-        files.push_back(
-            std::make_unique<core::AtomicFile>(name == kSogMeta ? path : path.parent_path() / name));
-        files.back()->write(bytes);
+    const ValueFiles before = sog_value_files(path);
+    std::vector<std::unique_ptr<core::AtomicFile>> images;
+    for (const std::string& bytes : packer.images()) {
+        images.push_back(std::make_unique<core::AtomicFile>(before.written[images.size()]));
+        images.back()->write(bytes);
     }
-    for (const auto& file : files) file->commit();
+    // All files are on disk before any is renamed, and meta.json comes last. Its rename replaces the SOG at once.
+    core::AtomicFile meta(path);
+    meta.write(packer.meta(claim_names(images, before.usual)));
+    for (const auto& image : images) image->commit();
+    const ValueFiles beside = sog_value_files(path);
+    meta.commit();
     remove_values(beside);
     return remarks_of(gaussians, packer.palette());
 }

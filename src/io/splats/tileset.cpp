@@ -7,10 +7,7 @@
 #include <glm/glm.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <set>
 
-#include "core/atomic_file.h"
 #include "core/folders.h"
 #include "core/json.h"
 #include "core/sandboxed_path.h"
@@ -18,6 +15,7 @@
 #include "ewa/splat_edit.h"
 #include "io/splats/formats.h"
 #include "io/splats/gltf_splats.h"
+#include "io/splats/part_folders.h"
 #include "io/splats/splat_tree.h"
 
 namespace ewa::io {
@@ -65,92 +63,18 @@ double usual_width(const Gaussians& g) {
     return 2 * std::exp(double(*middle));
 }
 
-bool is_number(std::string_view text) {
-    return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
-}
-
-/// Whether write_tileset has made this tile for a tileset.json in the folder.
-bool is_own_tile(const std::filesystem::path& tile, const std::filesystem::path& folder) {
-    const std::string name = tile.stem().string();
-    const size_t middle = name.find('_');
-    return tile.extension() == ".glb" && middle != std::string::npos && is_number(name.substr(0, middle)) &&
-           is_number(name.substr(middle + 1)) && tile.parent_path().parent_path() == folder &&
-           names_tile_folder(tile.parent_path().filename().string());
-}
-
-/// A new folder beside the tileset.json. The destructor removes it, unless it was kept.
-class NewFolder {
-  public:
-    explicit NewFolder(const std::filesystem::path& above) {
-        core::make_folder(above);
-        for (int number = 1;; ++number) {
-            name_ = kFolder;
-            if (number > 1) name_.append("-").append(std::to_string(number));
-            path_ = above / name_;
-            std::error_code error;
-            if (std::filesystem::create_directory(path_, error)) {
-                lock_.emplace(path_);
-                return;
-            }
-            if (error && error != std::errc::file_exists)
-                throw RunError("cannot make the folder " + path_.string() + ": " + error.message());
-        }
-    }
-    ~NewFolder() {
-        std::error_code ignored;
-        if (!kept_) std::filesystem::remove_all(path_, ignored);
-    }
-    NewFolder(const NewFolder&) = delete;
-    NewFolder& operator=(const NewFolder&) = delete;
-
-    const std::string& name() const { return name_; }
-    void keep() { kept_ = true; }
-
-  private:
-    std::string name_;
-    std::filesystem::path path_;
-    std::optional<core::FolderLock> lock_;  // tells other processes that it is in use
-    bool kept_ = false;
-};
-
-/// Whether a folder has tiles alone that write_tileset has made.
-bool is_own_tile_folder(const std::filesystem::path& folder) {
-    std::error_code error;
-    if (std::filesystem::symlink_status(folder, error).type() != std::filesystem::file_type::directory)
-        return false;
-    std::filesystem::directory_iterator entries(folder, error);
-    return !error && std::all_of(begin(entries), end(entries), [&](const auto& entry) {
-        return entry.is_regular_file(error) && is_own_tile(entry.path(), folder.parent_path());
-    });
-}
-
-/// Removes the folders of tiles that killed processes left beside the tileset, unless a .json there names them. own: its folder's name.
-void remove_abandoned_tiles(const std::filesystem::path& above, const std::string& own) {
-    std::vector<std::filesystem::path> folders, texts;
-    std::error_code ignored;
-    for (const auto& entry : std::filesystem::directory_iterator(above.empty() ? "." : above, ignored)) {
-        const std::filesystem::path path = above / entry.path().filename();
-        if (path.extension() == ".json") texts.push_back(path);
-        if (path.filename() == own || !names_tile_folder(path.filename().string())) continue;
-        core::remove_abandoned_files(path);
-        if (is_own_tile_folder(path)) folders.push_back(path);
-    }
-    if (folders.empty()) return;
-    std::set<std::filesystem::path> named;
-    for (const std::filesystem::path& text : texts)
-        for (const std::filesystem::path& tile : tile_files(text)) named.insert(tile.parent_path());
-    for (const std::filesystem::path& folder : folders) try {
-            if (named.contains(folder)) continue;
-            const core::FolderLock unused(folder);
-            std::filesystem::remove_all(folder, ignored);
-        } catch (const RunError&) {  // another process writes it
-        }
+/// Whether write_tileset gives tiles such names.
+bool is_tile(const std::filesystem::path& file) {
+    return file.extension() == ".glb" && is_pair_of_numbers(file.stem().string());
 }
 
 class TilesetWriter {
   public:
     TilesetWriter(const std::filesystem::path& path, const TilesetOptions& options)
-        : path_(path), options_(options), folder_(path.parent_path()) {}
+        : path_(path),
+          options_(options),
+          folders_(path, {tile_files, names_tile_folder, is_tile}),
+          folder_(folders_.add(kFolder)) {}
 
     std::vector<std::string> write(Gaussians g) {
         const glm::dvec3 origin = g.origin;
@@ -166,7 +90,7 @@ class TilesetWriter {
             write_level(g, level);
         }
         join();
-        replace(structure(origin).dump(1) + "\n");
+        folders_.replace(structure(origin).dump(1) + "\n");
         std::string text = std::to_string(written_) + " tiles of levels with ";
         for (size_t level = 0; level < levels; ++level)
             text.append(level == 0 ? "" : ", ").append(std::to_string(sizes[level]));
@@ -181,22 +105,6 @@ class TilesetWriter {
     }
 
   private:
-    /// Replaces the tileset.json, and with it all tiles at once.
-    void replace(const std::string& text) {
-        const std::vector<std::filesystem::path> before = tile_files(path_);
-        core::AtomicFile file(path_);
-        file.write(text);
-        file.commit();
-        folder_.keep();
-        std::error_code ignored;
-        for (const std::filesystem::path& tile : before) {
-            if (!is_own_tile(tile, path_.parent_path())) continue;
-            std::filesystem::remove(tile, ignored);
-            std::filesystem::remove(tile.parent_path(), ignored);  // works once it is empty
-        }
-        remove_abandoned_tiles(path_.parent_path(), folder_.name());
-    }
-
     void plan(const Gaussians& g) {
         const int levels = options_.save.levels;
         // A half of a node with more has at least as many as a tile should.
@@ -241,8 +149,7 @@ class TilesetWriter {
             part.means[i] = float(double(part.means[i]) - tile.origin[int(i % 3)]);
         tile.splats = part.size();
         tile.error = tile.level == 0 ? 0 : kErrorPerWidth * usual_width(part);
-        tile.file =
-            folder_.name() + "/" + std::to_string(tile.level) + "_" + std::to_string(written_++) + ".glb";
+        tile.file = folder_ + "/" + std::to_string(tile.level) + "_" + std::to_string(written_++) + ".glb";
         SaveOptions options = options_.save;
         options.progress = {};
         write_cesium_tile(path_.parent_path() / tile.file, part, options, loss_);
@@ -300,7 +207,8 @@ class TilesetWriter {
     const TilesetOptions& options_;
     std::vector<TreeNode> nodes_;
     std::vector<Tile> tiles_;
-    NewFolder folder_;
+    PartFolders folders_;
+    const std::string folder_;
     SpzLoss loss_;
     int deepest_ = 0;
     size_t written_ = 0;
@@ -324,10 +232,8 @@ glm::dmat4 earth_of_place(const Place& place) {
     return {glm::dvec4(right, 0), glm::dvec4(-up, 0), glm::dvec4(forward, 0), glm::dvec4(at, 1)};
 }
 
-bool names_tile_folder(const std::string& name) {
-    const std::string start = kFolder;
-    return name == start ||
-           (name.starts_with(start + "-") && is_number(std::string_view(name).substr(start.size() + 1)));
+bool names_tile_folder(std::string_view name) {
+    return without_number(name) == kFolder;
 }
 
 std::vector<std::filesystem::path> tile_files(const std::filesystem::path& tileset) try {

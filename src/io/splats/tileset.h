@@ -14,6 +14,7 @@
 #include <glm/mat4x4.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "ewa/gaussians.h"
@@ -45,7 +46,7 @@ std::vector<std::string> write_tileset(const std::filesystem::path& path, Gaussi
                                        const TilesetOptions& options);
 
 /// Whether this is the name of a folder that write_tileset makes.
-bool names_tile_folder(const std::string& name);
+bool names_tile_folder(std::string_view name);
 
 /// The tiles of an existing tileset.json that are in or below its folder. Empty if it cannot be read.
 std::vector<std::filesystem::path> tile_files(const std::filesystem::path& tileset);

@@ -2,32 +2,24 @@
 #include "io/splats/value_files.h"
 
 #include <algorithm>
+#include <fstream>
 #include <string>
 #include <system_error>
 
+#include "core/atomic_file.h"
 #include "core/text.h"
 
 namespace ewa::io {
 
 namespace {
 
-/// a.bin, a-2.bin, a-3.bin and so on.
-std::filesystem::path numbered(const std::filesystem::path& usual, int number) {
-    if (number == 1) return usual;
-    std::string name = usual.stem().string();
-    name.append("-").append(std::to_string(number)).append(usual.extension().string());
-    return usual.parent_path() / name;
+bool is_digits(std::string_view text) {
+    return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
 }
 
 bool is_numbered(const std::filesystem::path& file, const std::filesystem::path& usual) {
-    const std::string name = file.filename().string(), stem = usual.stem().string(),
-                      end = usual.extension().string();
     if (file.lexically_normal().parent_path() != usual.lexically_normal().parent_path()) return false;
-    if (name.size() < stem.size() + end.size() || !name.starts_with(stem) || !name.ends_with(end))
-        return false;
-    const std::string number = name.substr(stem.size(), name.size() - stem.size() - end.size());
-    return number.empty() || (number.size() > 1 && number[0] == '-' &&
-                              number.find_first_not_of("0123456789", 1) == std::string::npos);
+    return file.filename() == usual.filename() || without_number(file) == usual.filename().string();
 }
 
 /// Also a link that leads nowhere has a name.
@@ -57,14 +49,31 @@ Paths named_by_others(const std::filesystem::path& naming, Paths (*named_by)(con
 
 }  // namespace
 
+std::filesystem::path numbered(const std::filesystem::path& usual, int number) {
+    if (number == 1) return usual;
+    std::string name = usual.stem().string();
+    name.append("-").append(std::to_string(number)).append(usual.extension().string());
+    return usual.parent_path() / name;
+}
+
+std::string without_number(const std::filesystem::path& file) {
+    std::string name = file.stem().string();
+    const size_t dash = name.rfind('-');
+    if (dash != std::string::npos && dash > 0 && is_digits(std::string_view(name).substr(dash + 1)))
+        name.resize(dash);
+    return name + file.extension().string();
+}
+
 ValueFiles value_files(const std::filesystem::path& naming, const Paths& usual,
                        Paths (*named_by)(const std::filesystem::path&)) {
     ValueFiles files;
+    files.usual = usual;
     for (int number = 1; files.written.empty(); ++number) {
         Paths names;
         for (const std::filesystem::path& name : usual) names.push_back(numbered(name, number));
         if (std::ranges::all_of(names, is_free)) files.written = std::move(names);
     }
+    if (!written_by_ewa(naming)) return files;
     for (const std::filesystem::path& file : named_by(naming))
         if (std::ranges::any_of(usual, [&](const auto& name) { return is_numbered(file, name); }))
             files.removed.push_back(file);
@@ -74,6 +83,28 @@ ValueFiles value_files(const std::filesystem::path& naming, const Paths& usual,
         return std::ranges::any_of(others, [&](const auto& other) { return is_same(other, file); });
     });
     return files;
+}
+
+Paths claim_names(const std::vector<std::unique_ptr<core::AtomicFile>>& files, const Paths& usual) {
+    for (int number = 1;; ++number) {
+        Paths names;
+        for (const std::filesystem::path& name : usual) names.push_back(numbered(name, number));
+        if (!std::ranges::all_of(names, is_free)) continue;
+        size_t claimed = 0;
+        while (claimed < files.size() && files[claimed]->claim(names[claimed])) ++claimed;
+        if (claimed == files.size()) return names;
+    }
+}
+
+bool written_by_ewa(const std::filesystem::path& file) {
+    std::string head(1024, '\0');
+    std::ifstream stream(file, std::ios::binary);
+    stream.read(head.data(), std::streamsize(head.size()));
+    head.resize(size_t(stream.gcount()));
+    std::erase_if(head, [](char c) { return c == ' ' || c == '\n' || c == '\r' || c == '\t'; });
+    constexpr std::string_view kGenerator = R"("generator":"ewa)";
+    const size_t at = head.find(kGenerator);
+    return at != std::string::npos && is_digits(std::string_view(head).substr(at + kGenerator.size(), 1));
 }
 
 void remove_values(const ValueFiles& files) {

@@ -4,7 +4,13 @@
 // touched.
 #pragma once
 #include <filesystem>
+#include <memory>
+#include <string>
 #include <vector>
+
+namespace ewa::core {
+class AtomicFile;
+}
 
 namespace ewa::io {
 
@@ -12,17 +18,31 @@ using Paths = std::vector<std::filesystem::path>;
 
 /// What writing a naming file does beside it.
 struct ValueFiles {
+    Paths usual;
     Paths written;
     Paths removed;  // older values, once the naming file is in its place
 };
 
 /// `usual`: the names of the values where all of them are free; else all end in -2, in -3 and so on. `named_by`: the
 /// values that an existing naming file names, empty if there is none. Values of `naming` with such a
-/// name are removed, unless another naming file in the folder names them too.
+/// name are removed if ewa wrote it, unless another naming file in the folder names them too.
 ValueFiles value_files(const std::filesystem::path& naming, const Paths& usual,
                        Paths (*named_by)(const std::filesystem::path&));
 
+/// Gives files that are still to be committed the names of `usual`, or those with the first number that all of them can have.
+/// Files of other processes keep theirs.
+Paths claim_names(const std::vector<std::unique_ptr<core::AtomicFile>>& files, const Paths& usual);
+
 /// Failures are ignored: the values are of no use, and no harm.
 void remove_values(const ValueFiles& files);
+
+/// a.bin, a-2.bin, a-3.bin and so on.
+std::filesystem::path numbered(const std::filesystem::path& usual, int number);
+
+/// The file's name in the form of the first one.
+std::string without_number(const std::filesystem::path& file);
+
+/// Whether the asset.generator at the beginning of a JSON or .glb says so.
+bool written_by_ewa(const std::filesystem::path& file);
 
 }  // namespace ewa::io
