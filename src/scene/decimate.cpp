@@ -11,8 +11,10 @@
 #include <nanoflann.hpp>
 #include <numbers>
 #include <numeric>
+#include <string>
 
 #include "core/parallel.h"
+#include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "scene/splat_arrays.h"
 #include "scene/splat_shape.h"
@@ -133,21 +135,27 @@ double cost(const Shape& a, const Shape& b, double color) {
     return change.squared / std::pow(std::max(change.both, kSmallest), kRelative);
 }
 
-/// Splats whose means are the first at their place: a query of a tree would visit all that share one.
+/// Splats whose means are the first at their place: a query of a tree would visit all that share one. Value: of coordinates and
+/// squared distances.
+template <class Value>
 struct Places {
-    const Gaussians* gaussians = nullptr;
-    std::vector<uint32_t> splats;
+    const Gaussians& gaussians;
+    const std::vector<uint32_t>& splats;
 
     size_t kdtree_get_point_count() const { return splats.size(); }
-    float kdtree_get_pt(size_t i, size_t axis) const { return gaussians->means[3 * splats[i] + axis]; }
+    Value kdtree_get_pt(size_t i, size_t axis) const { return gaussians.means[3 * splats[i] + axis]; }
     template <class Box>
     bool kdtree_get_bbox(Box&) const {
         return false;
     }
 };
 
-using PlaceTree =
-    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Places>, Places, 3, uint32_t>;
+template <class Value>
+using PlaceTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<Value, Places<Value>>,
+                                                      Places<Value>, 3, uint32_t>;
+
+/// Squares of coordinates up to this, and sums of them, are finite in float32.
+constexpr float kFarthestInFloat = 1e18f;
 
 struct Pair {
     float cost = std::numeric_limits<float>::max();
@@ -213,7 +221,7 @@ class Round {
     }
 
     /// The first splat of each place, in order of the places. Each other splat there is paired with the one before.
-    Places find_places() {
+    std::vector<uint32_t> find_places() {
         std::vector<uint32_t> order(g_.size());
         std::iota(order.begin(), order.end(), 0u);
         const auto before = [&](uint32_t a, uint32_t b) {
@@ -222,10 +230,10 @@ class Round {
         };
         std::sort(order.begin(), order.end(),
                   [&](uint32_t a, uint32_t b) { return before(a, b) || (!before(b, a) && a < b); });
-        Places places{&g_, {}};
+        std::vector<uint32_t> places;
         for (size_t k = 0; k < order.size(); ++k)
             if (k == 0 || before(order[k - 1], order[k]))
-                places.splats.push_back(order[k]);
+                places.push_back(order[k]);
             else
                 pairs_[kBestOfThem * order[k]] = pair_of(shape_of(order[k]), order[k], order[k - 1]);
         return places;
@@ -233,18 +241,27 @@ class Round {
 
     void find_pairs() {
         pairs_.assign(kBestOfThem * g_.size(), {});
-        const Places places = find_places();
-        const PlaceTree tree(3, places);
-        for_all(places.splats.size(), [&](size_t at) {
-            const uint32_t i = places.splats[at];
+        const std::vector<uint32_t> places = find_places();
+        const bool near =
+            std::ranges::all_of(g_.means, [](float v) { return std::abs(v) < kFarthestInFloat; });
+        near ? find_pairs_among<float>(places) : find_pairs_among<double>(places);
+    }
+
+    template <class Value>
+    void find_pairs_among(const std::vector<uint32_t>& splats) {
+        const Places<Value> places{g_, splats};
+        const PlaceTree<Value> tree(3, places);
+        for_all(splats.size(), [&](size_t at) {
+            const uint32_t i = splats[at];
             const Shape shape = shape_of(i);
             std::array<uint32_t, kNeighbors + 1> near{};  // i itself is one of them
-            std::array<float, kNeighbors + 1> squared{};
+            std::array<Value, kNeighbors + 1> squared{};
+            const std::array<Value, 3> here = {g_.means[3 * i], g_.means[3 * i + 1], g_.means[3 * i + 2]};
             std::array<Pair, kNeighbors> pairs{};
-            const size_t found = tree.knnSearch(&g_.means[3 * i], near.size(), near.data(), squared.data());
+            const size_t found = tree.knnSearch(here.data(), near.size(), near.data(), squared.data());
             size_t count = 0;
             for (size_t k = 0; k < found && count < pairs.size(); ++k)
-                if (const uint32_t j = places.splats[near[k]]; j != i) pairs[count++] = pair_of(shape, i, j);
+                if (const uint32_t j = splats[near[k]]; j != i) pairs[count++] = pair_of(shape, i, j);
             const size_t best = std::min(count, kBestOfThem);
             std::partial_sort(pairs.begin(), pairs.begin() + std::ptrdiff_t(best),
                               pairs.begin() + std::ptrdiff_t(count));
@@ -333,7 +350,11 @@ void merge_rounds(Gaussians& gaussians, size_t target, const scene::MergeTrace& 
                   const std::function<void(size_t)>& progress) {
     target = std::max(target, size_t(1));
     while (gaussians.size() > target) {
+        const size_t before = gaussians.size();
         Round(gaussians, trace).run(target);
+        if (gaussians.size() == before)
+            throw RunError("no two of " + std::to_string(before) + " splats can be merged to have " +
+                           std::to_string(target));
         if (progress) progress(gaussians.size());
     }
 }

@@ -141,6 +141,25 @@ TEST(Decimate, ManyAtOnePlaceAndExtremes) {
     for (size_t i = 0; i < odd.size(); ++i) EXPECT_TRUE(drawable(odd, i)) << i;
 }
 
+/// Squares of such distances overflow float32.
+TEST(Decimate, SplatsAsFarAsFloatsGo) {
+    for (const float far : {3e19f, 1e30f, 3e38f})
+        for (const bool all : {false, true}) {
+            SCOPED_TRACE(testing::Message() << far << " " << all);
+            Gaussians g = test::storable_splats(5, 300, 0);
+            if (all)
+                for (float& v : g.means) v = v < 0 ? -far : far;
+            else
+                g.means[0] = far;
+            Gaussians to_one = g;
+            decimate_splats(g, 100);
+            EXPECT_EQ(g.size(), 100u);
+            for (size_t i = 0; i < g.size(); ++i) EXPECT_TRUE(drawable(g, i)) << i;
+            decimate_splats(to_one, 1);
+            EXPECT_EQ(to_one.size(), 1u);
+        }
+}
+
 TEST(Decimate, KeepsADensity) {
     Gaussians g = test::storable_splats(9, 100, 0);
     fit_opacities(g, true);
