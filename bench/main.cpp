@@ -5,6 +5,7 @@
 #include <new>
 
 #include "bench/bench.h"
+#include "core/exclusion.h"
 #include "core/text.h"
 #include "ewa/error.h"
 
@@ -26,6 +27,7 @@ int main(int argc, char** argv) {
     app.set_version_flag("--version", "ewa " EWA_VERSION);
     ewa::bench::Options options;
     ewa::bench::add_options(app, options);
+    ewa::core::refuse_empty_values<CLI::Validator>(app);
     try {
         app.parse(argc, argv);
         const int status = ewa::bench::run(options, {"/proc/self/exe"});

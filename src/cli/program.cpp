@@ -12,6 +12,7 @@
 #include "cli/interrupt.h"
 #include "cli/status.h"
 #include "cli/usage.h"
+#include "core/exclusion.h"
 #include "core/terminal.h"
 #include "core/text.h"
 
@@ -99,6 +100,7 @@ int run_arguments(int argc, char** argv) {
         command.action = command.add(*command.app);
         group_by_subject(*command.app);
     }
+    core::refuse_empty_values<CLI::Validator>(app);
 
     try {
         app.parse(argc, argv);

@@ -39,4 +39,16 @@ void check_exclusions(const Rows& rows, const Options& options) {
     }
 }
 
+/// Makes an empty value of any option an error: a shell variable that is not set gives one. Call it once all options are added.
+/// A template, so that this module does not need CLI11: Validator is CLI::Validator.
+template <class Validator, class App>
+void refuse_empty_values(App& app) {
+    const auto check = [](std::string& value) {
+        return std::string(value.empty() ? "the value is empty; leave the option out, or give it one" : "");
+    };
+    for (auto* option : app.get_options())
+        if (option->get_items_expected_max() > 0) option->transform(Validator(check, ""));
+    for (auto* command : app.get_subcommands({})) refuse_empty_values<Validator>(*command);
+}
+
 }  // namespace ewa::core

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/exclusion.h"
 #include "core/folders.h"
 #include "core/outputs.h"
 #include "core/pixel_size.h"
@@ -377,6 +378,7 @@ int main(int argc, char** argv) {
     Arguments arguments;
     add_options(app, arguments);
     group_options(app);
+    core::refuse_empty_values<CLI::Validator>(app);
     app.allow_extras();
     try {
         app.parse(argc, argv);
