@@ -34,6 +34,12 @@ void remove_files_and_end(int signal) {
     raise(signal);  // delivered when this handler returns: until then it is blocked
 }
 
+void remove_files_and_exit(int) {
+    core::remove_unfinished_files();
+    if (at_terminal) (void)!write(STDERR_FILENO, "\n", 1);
+    _exit(kInterruptedStatus);
+}
+
 /// Installs a handler during which the other signals are blocked. Returns the previous one.
 struct sigaction handle(int signal, void (*handler)(int)) {
     struct sigaction action {
@@ -44,6 +50,14 @@ struct sigaction handle(int signal, void (*handler)(int)) {
     for (const int other : kSignals) sigaddset(&action.sa_mask, other);
     sigaction(signal, &action, &before);
     return before;
+}
+
+/// Signals that are ignored stay so.
+void handle_all(void (*handler)(int)) {
+    for (const int signal : kSignals) {
+        const struct sigaction before = handle(signal, handler);
+        if (before.sa_handler == SIG_IGN) sigaction(signal, &before, nullptr);
+    }
 }
 
 }  // namespace
@@ -68,10 +82,12 @@ bool interrupted() {
 void remove_temporary_files_on_signals() {
     // A write beyond ulimit -f then fails, and says so.
     std::signal(SIGXFSZ, SIG_IGN);
-    for (const int signal : kSignals) {
-        const struct sigaction before = handle(signal, remove_files_and_end);
-        if (before.sa_handler == SIG_IGN) sigaction(signal, &before, nullptr);
-    }
+    handle_all(remove_files_and_end);
+}
+
+void end_on_signals() {
+    at_terminal = isatty(STDERR_FILENO) != 0;
+    handle_all(remove_files_and_exit);
 }
 
 }  // namespace ewa::cli

@@ -32,6 +32,9 @@ struct Interrupted {};
 /// ignored. A file size limit becomes an error of the write, as a full disk is.
 void remove_temporary_files_on_signals();
 
+/// The same for work that saves nothing, with kInterruptedStatus: in the middle of a long step, too.
+void end_on_signals();
+
 /// The exit status after Ctrl-C.
 inline constexpr int kInterruptedStatus = 130;
 

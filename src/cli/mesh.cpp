@@ -204,13 +204,10 @@ int make_mesh(const MeshArguments& arguments, const std::optional<live::Run>& ru
     mesh::meshing();  // says at once that it is missing
 
     Renderer renderer(open_device(arguments.device), gaussians, options);
-    const InterruptWatch watch;
+    end_on_signals();
     Progress progress("meshed", int((arguments.collision ? 2 : 3) * cameras.size()), "views",
                       arguments.quiet);
-    const auto done = [&](size_t steps) {
-        if (interrupted()) throw Interrupted();
-        progress.update(int(steps));
-    };
+    const auto done = [&](size_t steps) { progress.update(int(steps)); };
     const bool mean = at_mean_depth(arguments, run);
     mesh::DepthCache cache(cameras.size(), [&](size_t i) {
         Image seen = mean ? solid_mean_depth(renderer.render(cameras[i], Drawing::depth))

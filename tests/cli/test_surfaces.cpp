@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <glm/common.hpp>
@@ -11,6 +12,7 @@
 #include <numbers>
 
 #include "cli/expect.h"
+#include "cli/faulty.h"
 #include "ewa/image.h"
 #include "ewa/splat_files.h"
 #include "io/gltf/document.h"
@@ -57,6 +59,21 @@ struct Prepared : Folder {
 /// The number behind a word of a PLY's header.
 size_t header_count(const std::string& bytes, const std::string& word) {
     return std::stoul(bytes.substr(bytes.find(word) + word.size()));
+}
+
+/// The program stands still in its work for the device, and nothing lets it go on.
+TEST(Mesh, SignalsEndItInTheMiddleOfAStep) {
+    const Prepared folder;
+    for (const int signal : {SIGINT, SIGTERM}) {
+        Circumstances held = held_at(4, folder / "held", signal);
+        held.then = [] {};
+        const Outcome outcome = run_ewa({"mesh", folder / "shell.ply", "-o", folder / "out/m.ply",
+                                         "--cameras", folder / "data", "--quiet"},
+                                        held);
+        EXPECT_EQ(outcome.status, 130) << outcome.err;
+        EXPECT_EQ(outcome.err, "");
+        EXPECT_FALSE(std::filesystem::exists(folder / "out/m.ply"));
+    }
 }
 
 TEST(Mesh, OfAllFormatsAndTheSameTwice) {
