@@ -133,13 +133,13 @@ void Run::read_checkpoint(const TrainOptions& asked) {
     const bool points = options().train.loss.sfm_depth > 0;
     saves_.settings() = train::checkpoint_settings(
         options(), train::dataset_fingerprint(input_.dataset, input_.split, points));
-    if (earlier_ && options().robust && earlier_->reader->checkpoint().state.report.step > 0) {
+    if (!earlier_) return;
+    Json settings = saves_.settings();
+    if (options().robust && earlier_->reader->checkpoint().state.report.step > 0) {
         masks_ = train::saved_masks(input_);
-        saves_.settings()[train::kMasksSetting] = train::fingerprint_of(*masks_);
+        settings[train::kMasksSetting] = train::fingerprint_of(*masks_);
     }
-    if (earlier_)
-        train::check_resumable(folder_.checkpoint(), earlier_->reader->checkpoint().settings,
-                               saves_.settings());
+    train::check_resumable(folder_.checkpoint(), earlier_->reader->checkpoint().settings, settings);
 }
 
 /// Called as late as possible, since it ends an earlier run that is replaced.

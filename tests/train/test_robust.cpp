@@ -13,6 +13,7 @@
 #include "run/passers_by.h"
 #include "support/temp_folder.h"
 #include "support/thread_ranks.h"
+#include "train/checkpoint.h"
 #include "train/synthetic.h"
 
 namespace ewa::test {
@@ -254,6 +255,8 @@ TEST(Robust, ContinuesWithTheMasksOfItsFolder) {
         return line.find("find what images") != std::string::npos;
     }));
     EXPECT_EQ(file_bytes(folder / "cut/splats.ply"), file_bytes(folder / "whole/splats.ply"));
+    EXPECT_EQ(ewa::train::read_checkpoint_head(folder / "cut/checkpoint.ewa").settings,
+              ewa::train::read_checkpoint_head(folder / "whole/checkpoint.ewa").settings);
 
     RunOptions other = cut;
     other.robust = false;
