@@ -111,6 +111,12 @@ std::string all_kinds() {
 }
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& kinds) {
+    constexpr std::string_view kClouds[] = {".las", ".laz", ".e57", ".pcd", ".pts", ".ptx", ".xyz"};
+    if (std::ranges::count(kClouds, core::lower(path.extension().string())) > 0)
+        throw InputError(
+            core::one_line(path.string()) +
+            ": ewa reads point clouds as .ply alone; CloudCompare makes one of this, or of a .las "
+            "or .laz `pdal translate IN.las OUT.ply`");
     throw InputError(
         core::one_line(path.string() + ": not a supported kind of splat file; supported: " + kinds));
 }
