@@ -153,14 +153,6 @@ void check_before_scene(const TrainArguments& arguments) {
             video_frames(options.frames);
         else if (options.frames != "all" && searched)
             refuse_frames(options.frames, options.scene);
-        // COLMAP begins with a pair of photos that share a hundred points.
-        constexpr uint32_t kLeastPoints = 100;
-        const uint32_t most = options.train.max_splats;
-        if (searched && options.init == "sfm" && most != kAutomaticMaxSplats && most < kLeastPoints)
-            throw InputError(
-                fmt::format("--max-splats {}: training starts with a splat for each point that "
-                            "COLMAP finds, which are {} or more",
-                            most, kLeastPoints));
         if (const ImageSize size = smallest_image(options.scene); size.width > 0) {
             train::check_downscale(options.downscale, options.downscale, size.width, size.height,
                                    "the smallest image");

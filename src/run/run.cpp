@@ -188,6 +188,7 @@ TrainOptions Run::capped_options() const {
 /// Opens the device and tells the observer what the run begins with.
 void Run::start() {
     device_ = opening_.get();
+    if (!earlier_) train::thin_for_device(input_, *device_);
     RunStart start;
     start.memory = choose_cap();
     report_.title = input_.name;

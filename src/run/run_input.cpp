@@ -27,6 +27,7 @@
 #include "scene/dense_points.h"
 #include "scene/lens.h"
 #include "scene/names.h"
+#include "scene/thin_points.h"
 #include "shared/constants.h"
 #include "train/appearance_choice.h"
 #include "train/needs.h"
@@ -36,6 +37,9 @@ namespace ewa::train {
 namespace {
 
 constexpr uint32_t kRandomSplats = 50000;
+/// So many points are taken as they are, however small the photos.
+constexpr size_t kUsualPoints = 200000;
+constexpr const char* kOtherLimit = "; --max-splats N sets another limit";
 // A longer run adds splats by itself where they are needed. fox_270 gains 0.7 dB in 500 steps, and nothing in 1,000.
 constexpr int kDenseStartSteps = 700;
 constexpr double kPixelsOfDenseStart = 2;  // of an image, for each first splat
@@ -204,6 +208,7 @@ void add_remarks(RunInput& input, const StartSource& source) {
         input.remarks.push_back("the dataset has no points: training starts from " +
                                 start_without_points(source));
     if (!source.skipped.empty()) input.remarks.push_back(source.skipped);
+    if (!source.thinned.empty()) input.notes.push_back(source.thinned);
     if (input.options.init == "stereo")
         input.notes.push_back("training starts from " + start_without_points(source));
     if (const size_t points = dataset.points.positions.size();
@@ -272,6 +277,19 @@ void refuse_dense_start(const RunOptions& options, const std::string& start) {
         throw InputError("--dense-start on puts splats between points, and " + start + " has none");
 }
 
+/// How many points training starts from at the most.
+size_t most_points(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames) {
+    if (options.train.max_splats != kAutomaticMaxSplats) return options.train.max_splats;
+    return std::max<size_t>(kUsualPoints, cap_by_pixels(dataset, frames));
+}
+
+std::string thinned_note(size_t taken, size_t all, const RunOptions& options) {
+    std::string note = fmt::format("{} of {} points are taken, evenly", taken, all);
+    if (options.train.max_splats == kAutomaticMaxSplats)
+        note.append(": the photos have detail for no more").append(kOtherLimit);
+    return note;
+}
+
 Gaussians splats_of(const PointCloud& points, const RunOptions& options, const Dataset& dataset,
                     const std::vector<int>& frames) {
     const size_t wanted = dense_start_size(options, dataset, frames);
@@ -300,7 +318,9 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
             measured = points_of_depth_maps(dataset, frames, first_splats(options), options.train.seed);
         from = measured.positions.empty() ? StartsFrom::points : StartsFrom::depth_maps;
         const PointCloud& points = measured.positions.empty() ? dataset.points : measured;
-        if (!points.positions.empty()) start = splats_of(points, options, dataset, frames);
+        const size_t all = points.positions.size(), most = most_points(options, dataset, frames);
+        if (all > most) found.thinned = thinned_note(most, all, options);
+        if (all > 0) start = splats_of(scene::thinned(points, most), options, dataset, frames);
     }
     const bool chosen = options.init == "stereo";
     if (chosen || (options.init == "sfm" && start.size() == 0)) {
@@ -321,11 +341,14 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
         refuse_dense_start(options, options.init == "random" ? "--init random" : "the dataset");
         start = random_gaussians(dataset, frames, int(first_splats(options)), options.train.seed, degree);
     } else if (from == StartsFrom::file && io::is_point_cloud(file)) {
-        const io::PlyPoints cloud = io::read_points_ply(file);
+        const size_t most = most_points(options, dataset, frames);
+        const io::PlyPoints cloud = io::read_points_ply(file, most);
         if (cloud.dropped.count > 0)
             found.skipped = fmt::format("{} of {} skipped, since a coordinate is not finite: {}",
                                         core::counted(uint64_t(cloud.dropped.count), "point"), options.init,
                                         cloud.dropped.first);
+        found.cloud = true;
+        if (cloud.found > most) found.thinned = thinned_note(most, cloud.found, options);
         start = splats_of(cloud.points, options, dataset, frames);
     } else if (from == StartsFrom::file) {
         refuse_dense_start(options, options.init);
@@ -422,9 +445,27 @@ RunInput load_run(const RunOptions& options) {
     input.options.output = output_folder(options);
     StartSource source;
     input.start = initial_splats(input.options, input.dataset, input.split.train, &source);
+    input.from_points = source.from == StartsFrom::points || source.cloud;
     if (input.options.train.region) check_region(input.options.train, input.start);
     add_remarks(input, source);
     return input;
+}
+
+void thin_for_device(RunInput& input, const gpu::Device& device) {
+    const TrainOptions& train = input.options.train;
+    if (!input.from_points || train.max_splats != kAutomaticMaxSplats || train.device_memory_bytes > 0 ||
+        input.options.ranks->size() > 1)
+        return;
+    const TrainOptions resolved = resolve(train, input.dataset, input.split.train);
+    const size_t fit = Needs(device, input.dataset, input.split.train, input.start, resolved).fitting_start();
+    if (fit >= input.start.size()) return;
+    RunOptions fewer = input.options;
+    fewer.train.max_splats = uint32_t(fit);
+    StartSource source;
+    input.start = initial_splats(fewer, input.dataset, input.split.train, &source);
+    std::erase_if(input.notes, [](const std::string& note) { return note.ends_with(kOtherLimit); });
+    if (!source.thinned.empty())
+        input.notes.push_back(source.thinned + ": the device's memory has room for no more" + kOtherLimit);
 }
 
 namespace {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "ewa/device.h"
 #include "ewa/run_options.h"
 #include "run/viewed_sphere.h"
 #include "scene/frame_images.h"
@@ -17,6 +18,7 @@ struct RunInput {
     Dataset dataset;
     Split split;
     Gaussians start;
+    bool from_points = false;  // of a cloud, which can be thinned
     scene::KeptImages images;  // that are read already
     // For the user and the report: what ewa chose, and what may be wrong.
     std::vector<std::string> notes, remarks;
@@ -30,6 +32,9 @@ struct RunInput {
 /// Loads the dataset and the first splats. Throws InputError.
 RunInput load_run(const RunOptions& options);
 
+/// Starts from fewer points where the device has no room for a splat of each. Not for a number that the user sets.
+void thin_for_device(RunInput& input, const gpu::Device& device);
+
 /// Whether RunOptions::init is a word, and not a file.
 inline bool starts_by_word(const std::string& init) {
     return init == "sfm" || init == "stereo" || init == "random";
@@ -41,6 +46,8 @@ struct StartSource {
     StartsFrom from = StartsFrom::file;
     size_t points = 0, images = 0;  // of stereo
     std::string skipped;            // what of a file is skipped, and why; empty: nothing is
+    bool cloud = false;             // the file has points
+    std::string thinned;            // what to tell of points that are too many; empty: none are
 };
 
 /// The first splats that the options ask for. frames: indices of the training frames. options: with a concrete

@@ -41,6 +41,12 @@ double pixels_of(const Dataset& dataset, const std::vector<int>& frames) {
     return pixels;
 }
 
+size_t cap_by_pixels(const Dataset& dataset, const std::vector<int>& frames) {
+    return frames.empty()
+               ? 0
+               : size_t(kSplatsPerPixel * pixels_of(dataset, frames) / std::sqrt(double(frames.size())));
+}
+
 uint64_t limited_cache(const TrainOptions& options) {
     return std::min(options.image_cache_bytes, options.device_memory_bytes / 4);
 }
@@ -67,11 +73,18 @@ uint32_t Needs::fitting(uint32_t most) {
     return low;
 }
 
+size_t Needs::fitting_start() {
+    const MemoryEstimate needed = estimator_.up_to(uint32_t(start_));
+    const double bytes = kMemoryShare * double(device_info(device_).memory_bytes) - double(needed.images),
+                 own = double(needed.total() - needed.images);
+    return own <= bytes ? start_ : size_t(std::max(1.0, double(start_) * bytes / own));
+}
+
 SplatCap Needs::cap() {
     if (options_.max_splats != kAutomaticMaxSplats) return {options_.max_splats, "as asked for"};
     const auto first = uint32_t(start_);
-    const double pixels = pixels_of(dataset_, frames_), photos = double(frames_.size());
-    const double by_pixels = kSplatsPerPixel * pixels / std::sqrt(photos);
+    const double pixels = pixels_of(dataset_, frames_);
+    const auto by_pixels = double(cap_by_pixels(dataset_, frames_));
     const double by_steps = first + kSplatsPerStep * options_.steps;
     SplatCap cap{uint32_t(std::min({by_pixels, by_steps, 1e9})),
                  fmt::format("{} with {:.3g} million pixels have detail for no more",

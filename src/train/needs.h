@@ -15,6 +15,9 @@ void check_start(size_t splats, const TrainOptions& options);
 /// The number of pixels of all these frames together.
 double pixels_of(const Dataset& dataset, const std::vector<int>& frames);
 
+/// The number of splats for which these frames have detail.
+size_t cap_by_pixels(const Dataset& dataset, const std::vector<int>& frames);
+
 /// The bytes of the image cache of a training in several portions.
 uint64_t limited_cache(const TrainOptions& options);
 
@@ -27,6 +30,8 @@ class Needs {
 
     /// The largest number of splats.
     SplatCap cap();
+    /// About how many of the first splats fit in the device's memory; all of them if they do.
+    size_t fitting_start();
     MemoryEstimate memory(uint32_t max_splats) { return estimator_.up_to(max_splats); }
     /// Into how many portions each of `ranks` ranks divides its splats: 1 if the training fits in
     /// TrainOptions::device_memory_bytes. Such a training keeps within the limit too. The number comes from the splats at

@@ -9,6 +9,7 @@
 
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "io/datasets/image_records.h"
 #include "run/depth_points.h"
 #include "run/run_input.h"
 #include "support/temp_folder.h"
@@ -174,8 +175,64 @@ TEST(Initialise, StartsFromAFileOfPoints) {
     expect_error<InputError>([&] { initial_splats(options, {}, {}); }, {"this is a mesh"});
     options.init = folder.write("cut.ply", "ply\nformat ascii 1.0\nelement vertex 2\n").string();
     expect_error<InputError>([&] { initial_splats(options, {}, {}); }, {"cut.ply"});
+    for (const char* cloud : {"a.las", "b.LAZ", "c.e57"}) {
+        options.init = folder.write(cloud, "LASF").string();
+        expect_error<InputError>([&] { initial_splats(options, {}, {}); },
+                                 {cloud, "CloudCompare", "pdal translate"});
+    }
     options.init = folder.write("other.txt", "no").string();
     expect_error<InputError>([&] { initial_splats(options, {}, {}); }, {"other.txt"});
+}
+
+TEST(Initialise, ThinsACloudThatIsTooLarge) {
+    const TempFolder folder;
+    PointCloud cloud;
+    for (int i = 0; i < 200; ++i) {
+        // Most of them in a corner.
+        cloud.positions.emplace_back(i < 150 ? 1e-3 * i : i, i % 7, i % 3);
+        cloud.colors.push_back({uint8_t(i), 0, 0});
+    }
+    io::write_points_ply(folder / "cloud.ply", cloud);
+    Dataset dataset = circle({0, 0, 0}, true);
+    dataset.points = cloud;
+    RunOptions options;
+    options.train.sh_degree = 0;
+    for (const std::string& init : {std::string("sfm"), (folder / "cloud.ply").string()}) {
+        SCOPED_TRACE(init);
+        options.init = init;
+        options.train.max_splats = 100;
+        StartSource source;
+        const Gaussians start = initial_splats(options, dataset, every_frame(dataset), &source);
+        EXPECT_EQ(start.size(), 100u);
+        EXPECT_EQ(source.thinned, "100 of 200 points are taken, evenly");
+        EXPECT_EQ(initial_splats(options, dataset, every_frame(dataset)).means, start.means);
+        const auto sparse = [&] {
+            size_t count = 0;
+            for (size_t i = 0; i < start.size(); ++i) count += start.means[3 * i] >= 150;
+            return count;
+        };
+        EXPECT_GE(sparse(), 45u) << "of 50, since the others are close to each other";
+        options.train.max_splats = 200;
+        EXPECT_EQ(initial_splats(options, dataset, every_frame(dataset), &source).size(), 200u);
+        EXPECT_EQ(source.thinned, "");
+    }
+}
+
+TEST(Initialise, TakesAsManyPointsAsThePhotosShowWithoutALimit) {
+    Dataset dataset = circle({0, 0, 0}, true);
+    const auto frames = every_frame(dataset);
+    RunOptions options;
+    options.train.sh_degree = 0;
+    options.dense_start = DenseStart::off;
+    for (int i = 0; i < 250'000; ++i) {
+        dataset.points.positions.emplace_back(i % 500, i / 500, 0);
+        dataset.points.colors.push_back({0, 0, 0});
+    }
+    StartSource source;
+    EXPECT_EQ(initial_splats(options, dataset, frames, &source).size(), 200'000u);
+    EXPECT_EQ(source.thinned,
+              "200000 of 250000 points are taken, evenly: the photos have detail for no more; --max-splats N "
+              "sets another limit");
 }
 
 TEST(Initialise, StartsFromPointsOrRandomSplats) {
@@ -199,8 +256,9 @@ TEST(Initialise, StartsFromPointsOrRandomSplats) {
     EXPECT_EQ(initial_splats(options, dataset, frames).size(), 70u);
     options.init = "sfm";
     options.train.max_splats = 1;
-    expect_error<InputError>([&] { initial_splats(options, dataset, frames); },
-                             {"2 splats", "--max-splats 1"});
+    StartSource source;
+    EXPECT_EQ(initial_splats(options, dataset, frames, &source).size(), 1u);
+    EXPECT_EQ(source.thinned, "1 of 2 points are taken, evenly");
 }
 
 /// A dataset without points: two images of 20 x 10 pixels, the second with a depth map, in which a column has no depth.

@@ -12,6 +12,7 @@
 #include "ewa/error.h"
 #include "io/splats/ply_table.h"
 #include "scene/native_lens.h"
+#include "scene/thin_points.h"
 
 namespace ewa::io {
 
@@ -42,13 +43,24 @@ void note_partial_spheres(ImageRecords& records) {
         " degrees upright");
 }
 
-bool add_point(PointCloud& points, DroppedPoints& dropped, const glm::dvec3& position,
-               const std::array<uint8_t, 3>& color, const std::function<std::string()>& where) {
+namespace {
+
+/// Else counts it as dropped.
+bool is_finite_point(DroppedPoints& dropped, const glm::dvec3& position,
+                     const std::function<std::string()>& where) {
     for (int axis = 0; axis < 3; ++axis)
         if (!std::isfinite(static_cast<float>(position[axis]))) {
             if (dropped.count++ == 0) dropped.first = where();
             return false;
         }
+    return true;
+}
+
+}  // namespace
+
+bool add_point(PointCloud& points, DroppedPoints& dropped, const glm::dvec3& position,
+               const std::array<uint8_t, 3>& color, const std::function<std::string()>& where) {
+    if (!is_finite_point(dropped, position, where)) return false;
     points.positions.push_back(position);
     points.colors.push_back(color);
     return true;
@@ -73,7 +85,7 @@ bool is_point_cloud(const std::filesystem::path& path) {
            !vertex->find("opacity") && !vertex->find("f_dc_0");
 }
 
-PlyPoints read_points_ply(const std::filesystem::path& path) {
+PlyPoints read_points_ply(const std::filesystem::path& path, size_t most) {
     PlyTable table(path);
     const PlyElement& vertex = table.go_to("vertex");
     std::vector<size_t> columns;
@@ -93,15 +105,22 @@ PlyPoints read_points_ply(const std::filesystem::path& path) {
     const bool colored = columns.size() == 6;
 
     PlyPoints result;
+    scene::PointThinner thinner(most);
     table.read(columns, [&](size_t index, const double* row) {
         const auto byte = [&](double v) -> uint8_t {
             return v > 0 ? static_cast<uint8_t>(std::lround(std::min(v * color_scale, 255.0))) : uint8_t(0);
         };
         std::array<uint8_t, 3> color{128, 128, 128};
         if (colored) color = {byte(row[3]), byte(row[4]), byte(row[5])};
-        add_point(result.points, result.dropped, {row[0], row[1], row[2]}, color,
-                  [&] { return core::one_line(path.string()) + ": vertex " + std::to_string(index); });
+        const glm::dvec3 position(row[0], row[1], row[2]);
+        const auto where = [&] {
+            return core::one_line(path.string()) + ": vertex " + std::to_string(index);
+        };
+        if (!is_finite_point(result.dropped, position, where)) return;
+        thinner.add(position, color);
+        ++result.found;
     });
+    result.points = thinner.take();
     return result;
 }
 
