@@ -39,13 +39,11 @@ constexpr int kPerturbations = 3;
 constexpr double kLargest = FLT_MAX;
 constexpr uint64_t kFewPixels = 4, kPixelsEach = 200;  // that may be close to a threshold
 
-/// Moves each stored value by a relative kPerturbation, up or down.
-Values perturbed(const Values& values, const glm::dvec3& eye, uint32_t draw) {
+/// Moves each stored value by a relative `size`, up or down.
+Values perturbed(const Values& values, const glm::dvec3& eye, uint32_t draw, double size) {
     Values out = values;
     uint32_t counter = 0;
-    const auto sign = [&] {
-        return core::pcg4d({counter++, draw, 0x636f6e64u, 0})[0] & 1 ? kPerturbation : -kPerturbation;
-    };
+    const auto sign = [&] { return core::pcg4d({counter++, draw, 0x636f6e64u, 0})[0] & 1 ? size : -size; };
     const auto relative = [&](std::vector<double>& group) {
         for (double& v : group) v += v * sign();
     };
@@ -241,18 +239,17 @@ Expected expected_of(const StabilityCase& one, const Image& target) {
     return expected;
 }
 
-/// The errors of the reference under changes of each stored value, divided by the size of the change: the
-/// largest of several.
-std::vector<double> conditions_of(const StabilityCase& one, const Image& target, const Expected& expected) {
+/// The errors of the reference under changes of each stored value by `size`: the largest of several.
+std::vector<double> errors_under_changes(const StabilityCase& one, const Image& target,
+                                         const Expected& expected, double size) {
     std::vector<double> largest;
     for (uint32_t draw = 0; draw < kPerturbations; ++draw) {
         const ReferenceGradient moved = reference::loss_gradient(
-            perturbed(one.gaussians, one.camera.position(), draw), one.camera, target, one.options);
+            perturbed(one.gaussians, one.camera.position(), draw, size), one.camera, target, one.options);
         const auto errors =
             errors_of(expected, moved.rendered.blended.color, moved.loss, moved.gradient, moved.camera);
         largest.resize(errors.size());
-        for (size_t i = 0; i < errors.size(); ++i)
-            largest[i] = std::max(largest[i], errors[i].error / kPerturbation);
+        for (size_t i = 0; i < errors.size(); ++i) largest[i] = std::max(largest[i], errors[i].error);
     }
     return largest;
 }
@@ -260,6 +257,20 @@ std::vector<double> conditions_of(const StabilityCase& one, const Image& target,
 /// Without a finite condition number, the floor is the bound.
 double bound(double floor, double condition) {
     return std::isfinite(condition) ? std::max(floor, kRoundings * condition * kUnit) : floor;
+}
+
+void add_bounds(const StabilityCase& one, const Image& target, const Expected& expected,
+                std::vector<Comparison>& comparisons) {
+    const std::vector<double> errors = errors_under_changes(one, target, expected, kPerturbation);
+    for (size_t i = 0; i < errors.size(); ++i) {
+        comparisons[i].condition = errors[i] / kPerturbation;
+        comparisons[i].bound = bound(i < 2 ? kPictureFloor : kGradientFloor, comparisons[i].condition);
+    }
+    if (std::ranges::all_of(comparisons, &Comparison::good)) return;
+    // Changes as large as the roundings cross thresholds of the model, where the smaller ones do not.
+    const std::vector<double> crossing = errors_under_changes(one, target, expected, kRoundings * kUnit);
+    for (size_t i = 0; i < crossing.size(); ++i)
+        if (std::isfinite(crossing[i])) comparisons[i].bound = std::max(comparisons[i].bound, crossing[i]);
 }
 
 /// The comparison that is closest to its bound.
@@ -424,11 +435,7 @@ StabilityResult compare_with_reference(const std::shared_ptr<gpu::Device>& devic
         result.finite = result.finite && all_finite(group);
     });
     result.comparisons = errors_of(expected, color, actual.loss, actual.gradient, actual.camera);
-    const std::vector<double> conditions = conditions_of(one, target, expected);
-    for (size_t i = 0; i < conditions.size(); ++i) {
-        result.comparisons[i].condition = conditions[i];
-        result.comparisons[i].bound = bound(i < 2 ? kPictureFloor : kGradientFloor, conditions[i]);
-    }
+    add_bounds(one, target, expected, result.comparisons);
     return result;
 }
 
