@@ -3,6 +3,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -13,7 +14,9 @@
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "io/datasets/dataset_folders.h"
+#include "report/run_file_names.h"
 #include "report/summary.h"
+#include "run/option_table.h"
 #include "run/run_files.h"
 #include "train/checkpoint.h"
 
@@ -76,6 +79,47 @@ void check_no_dataset(const fs::path& folder, const RunOptions& options) {
                              " holds the photos, where no outputs belong; name another folder");
 }
 
+/// Whether a run of ewa's has begun in the folder, finished or not.
+bool holds_run(const fs::path& folder) {
+    const auto has = [&](const char* name) { return core::is_file(folder / name); };
+    return has(report::kConfigFile) &&
+           (has(report::kMetricsFile) || has(report::kSplatsFile) || has(report::kCheckpointFile));
+}
+
+/// Whether the file has options of a run alone.
+bool is_config(const fs::path& file) try {
+    const Json config = core::read_json_file<Json>(file);
+    const auto known = [](const auto& item) {
+        return std::ranges::any_of(run_options(),
+                                   [&](const RunOption& option) { return option.name == item.key(); });
+    };
+    const auto items = config.items();
+    return config.is_object() && std::all_of(items.begin(), items.end(), known);
+} catch (const InputError&) {
+    return false;
+}
+
+/// Throws InputError if a folder without a run has something with a name that a run writes or removes. Links are replaced.
+void check_no_names_of_others(const fs::path& folder) {
+    if (holds_run(folder)) return;
+    const auto refuse = [&](const fs::path& name) {
+        throw InputError(core::one_line(folder.string()) + ": holds " + core::one_line(name.string()) +
+                         ", which a run writes and no run of this folder has written; " + kReplace);
+    };
+    std::error_code absent;
+    const auto is = [&](const fs::path& name, fs::file_type type) {
+        return fs::symlink_status(folder / name, absent).type() == type;
+    };
+    for (const std::string_view name : report::kRunFiles)
+        if (is(name, fs::file_type::regular) &&
+            (name != report::kConfigFile || !is_config(folder / report::kConfigFile)))
+            refuse(name);
+    for (const char* name : report::kCameraModelFiles)
+        if (is(name, fs::file_type::regular)) refuse(name);
+    for (const char* name : {"test", "train", "inria", report::kPassersByFolder})
+        if (is(name, fs::file_type::directory) && !fs::is_empty(folder / name, absent)) refuse(name);
+}
+
 }  // namespace
 
 void check_free(const fs::path& folder, const RunOptions& options) {
@@ -91,7 +135,8 @@ void check_free(const fs::path& folder, const RunOptions& options) {
             run->psnr = summary->psnr;
         throw InputError(where + described(*run));
     }
-    if (!has("splats.ply") && !has("summary.json") && kept_splats(folder).empty()) return;
+    if (!has("splats.ply") && !has("summary.json") && kept_splats(folder).empty())
+        return check_no_names_of_others(folder);
     // Splats are saved just before the checkpoint. A kill between the two leaves no summary.
     if (options.resume && has("metrics.jsonl") && !has("summary.json")) return;
     const auto run = from_summary(folder);

@@ -159,6 +159,26 @@ TEST_F(RunFolders, NothingIsWrittenThroughLinks) {
     EXPECT_EQ(read_file(folder / "pictures/0.png"), "a picture");
 }
 
+/// What a run would replace or remove, in a folder where none has begun.
+TEST_F(RunFolders, FilesOfOthersWithTheNamesOfARunAreRefused) {
+    for (const std::string name : {"cameras.json", "sky.json", "report.html", "metrics.jsonl", "config.json",
+                                   "test/0.png", "inria/cfg_args", "passers_by/0.png"}) {
+        SCOPED_TRACE(name);
+        const std::string out = "o-" + name.substr(0, name.find('/'));
+        fs::create_directories(fs::path(folder / (out + "/" + name)).parent_path());
+        write_file(folder / (out + "/" + name), "{\"mine\": 1}");
+        expect_failure(train({"-o", out, "--steps", "2"}), 2,
+                       "holds " + name.substr(0, name.find('/')) + ", which a run writes");
+        EXPECT_EQ(read_file(folder / (out + "/" + name)), "{\"mine\": 1}");
+    }
+    expect_success(train({"-o", "o-sky.json", "--steps", "2", "--force"}));
+    fs::create_directory(folder / "o");
+    write_file(folder / "o/config.json", "{\"steps\": 2}");
+    write_file(folder / "o/notes.txt", "mine");
+    expect_success(train({"-o", "o", "--config", folder / "o/config.json"}));
+    EXPECT_EQ(read_file(folder / "o/notes.txt"), "mine");
+}
+
 TEST_F(RunFolders, ALinkOfAnotherUserInAFolderOfAllIsNotFollowed) {
     if (geteuid() != 0) GTEST_SKIP() << "needs root";
     constexpr uid_t kSomebody = 12345;
