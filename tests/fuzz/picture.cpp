@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as a picture. A PNG or JPEG is decoded; of every other format its probe is run. Each keeps to the
 // limits of pictures, or says in one line what is wrong.
-#include <zlib.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <string>
@@ -10,28 +8,13 @@
 #include "ewa/error.h"
 #include "image/image_files.h"
 #include "input.h"
+#include "png.h"
 
 namespace {
 
 using namespace ewa;
 
-constexpr size_t kPngSignature = 8, kPngLength = 4, kPngFrame = 12;  // length, type and checksum of a chunk
 constexpr uint64_t kDecodedPixels = 1 << 16;
-
-/// Gives each chunk of a PNG its checksum. Otherwise every mutation would end there.
-void sum_chunks(std::string& bytes) {
-    if (!bytes.starts_with("\x89PNG")) return;
-    const auto* data = reinterpret_cast<const Bytef*>(bytes.data());
-    for (size_t at = kPngSignature; at + kPngFrame <= bytes.size();) {
-        const uint64_t length = uint64_t(data[at]) << 24 | uint64_t(data[at + 1]) << 16 |
-                                uint64_t(data[at + 2]) << 8 | uint64_t(data[at + 3]);
-        if (length > bytes.size() - at - kPngFrame) break;
-        const auto sum = uint32_t(crc32_z(0, data + at + kPngLength, 4 + length));
-        const size_t end = at + kPngFrame - 4 + length;
-        for (size_t i = 0; i < 4; ++i) bytes[end + i] = char(sum >> (24 - 8 * i));
-        at = end + 4;
-    }
-}
 
 void check_size(const ImageSize& size) {
     const std::string text = std::to_string(size.width) + " x " + std::to_string(size.height);
@@ -85,7 +68,7 @@ void read_picture(const std::string& path, const std::string& bytes) {
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     static fuzz::MemoryFile file;
     std::string bytes(reinterpret_cast<const char*>(data), size);
-    sum_chunks(bytes);
+    fuzz::sum_png_chunks(bytes);
     const std::string& path = file.hold(reinterpret_cast<const uint8_t*>(bytes.data()), size);
     try {
         read_picture(path, bytes);

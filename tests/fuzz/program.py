@@ -3,11 +3,11 @@
 """Gives damaged files to the program: program.py EWA [--runs N] [--seed S] [--findings DIR].
 
 Each run damages one file of a splat scene, a dataset, a training run, an image or a mesh scene, and starts `ewa` on it. The program
-must end with status 0, or with status 2 and a line that begins with its name, within the limits on time and memory. A line
-break is the only control character that it prints. Nothing here needs a device. Built with the sanitizers
+must end with status 0, or with status 2 and a line that begins with its name, within the limits on time and memory. A third of the
+changes are of structure: lists that are empty, values of other types, names of other files, numbers at limits. A line break is the only control character that it prints. Renders are tried where a device is. Built with the sanitizers
 (scripts/damaged), the program also ends at what these find. A finding is kept with its command.
 """
-import argparse, concurrent.futures, gzip, io, json, os, pathlib, random, resource, shlex, shutil, struct, subprocess, sys
+import argparse, concurrent.futures, gzip, io, json, os, pathlib, random, re, resource, shlex, shutil, struct, subprocess, sys
 import tempfile, time, zipfile, zlib
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -51,6 +51,74 @@ def damaged(dice, data, other):
     return bytes(data)
 
 
+LIMITS = [b"0", b"-0.0", b"1", b"-1", b"256", b"2147483648", b"4294967296", b"9007199254740993", b"18446744073709551616", b"3e19",
+          b"3.4e38", b"1e39", b"1e309", b"1e-45", b"-1e-30", b"inf", b"nan"]
+VALUES = [b"null", b"true", b'""', b'"a"', b"0", b"-1", b"1.5", b"[]", b"{}", b"[[]]", b"[0]", b"[null]", b'["a"]', b'{"a": 1}', b"()", b"None"]
+TOKEN = re.compile(rb"\"(?:[^\"\\\n]|\\.)*\"|'[^'\n]*'|[\[\]{}()<>]|[\w.+-]+")
+
+
+def spans_of(data):
+    """Brackets with what is between them, quoted texts, numbers and words: (begin, end), inner ones first."""
+    spans, opened = [], []
+    for token in TOKEN.finditer(data):
+        if token[0] in b"[{(<":
+            opened.append(token.start())
+        elif token[0] not in b"]})>":
+            spans.append(token.span())
+        elif opened:
+            spans.append((opened.pop(), token.end()))
+    return spans
+
+
+def restructured(dice, data, other):
+    """The text after one to three changes of structure; see structure.h. Other bytes are damaged."""
+    if any(byte < 9 or byte > 126 for byte in data[:64]) or not spans_of(data):
+        return damaged(dice, data, other)
+    for _ in range(1 + dice.randrange(3)):
+        spans = spans_of(data)
+        if not spans:
+            break
+        is_name = lambda text, span: text[span[1] :].lstrip()[:1] in (b":", b"=")  # noqa: E731
+        names = [span for span in spans if is_name(data, span)]
+        lists = [span for span in spans if data[span[0]] in b"[{("]
+        begin, end = dice.choice([span for span in spans if span not in names] or spans)
+        lender = other if dice.random() < 0.5 and spans_of(other[:65536]) else data
+        lent = dice.choice(spans_of(lender[:65536]) or [(0, 0)])
+        kind = dice.randrange(7)
+        if kind == 0 and lists:
+            begin, end = dice.choice(lists)
+            new = data[begin : begin + 1] + data[end - 1 : end]
+        elif kind == 1:
+            new = dice.choice(VALUES)
+        elif kind == 2:
+            begin, end = dice.choice([span for span in spans if data[span[0]] in b"0123456789.-+"] or [(begin, end)])
+            new = dice.choice(LIMITS)
+        elif kind == 3 and names:
+            begin, end = dice.choice(names)
+            new = dice.choice([lender[b:e] for b, e in spans_of(lender[:65536]) if is_name(lender, (b, e))] or [b"a"])
+        elif kind == 4:
+            new = lender[lent[0] : lent[1]]
+        elif kind == 5:
+            new = data[begin:end] + (b", " + data[begin:end]) * dice.choice([1, 1, 1, 100])
+        else:
+            new = b""
+        if len(new) < 100_000:
+            data = data[:begin] + new + data[end:]
+    return data
+
+
+def with_json(dice, data, other):
+    """The JSON of a .glb or .rad, restructured, in a container that fits again."""
+    begin = 20 if data[:4] == b"glTF" else 8
+    length = struct.unpack_from("<I", data, begin - 8 if begin == 20 else 4)[0]
+    text = restructured(dice, data[begin : begin + length], other)
+    if begin == 20:
+        text += b" " * (-len(text) % 4)
+        out = data[:12] + struct.pack("<I", len(text)) + data[16:20] + text + data[begin + length :]
+        return out[:8] + struct.pack("<I", len(out)) + out[12:]
+    return data[:4] + struct.pack("<I", len(text)) + text + bytes(-len(text) % 8) + data[8 + length + -length % 8 :]
+
+
 def damaged_rad(dice, data, other):
     """A .rad of one chunk, with one of its properties damaged before it is packed."""
     def part(at):
@@ -76,7 +144,14 @@ def damaged_rad(dice, data, other):
     return packed_head(b"RAD0", head) + packed_head(b"RADC", chunk) + struct.pack("<Q", len(payload)) + payload
 
 
-def damaged_inside(dice, data, other):
+def restructured_inside(dice, data, other):
+    """The same in the text of a container."""
+    if data[:4] in (b"glTF", b"RAD0"):
+        return with_json(dice, data, other)
+    return damaged_inside(dice, data, other, restructured) if data[:2] == b"PK" else restructured(dice, data, other)
+
+
+def damaged_inside(dice, data, other, damaged=damaged):  # noqa: F811
     """The same below a compression or a checksum, which would notice any other damage."""
     if data[:2] == b"\x1f\x8b":
         return gzip.compress(damaged(dice, gzip.decompress(data), other), 1)
@@ -153,7 +228,8 @@ def transforms(folder):
     for i in range(3):
         (folder / "images" / f"{i}.png").write_bytes(png(24, 18))
         matrix = [[1, 0, 0, 0.1 * i], [0, 1, 0, 0], [0, 0, 1, 4], [0, 0, 0, 1]]
-        frames.append({"file_path": f"images/{i}.png", "transform_matrix": matrix})
+        (folder / f"depth_{i}.png").write_bytes((SEEDS / "read_depth_map" / "ramp.png").read_bytes())
+        frames.append({"file_path": f"images/{i}.png", "depth_file_path": f"depth_{i}.png", "transform_matrix": matrix})
     value = {"w": 24, "h": 18, "fl_x": 20, "fl_y": 20, "cx": 12, "cy": 9, "k1": 0.01, "frames": frames}
     (folder / "transforms.json").write_text(json.dumps(value))
 
@@ -179,9 +255,14 @@ class Case:
         self.files = files or ["."]  # those that may be damaged, relative to the path
 
 
-def make_cases(ewa, folder):
+def make_cases(ewa, folder, renders):
     read = ["info {}", "info {} --json --verbose"]
     to_any = [f"convert {{}} {{out}}.{kind} --quiet" for kind in FORMATS] + ["convert {} {good} -o {out}.ply --sort morton"]
+    to_any += ["convert {} {out}.ply --decimate 50% --quiet", "convert {} {out}.ply --decimate 1 --quiet",
+               "convert {} {out}/lod-meta.json --levels 2 --quiet", "convert {} {out}/tileset.json --levels 2 --quiet",
+               "convert {} {out}.rad --levels 3 --quiet", "convert {} {out}.ply --remove-floaters --quiet"]
+    if renders:
+        to_any.append("render {} -o {out}.png --size 24x16 --quiet")
     cases, base = [], folder / "base.ply"
     base.write_bytes(ply(40))
     splats = [base]
@@ -214,7 +295,13 @@ def make_cases(ewa, folder):
         cases.append(Case("COLMAP " + name, folder / name, look, [str(p.relative_to(folder / name)) for p in
                                                                   (folder / name).rglob("*") if p.is_file()]))
     transforms(folder / "nerf")
-    cases.append(Case("transforms.json", folder / "nerf", look, ["transforms.json", "images/1.png"]))
+    cases.append(Case("transforms.json", folder / "nerf", look + ["train {} --check-options --loss depth=1 -o {out}"],
+                      ["transforms.json", "images/1.png", "depth_1.png"]))
+    with zipfile.ZipFile(folder / "a.r3d", "w") as archive:
+        archive.writestr("metadata", (SEEDS / "read_r3d" / "frames").read_bytes().split(b"@@@")[0])
+        for i in range(4):
+            archive.writestr(f"rgbd/{i}.png", png(48, 36))
+    cases.append(Case(".r3d", folder / "a.r3d", ["info {}", "info {} --json"]))
     for name, files in imported(folder / "imported").items():
         cases.append(Case(name, folder / "imported" / name, look, files))
     run = folder / "run"
@@ -241,7 +328,7 @@ def run_one(ewa, cases, number, seed, folder, sanitized):
     (shutil.copytree if case.path.is_dir() else shutil.copy)(case.path, path)
     target = path / dice.choice(case.files) if case.path.is_dir() else path
     lender = other.path / other.files[0] if other.path.is_dir() else other.path
-    change = damaged_inside if dice.random() < 0.5 else damaged
+    change = dice.choice([damaged, damaged_inside, restructured_inside])
     target.write_bytes(change(dice, target.read_bytes(), lender.read_bytes()))
     # As in shell words: the paths of this script have no blanks.
     words = dice.choice(case.commands).replace("{good}", str(case.path)).replace("{out}", str(here / "out")).replace("{}", str(path))
@@ -256,7 +343,7 @@ def run_one(ewa, cases, number, seed, folder, sanitized):
         timer.cancel()
     seconds = time.monotonic() - started
     size = sum(f.stat().st_size for f in here.rglob("*") if f.is_file())
-    most = 4 * size // 1024 + (1_500_000 if sanitized else 300_000)
+    most = 4 * size // 1024 + (1_500_000 if sanitized else 300_000) + (700_000 if words.startswith("render") else 0)
     text = (here / "stderr").read_bytes() + (here / "stdout").read_bytes()
     last = (here / "stderr").read_bytes().splitlines()[-1:]
     wrong = ""
@@ -291,7 +378,8 @@ def main():
     totals, findings = {}, []
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        cases = make_cases(ewa, folder)
+        renders = subprocess.run([ewa, "devices"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
+        cases = make_cases(ewa, folder, renders)
         (runs := folder / "runs").mkdir()
         os.chdir(runs)
         with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:

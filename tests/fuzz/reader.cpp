@@ -13,7 +13,12 @@
 
 #include "ewa/error.h"
 #include "ewa/gaussians.h"
+#include "ewa/splat_edit.h"
 #include "input.h"
+#include "io/splats/formats.h"
+#include "io/splats/rad.h"
+#include "io/splats/tileset.h"
+#include "scene/decimate.h"
 
 namespace {
 
@@ -175,6 +180,37 @@ void check_scene(const scene::MeshScene& scene) {
         EWA_REQUIRE(std::isfinite(light.direction.x) && light.intensity.x >= 0 && light.range >= 0);
 }
 #else
+/// What commands do with a scene: fewer splats in both ways, and levels of it.
+void use_scene(const Gaussians& gaussians, bool write) {
+    constexpr size_t kMost = 2000;
+    Gaussians whole = gaussians;
+    std::vector<uint32_t> kept;
+    for (size_t i = 0; i < whole.size(); ++i)
+        if (drawable(whole, i)) kept.push_back(uint32_t(i));
+    if (kept.empty() || kept.size() > kMost) return;
+    keep_splats(whole, kept);
+    const std::string text = std::to_string(whole.size()) + " splats";
+    for (const size_t target : {(whole.size() + 1) / 2, size_t(1)}) {
+        Gaussians fewer = gaussians, traced = whole;
+        decimate_splats(fewer, target);
+        EWA_REQUIRE(fewer.size() == std::min(target, whole.size()));
+        std::vector<float> errors;
+        scene::decimate_traced(traced, target, {.errors = &errors});
+        EWA_REQUIRE(traced.size() == target && errors.size() == target);
+    }
+    EWA_REQUIRE(io::build_rad_tree(whole, 2).nodes.size() >= whole.size());
+    if (!write) return;
+    static const std::filesystem::path folder = fuzz::make_folder();
+    for (const char* name : {"lod-meta.json", "tileset.json"}) try {
+            const SaveOptions options{.levels = 2};
+            if (std::string_view(name) == "lod-meta.json")
+                io::write_levels(folder / name, whole, options);
+            else
+                io::write_tileset(folder / name, whole, {.save = options, .earth = {}});
+        } catch (const InputError&) {  // values that a format has no room for
+        }
+}
+
 void check_scene(const SplatScene& scene) {
     const Gaussians& g = scene.gaussians;
     const size_t n = g.size();
@@ -182,6 +218,7 @@ void check_scene(const SplatScene& scene) {
     EWA_REQUIRE(g.sh_degree >= 0 && g.sh_degree <= kMaxShDegree);
     EWA_REQUIRE(g.means.size() == 3 * n && g.quaternions.size() == 4 * n && g.log_scales.size() == 3 * n);
     EWA_REQUIRE(g.sh.size() == g.sh_stride() * n);
+    use_scene(g, n % 8 == 0);
 }
 #endif
 

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "damage.h"
+#include "structure.h"
 #include "targets.inc"
 
 #ifndef EWA_SANITIZED
@@ -90,12 +91,12 @@ long long peak_kilobytes() {
     return usage.ru_maxrss;
 }
 
-/// A few for every change; EWA_TEST_DAMAGED has another number.
-TEST_P(Seeds, AreReadOrRefusedDamaged) {
-    const auto& [name, target] = kTargets[GetParam()];
+/// Feeds `usually` changed seeds to the target, or a share of EWA_TEST_DAMAGED. change(seed, bytes, other): what becomes of bytes.
+template <class Change>
+void feed(size_t index, int usually, int share, const Change& change) {
+    const auto& [name, target] = kTargets[index];
     const char* wanted = std::getenv("EWA_TEST_DAMAGED");
-    constexpr int kUsually = 300;
-    const int runs = wanted ? std::atoi(wanted) : kUsually;
+    const int runs = wanted ? std::atoi(wanted) / share : usually;
     std::vector<std::string> seeds;
     for (const fs::path& file : seeds_of(name)) {
         const std::vector<uint8_t> bytes = bytes_of(file);
@@ -106,14 +107,27 @@ TEST_P(Seeds, AreReadOrRefusedDamaged) {
     const long long before = peak_kilobytes();
     for (int run = 0; run < runs; ++run) {
         SCOPED_TRACE(run);
-        const std::string damaged =
-            ewa::fuzz::Damage(uint32_t(run))
-                .of(seeds[size_t(run) % seeds.size()], seeds[size_t(run) * 7 / 3 % seeds.size()]);
-        current.assign(damaged.begin(), damaged.end());
+        const std::string changed = change(uint32_t(run), seeds[size_t(run) % seeds.size()],
+                                           seeds[size_t(run) * 7 / 3 % seeds.size()]);
+        current.assign(changed.begin(), changed.end());
         ASSERT_EQ(target(current.data(), current.size()), 0);
     }
     // Also of what C libraries allocate. The seeds are small.
     EXPECT_LT(peak_kilobytes() - before, 300'000);
+}
+
+/// A few for every change; EWA_TEST_DAMAGED has another number.
+TEST_P(Seeds, AreReadOrRefusedDamaged) {
+    feed(GetParam(), 300, 1, [](uint32_t seed, const std::string& bytes, const std::string& other) {
+        return ewa::fuzz::Damage(seed).of(bytes, other);
+    });
+}
+
+/// A fifth of that number has another structure.
+TEST_P(Seeds, AreReadOrRefusedWithDamagedStructure) {
+    feed(GetParam(), 100, 5, [](uint32_t seed, const std::string& bytes, const std::string& other) {
+        return ewa::fuzz::Structure(seed).of(bytes, other);
+    });
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Seeds, testing::Range(size_t(0), std::size(kTargets)),
