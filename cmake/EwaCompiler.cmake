@@ -53,6 +53,7 @@ if(EWA_FUZZ)
 endif()
 find_program(CCACHE ccache)
 if(CCACHE)
-    # Without these it would not cache what a precompiled header takes part in.
-    set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE})
+    # Without the first it would not cache what a precompiled header takes part in. The others let clones in other folders share.
+    set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros
+                                    CCACHE_BASEDIR=${PROJECT_SOURCE_DIR} CCACHE_NOHASHDIR=1 ${CCACHE})
 endif()
