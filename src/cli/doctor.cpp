@@ -170,18 +170,13 @@ std::string program_path(const std::vector<const char*>& names) {
 
 std::string python_version() {
     const std::string python = program_path({"python3"});
-    std::string text;
     // The current folder may hold another package of this name.
-    const core::Ended ended = core::run_program(
+    const core::Answer answer = core::ask_program(
         {.command = {python, "-c", "import sys; sys.path.pop(0); import ewa; print(ewa.__version__)"},
          .environment = {},
-         .log = "/dev/null"},
-        [&](std::string_view piece) {
-            text += piece;
-            return true;
-        });
-    if (ended != core::Ended::done) throw RunError(python + " has no package ewa");
-    return core::one_line(core::trim(text)) + ", " + python;
+         .log = "/dev/null"});
+    if (answer.ended != core::Ended::done) throw RunError(python + " has no package ewa");
+    return core::one_line(core::trim(answer.text)) + ", " + python;
 }
 
 std::vector<Check> all_checks(const DoctorArguments& arguments) {

@@ -118,14 +118,11 @@ std::string find_encoder(const std::string& codec, const fs::path& file) {
     if ((extension == ".webm" && !modern) || (extension == ".mov" && modern))
         throw InputError("--codec " + codec + ": a " + extension + " has none of it, but " +
                          (modern ? "h264 or hevc" : "av1 or vp9") + "; an .mp4 and an .mkv have all");
-    std::string listed;
-    core::run_program({.command = {find_ffmpeg().string(), "-hide_banner", "-loglevel", "error", "-encoders"},
-                       .environment = {},
-                       .log = {}},
-                      [&](std::string_view text) {
-                          listed += text;
-                          return true;
-                      });
+    const std::string listed = core::ask_program({.command = {find_ffmpeg().string(), "-hide_banner",
+                                                              "-loglevel", "error", "-encoders"},
+                                                  .environment = {},
+                                                  .log = {}})
+                                   .text;
     std::string wanted;
     for (const Encoder& encoder : encoders()) {
         if (encoder.codec != codec) continue;

@@ -7,11 +7,14 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <optional>
 
 #include "core/folders.h"
 #include "core/text.h"
@@ -22,9 +25,11 @@ extern char** environ;
 namespace ewa::core {
 namespace {
 
-constexpr int kTurn = 100;       // ms
-constexpr int kShortTurn = 10;   // ms
-constexpr int kPatience = 3000;  // ms that a program has to end after SIGTERM
+constexpr int kTurn = 100;                       // ms
+constexpr int kShortTurn = 10;                   // ms
+constexpr int kPatience = 3000;                  // ms that a program has to end after SIGTERM
+constexpr size_t kMostAnswer = size_t(1) << 20;  // bytes
+constexpr auto kAnswerTime = std::chrono::seconds(30);
 
 /// A file descriptor.
 class Descriptor {
@@ -33,6 +38,10 @@ class Descriptor {
     ~Descriptor() { close(); }
     Descriptor(const Descriptor&) = delete;
     int get() const { return value_; }
+    void set(int value) {
+        close();
+        value_ = value;
+    }
     void close() {
         if (value_ >= 0) ::close(value_);
         value_ = -1;
@@ -61,15 +70,59 @@ std::vector<std::string> environment_with(const std::vector<std::string>& change
     return all;
 }
 
-void write_all(int descriptor, std::string_view text, const std::filesystem::path& path) {
-    while (!text.empty()) {
-        const ssize_t written = ::write(descriptor, text.data(), text.size());
-        if (written < 0 && errno == EINTR) continue;
-        if (written <= 0)
-            throw RunError(one_line(path.string()) + ": cannot be written: " + std::strerror(errno));
-        text.remove_prefix(size_t(written));
+/// A pipe from a program.
+struct Pipe {
+    Pipe() {
+        int ends[2];
+        if (pipe2(ends, O_CLOEXEC) != 0) throw RunError("cannot create a pipe");
+        from.set(ends[0]);
+        to.set(ends[1]);
     }
-}
+    /// What has arrived. Closes `from` at the end.
+    std::string_view read(std::array<char, 65536>& buffer) {
+        const ssize_t n = ::read(from.get(), buffer.data(), buffer.size());
+        if (n == 0) from.close();
+        return {buffer.data(), n > 0 ? size_t(n) : 0};
+    }
+
+    Descriptor from, to;
+};
+
+/// The file that a program's messages are appended to. Without a path, nothing is written.
+class Log {
+  public:
+    explicit Log(const std::filesystem::path& path) : path_(path) {
+        if (path.empty()) return;
+        file_.set(open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666));
+        if (file_.get() < 0) fail();
+    }
+    void add(std::string_view text) {
+        if (text.size() >= left_ && left_ > 0) {
+            write(text.substr(0, left_));
+            write("\n[the rest is left out]\n");
+        } else if (left_ > 0) {
+            write(text);
+        }
+        left_ -= std::min(left_, text.size());
+    }
+
+  private:
+    void write(std::string_view text) {
+        while (!text.empty()) {
+            const ssize_t written = ::write(file_.get(), text.data(), text.size());
+            if (written < 0 && errno == EINTR) continue;
+            if (written <= 0) fail();
+            text.remove_prefix(size_t(written));
+        }
+    }
+    [[noreturn]] void fail() const {
+        throw RunError(one_line(path_.string()) + ": cannot be written: " + std::strerror(errno));
+    }
+
+    std::filesystem::path path_;
+    Descriptor file_;
+    size_t left_ = kMostLog;
+};
 
 /// Ends the child when an exception passes.
 class Child {
@@ -151,54 +204,60 @@ pid_t start_program(std::vector<std::string> command, const std::vector<std::str
     command[0] = file_of(command[0]);
     std::vector<std::string> all = environment_with(environment);
     const std::vector<char*> words = pointers(command), changed = pointers(all);
-    int ends[2];
-    if (pipe2(ends, O_CLOEXEC) != 0) throw RunError("cannot create a pipe");
-    const Descriptor from(ends[0]);
-    Descriptor to(ends[1]);
+    Pipe report;
     const pid_t parent = getpid(), child = fork();
-    if (child == 0) become(words.data(), changed.data(), streams, parent, to.get());
+    if (child == 0) become(words.data(), changed.data(), streams, parent, report.to.get());
     int reason = child < 0 ? errno : 0;
-    to.close();
+    report.to.close();
     // The end of the pipe closes as the program starts.
-    if (child > 0 && read(from.get(), &reason, sizeof(reason)) > 0) waitpid(child, nullptr, 0);
+    if (child > 0 && read(report.from.get(), &reason, sizeof(reason)) > 0) waitpid(child, nullptr, 0);
     if (reason != 0) throw RunError("cannot start " + name + ": " + std::strerror(reason));
     return child;
 }
 
 Ended run_program(const Program& program, const std::function<bool(std::string_view)>& output) {
-    int ends[2];
-    if (pipe2(ends, O_CLOEXEC) != 0) throw RunError("cannot create a pipe");
-    const Descriptor from(ends[0]);
-    Descriptor to(ends[1]);
-    const Descriptor log(program.log.empty()
-                             ? -1
-                             : open(program.log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666));
-    if (!program.log.empty() && log.get() < 0)
-        throw RunError(one_line(program.log.string()) + ": cannot be written: " + std::strerror(errno));
+    Log log(program.log);
+    Pipe out;
+    std::optional<Pipe> errors;
+    if (!program.log.empty() && !program.joined) errors.emplace();
+    const int to_log = errors ? errors->to.get() : program.joined ? out.to.get() : -1;
     Child child(start_program(program.command, program.environment,
-                              {.input = -1, .output = to.get(), .errors = log.get()}));
-    to.close();
-    std::array<char, 65536> piece;
-    // A program that has ended may have left its output to another one, which keeps it open.
+                              {.input = -1, .output = out.to.get(), .errors = to_log}));
+    out.to.close();
+    if (errors) errors->to.close();
+    std::array<char, 65536> buffer;
+    // A program that has ended may have left its output to another one, which keeps it open. Others close theirs and go on.
     for (bool ended = false;;) {
-        pollfd ready{from.get(), POLLIN, 0};
-        const int count = poll(&ready, 1, ended ? 0 : kTurn);
+        pollfd ready[] = {{out.from.get(), POLLIN, 0}, {errors ? errors->from.get() : -1, POLLIN, 0}};
+        const bool open = ready[0].fd >= 0 || ready[1].fd >= 0;
+        const int count = poll(ready, 2, ended ? 0 : open ? kTurn : kShortTurn);
         if (count == 0 && ended) break;
         ended = count == 0 && child.has_ended();
         if (count < 0 && errno != EINTR) throw RunError("cannot wait for " + one_line(program.command[0]));
         std::string_view text;
-        if (count > 0) {
-            const ssize_t n = read(from.get(), piece.data(), piece.size());
-            if (n == 0) break;
-            if (n > 0) text = {piece.data(), size_t(n)};
-        }
-        if (program.output_to_log) write_all(log.get(), text, program.log);
+        if (count > 0 && ready[1].revents != 0) log.add(errors->read(buffer));
+        if (count > 0 && ready[0].revents != 0) text = out.read(buffer);
+        if (program.output_to_log) log.add(text);
         if (!output(text)) {
             child.end();
             return Ended::stopped;
         }
     }
     return child.wait() == 0 ? Ended::done : Ended::failed;
+}
+
+Answer ask_program(const Program& program, const std::function<bool()>& go_on) {
+    const auto until = std::chrono::steady_clock::now() + kAnswerTime;
+    Answer answer;
+    bool wanted = true;
+    answer.ended = run_program(program, [&](std::string_view piece) {
+        answer.text.append(piece, 0, kMostAnswer - answer.text.size());
+        wanted = go_on();
+        return wanted && answer.text.size() < kMostAnswer && std::chrono::steady_clock::now() < until;
+    });
+    answer.cut = wanted && answer.ended == Ended::stopped;
+    if (answer.cut) answer.ended = Ended::failed;
+    return answer;
 }
 
 }  // namespace ewa::core

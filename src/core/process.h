@@ -32,9 +32,12 @@ pid_t start_program(std::vector<std::string> command, const std::vector<std::str
 struct Program {
     std::vector<std::string> command;      // the name or path of the program, then its arguments
     std::vector<std::string> environment;  // NAME=value, beside those of this process
-    std::filesystem::path log;             // standard error is appended; empty: it is this process's
+    std::filesystem::path log;   // standard error is appended, up to kMostLog bytes; empty: it is this process's
     bool output_to_log = false;  // standard output is appended to the log, as well as given to `output`
+    bool joined = false;         // standard error is part of the output
 };
+
+constexpr size_t kMostLog = size_t(16) << 20;  // bytes that a run of a program adds to its log
 
 enum class Ended { done, failed, stopped };
 
@@ -44,5 +47,16 @@ enum class Ended { done, failed, stopped };
 /// The result is `failed` where the exit status is not 0. Throws RunError if the program cannot be started, or the
 /// log cannot be written.
 Ended run_program(const Program& program, const std::function<bool(std::string_view text)>& output);
+
+struct Answer {
+    Ended ended = Ended::failed;
+    std::string text;
+    bool cut = false;  // the program was ended
+};
+
+/// Runs a program that answers a question on standard output. It is ended, and has failed, where it prints more than a megabyte
+/// or takes more than half a minute. go_on: asked at least every tenth of a second; false ends the program (`stopped`).
+Answer ask_program(
+    const Program& program, const std::function<bool()>& go_on = [] { return true; });
 
 }  // namespace ewa::core

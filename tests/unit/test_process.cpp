@@ -65,6 +65,35 @@ TEST(Process, TheLogHasErrorsAndIfAskedForTheOutput) {
     EXPECT_NE(log.find("out\n"), std::string::npos);
 }
 
+/// A program that floods or hangs is no reason to.
+TEST(Process, LogsAndAnswersAreBounded) {
+    const test::TempFolder folder;
+    Program program = shell("head -c 20000000 /dev/zero | tr '\\0' x; head -c 20000000 /dev/zero >&2");
+    program.log = folder / "log.txt";
+    program.output_to_log = true;
+    EXPECT_EQ(run(program).second.size(), 20000000u);
+    const std::string log = test::file_bytes(program.log);
+    EXPECT_LT(log.size(), core::kMostLog + 100);
+    EXPECT_TRUE(log.ends_with("[the rest is left out]\n"));
+    const core::Answer flood = core::ask_program(shell("yes")), end = core::ask_program(shell("echo yes; exit 3"));
+    EXPECT_TRUE(flood.cut);
+    EXPECT_EQ(flood.ended, Ended::failed);
+    EXPECT_EQ(flood.text.size(), size_t(1) << 20);
+    EXPECT_EQ(end.ended, Ended::failed);
+    EXPECT_EQ(end.text, "yes\n");
+    EXPECT_FALSE(end.cut);
+    EXPECT_EQ(core::ask_program(shell("sleep 1000"), [] { return false; }).ended, Ended::stopped);
+}
+
+TEST(Process, ErrorsMayBePartOfTheOutput) {
+    Program program = shell("echo out; echo err >&2");
+    program.joined = true;
+    EXPECT_EQ(run(program).second, "out\nerr\n");
+    // A program that closes its output goes on, and can be stopped.
+    EXPECT_EQ(core::run_program(shell("exec >&- 2>&-; sleep 1000"), [n = 0](std::string_view) mutable { return ++n < 5; }),
+              Ended::stopped);
+}
+
 /// The program and what it has started end, although neither prints anything.
 TEST(Process, StopsWhenAsked) {
     const test::TempFolder folder;
