@@ -25,6 +25,14 @@ bool is_folder(const std::filesystem::path& path) {
     return std::filesystem::is_directory(path, ignored);
 }
 
+bool is_of_desktop(const std::filesystem::path& inside) {
+    for (const std::filesystem::path& part : inside)
+        if (const std::string name = part.string();
+            (name.starts_with('.') && name != "." && name != "..") || name == "__MACOSX" || name == "@eaDir")
+            return true;
+    return inside.filename() == "Thumbs.db" || inside.filename() == "desktop.ini";
+}
+
 void make_folder(const std::filesystem::path& folder) {
     if (folder.empty()) return;
     std::error_code error;

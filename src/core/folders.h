@@ -10,6 +10,10 @@ namespace ewa::core {
 bool is_file(const std::filesystem::path& path);
 bool is_folder(const std::filesystem::path& path);
 
+/// Whether a desktop or a server has put the file there, or the folder that it is in: names that begin with a dot, __MACOSX, @eaDir,
+/// Thumbs.db and desktop.ini. inside: relative to the user's folder.
+bool is_of_desktop(const std::filesystem::path& inside);
+
 /// Creates the folder and its parents. An empty path names no folder. Throws RunError if the folder cannot be
 /// created, or if the path names something else.
 void make_folder(const std::filesystem::path& folder);

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "core/atomic_file.h"
+#include "core/folders.h"
 #include "core/system_limits.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -65,6 +66,7 @@ const image::Format& format_of(std::FILE* file) {
     std::array<char, 16> bytes;
     const size_t size = std::fread(bytes.data(), 1, bytes.size(), file);
     std::rewind(file);
+    if (size == 0) throw std::runtime_error("the file is empty");
     const image::Format* format = image::format_of({bytes.data(), size});
     if (!format)
         throw std::runtime_error(
@@ -343,7 +345,7 @@ std::string image_fault(const fs::path& path) try {
     const std::string text = error.what();
     for (const std::string& start : {path.string() + kNotReadable, path.string() + ": "})
         if (const std::string name = core::one_line(start); text.starts_with(name))
-            return text.substr(name.size());
+            return std::string(core::trim(text.substr(name.size())));
     return text;
 }
 
@@ -377,15 +379,16 @@ std::vector<fs::path> images_below(const fs::path& folder) try {
     // Extensions that are read, and extensions of other images. The latter are errors, so that no image is
     // overlooked.
     static constexpr std::string_view kExtensions[] = {
-        ".bmp", ".dib",  ".env",  ".exr",  ".hdr",  ".jfi", ".jfif", ".jif",  ".jpe", ".jpeg",
-        ".jpg", ".mxr",  ".pfm",  ".pgm",  ".png",  ".pnm", ".ppm",  ".rgbe", ".sm",  ".sxr",
-        ".tif", ".tiff", ".tx",   ".vsm",  ".webp", ".dds", ".dpx",  ".gif",  ".ico", ".jp2",
-        ".j2k", ".heic", ".heif", ".avif", ".pbm",  ".psd", ".tga"};
+        ".bmp", ".dib",  ".env",  ".exr", ".hdr",  ".jfi", ".jfif", ".jif",  ".jpe", ".jpeg",
+        ".jpg", ".mxr",  ".pfm",  ".pgm", ".png",  ".pnm", ".ppm",  ".rgbe", ".sm",  ".sxr",
+        ".tif", ".tiff", ".tx",   ".vsm", ".webp", ".dds", ".dpx",  ".gif",  ".ico", ".jp2",
+        ".j2k", ".heic", ".heif", ".hif", ".avif", ".pbm", ".psd",  ".tga"};
     std::vector<fs::path> found;
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
         if (const std::string extension = core::lower(entry.path().extension().string());
             entry.is_regular_file() && std::ranges::find(kExtensions, extension) != std::end(kExtensions))
             found.push_back(entry.path().lexically_relative(folder));  // of links: their own names
+    std::erase_if(found, core::is_of_desktop);
     std::ranges::sort(found);
     return found;
 } catch (const fs::filesystem_error& error) {

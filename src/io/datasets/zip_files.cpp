@@ -32,9 +32,7 @@ constexpr uint64_t kEncryptedFlag = 1, kDeflated = 8;
 
 /// Files that desktops add, and the record by which ewa knows its own datasets.
 bool is_left_out(const fs::path& name) {
-    const std::string file = name.filename().string();
-    return *name.begin() == "__MACOSX" || file == ".DS_Store" || file == "Thumbs.db" ||
-           file == "desktop.ini" || file == "capture.json";
+    return core::is_of_desktop(name) || name.filename() == "capture.json";
 }
 
 /// Why the name cannot be written; empty if it can.
