@@ -120,6 +120,7 @@ void Progress::begin(std::string what, int total, std::string unit) {
     printed_done_ = -1;
     pace_ = Pace();
     left_.reset();
+    left_set_ = -1;
     rest_ = 0;
 }
 
@@ -127,7 +128,12 @@ void Progress::skip(int done) {
     pace_ = Pace(seconds(), done);
 }
 
-void Progress::set_left(double seconds_left) {
+void Progress::set_total(int total) {
+    total_ = total;
+    if (total > 0) next_tenth_ = int(10LL * std::max(0, printed_done_) / total) + 1;
+}
+
+void Progress::set_left(std::optional<double> seconds_left) {
     left_ = seconds_left;
     left_set_ = seconds();
 }
@@ -142,7 +148,7 @@ bool Progress::due(int done) const {
 /// The time left of all parts.
 std::optional<double> Progress::left_now() const {
     if (left_) return std::max(0.0, *left_ - (seconds() - left_set_)) + rest_;
-    if (const auto left = pace_.left(seconds(), total_)) return *left + rest_;
+    if (const auto left = left_set_ < 0 ? pace_.left(seconds(), total_) : std::nullopt) return *left + rest_;
     return {};
 }
 

@@ -54,11 +54,11 @@ class Progress {
     /// Begins the next part of the work. The bar and the time left are those of all parts together.
     void begin(std::string what, int total, std::string unit);
     /// Another number of units in this part.
-    void set_total(int total) { total_ = total; }
+    void set_total(int total);
     /// This part's units up to `done` were done before it began.
     void skip(int done);
-    /// Seconds that this part still takes, in place of what its pace says. They count down until the next call.
-    void set_left(double seconds);
+    /// Seconds that this part still takes, in place of what its pace says. They count down until the next call. Empty: nobody knows.
+    void set_left(std::optional<double> seconds);
     /// Seconds that the parts after this one take.
     void set_rest(double seconds) { rest_ = seconds; }
 
@@ -87,7 +87,8 @@ class Progress {
     Clock::time_point start_ = Clock::now(), part_start_ = start_, printed_{};
     Pace pace_;
     std::optional<double> left_;  // of this part, at left_set_
-    double left_set_ = 0, rest_ = 0, share_ = 0;
+    double left_set_ = -1;        // -1: the pace says how long this part takes
+    double rest_ = 0, share_ = 0;
 };
 
 }  // namespace ewa::core
