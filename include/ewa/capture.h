@@ -31,7 +31,9 @@ struct CaptureProgress {
     std::string what;  // a verb, such as "placed"
     std::string unit;  // its plural, such as "photos"
     int done = 0, total = 0;
-    std::string note;  // a line for the user, which comes once; usually empty
+    std::string note;          // a line for the user, which comes once; usually empty
+    double left = -1;          // s, of all parts; -1: not known before the first photo is searched
+    double photo_seconds = 0;  // that COLMAP takes to search one; 0: not known
 };
 
 struct Capture {
@@ -42,9 +44,12 @@ struct Capture {
     std::vector<std::string> remarks;     // for the user: a line each
 };
 
-/// Whether the path is a video by its extension, a zip archive, or a folder with photos that load_dataset does not read
-/// because it has no cameras.
+/// Whether the path is a video by its extension, a zip archive, or a folder with photos or videos that load_dataset does not
+/// read because it has no cameras.
 bool is_capture(const std::filesystem::path& path);
+
+/// Whether the dataset is made of frames: the path is a video by its extension, or a folder with videos and no photos.
+bool has_videos(const std::filesystem::path& path);
 
 /// Whether the path is a zip archive by its extension and its first bytes.
 bool is_archive(const std::filesystem::path& path);
@@ -65,9 +70,11 @@ std::filesystem::path dataset_of_images(const std::filesystem::path& folder);
 /// folder of images whose cameras a dataset has, which the message names.
 void check_training_input(const std::filesystem::path& path);
 
-/// Makes a dataset of a folder of photos (JPEG, PNG, TIFF, BMP; subfolders too), a video, or a zip archive. An archive is
+/// Makes a dataset of a folder of photos (JPEG, PNG, TIFF, BMP; subfolders too; HEIC and AVIF where a program converts them), a
+/// video, a folder of videos, or a zip archive. An archive is
 /// unpacked into unpacked/. If it holds a dataset, that becomes the folder's, and nothing is searched.
-/// - images: the frames of the video, or a link to the photos' folder.
+/// - images: the frames of the videos, or a link to the photos' folder, or the photos with those that were converted.
+/// - masks: those that lie among the photos, or in masks/ beside their folder.
 /// - sparse/0: COLMAP's model, made last. The lens has OpenCV's radial and tangential terms if all images have one size,
 ///   else one radial term per image. 360° photos get the lens of all directions.
 /// - colmap/: what COLMAP needs to continue, and log.txt with what the programs print.
@@ -75,7 +82,7 @@ void check_training_input(const std::filesystem::path& path);
 ///   same ones is continued; what is done is kept.
 ///
 /// progress is called at least every tenth of a second; false ends the run. Throws InputError: no such input, a folder
-/// of something else, too few photos, HEIC. Also where photos or a video have changed since, ffmpeg cannot read the
+/// of something else, too few photos, HEIC that no program converts. Also where photos or a video have changed since, ffmpeg cannot read the
 /// video, or COLMAP cannot place the photos. Throws RunError: ffmpeg or colmap is missing or fails, disk.
 Capture make_dataset(const std::filesystem::path& input, const std::filesystem::path& folder,
                      const CaptureOptions& options,

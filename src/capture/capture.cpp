@@ -3,7 +3,6 @@
 #include "ewa/capture.h"
 
 #include <algorithm>
-#include <array>
 #include <iterator>
 #include <map>
 #include <memory>
@@ -11,6 +10,7 @@
 #include <set>
 
 #include "capture/steps.h"
+#include "capture/times.h"
 #include "core/folders.h"
 #include "core/hash.h"
 #include "core/json.h"
@@ -40,8 +40,7 @@ std::string extension_of(const fs::path& path) {
 }
 
 bool is_video(const fs::path& path) {
-    constexpr std::array kVideos{".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".mts", ".3gp"};
-    return is_file(path) && std::find(kVideos.begin(), kVideos.end(), extension_of(path)) != kVideos.end();
+    return is_file(path) && capture::is_film(path);
 }
 
 /// The folder in which an archive has everything: itself, or a folder that is alone in it.
@@ -54,9 +53,44 @@ fs::path main_folder(fs::path folder) {
     return folder;
 }
 
-/// The photos are in the folder, or in its images/.
+/// The photos are in the folder, or in its images/, or all in its photos/ or input/.
 fs::path folder_of_photos(const fs::path& folder) {
-    return is_folder(folder / "images") ? folder / "images" : folder;
+    if (is_folder(folder / "images")) return folder / "images";
+    for (const char* name : {"photos", "input"}) {
+        if (!is_folder(folder / name)) continue;
+        const auto lies_there = [&](const fs::path& photo) { return *photo.begin() == name; };
+        if (std::ranges::all_of(capture::photo_files(folder), lies_there)) return folder / name;
+    }
+    return folder;
+}
+
+/// The videos that a dataset is made of: the input itself, or those of a folder without photos.
+std::vector<fs::path> videos_of(const fs::path& input) {
+    if (is_video(input)) return {input};
+    std::vector<fs::path> videos;
+    if (is_folder(input) && capture::photo_files(folder_of_photos(input)).empty())
+        for (const fs::path& name : capture::films_in(input)) videos.push_back(input / name);
+    return videos;
+}
+
+/// Throws InputError for what ewa itself has made, whose pictures are no photos.
+void refuse_made(const fs::path& input) {
+    const fs::path path = (fs::absolute(input).lexically_normal() / "").parent_path();
+    const std::string name = core::one_line(input.string());
+    const auto cameras_of = [](const fs::path& run) {
+        const fs::path dataset = run / "dataset";
+        return io::is_dataset_folder(dataset)
+                   ? "its cameras are in " + core::one_line(fs::proximate(dataset).string())
+                   : "its config.json names the dataset with its cameras";
+    };
+    if (capture::is_run(path) && !io::is_dataset_folder(path))
+        throw InputError(name + " is a run: " + cameras_of(path));
+    const fs::path folder = path.filename();
+    if (capture::is_run(path.parent_path()) && (folder == "test" || folder == "passers_by"))
+        throw InputError(name + " has pictures that a run has made: " + cameras_of(path.parent_path()));
+    if (is_file(path / "capture.json") && !io::is_dataset_folder(path))
+        throw InputError(
+            name + " is a dataset that is not finished; the command that began it, repeated, continues");
 }
 
 const char* name_of(Matching matching) {
@@ -110,7 +144,7 @@ Json check_claim(const fs::path& folder, Json record, bool video) {
     return is_begun(folder, video) ? before : Json();
 }
 
-/// Throws InputError if the video or archive is not the one that the folder was made of. Older records do not say it.
+/// Throws InputError if the videos or the archive are not those that the folder was made of. Older records do not say it.
 void check_same_file(const fs::path& folder, const Json& before, const Json& record,
                      const std::string& what) {
     const char* key = what == "video" ? "files" : "archive";
@@ -179,8 +213,9 @@ Capture search(const fs::path& folder, const capture::Chosen& chosen, const Capt
     if (!is_folder(model)) {
         capture::require_photos(folder / "images", chosen.names.size(), {});
         core::make_folder(model.parent_path());
+        const fs::path masks = is_folder(folder / "masks") ? folder / "masks" : fs::path();
         remarks = capture::place_photos(
-            {folder / "images", chosen.names, pairing_of(options.matching, chosen.names.size())},
+            {folder / "images", chosen.names, pairing_of(options.matching, chosen.names.size()), masks},
             folder / "colmap", model, progress);
     }
     if (!chosen.gone.empty()) capture::remove_views(model, chosen.gone);
@@ -194,7 +229,8 @@ struct Making {
     fs::path input, folder;
     CaptureOptions options;
     const capture::ProgressFunction& progress;
-    Json record, before;  // before: of what has begun; null: nothing has
+    Json record, before;           // before: of what has begun; null: nothing has
+    std::vector<fs::path> videos;  // none: the input is photos or an archive
     std::unique_ptr<core::FolderLock> lock = nullptr;
 
     /// After all errors of the input: they leave no folder.
@@ -209,26 +245,84 @@ struct Making {
 
 Capture make_of_video(Making& now) {
     const fs::path images = now.folder / "images", work = now.folder / "colmap";
-    now.record["files"] = Json::array({capture::line_of(now.input.parent_path(), now.input.filename())});
+    const fs::path above = is_folder(now.input) ? now.input : now.input.parent_path();
+    now.record["files"] = Json::array();
+    for (const fs::path& video : now.videos)
+        now.record["files"].push_back(capture::line_of(above, video.lexically_relative(above)));
     check_same_file(now.folder, now.before, now.record, "video");
     require_programs(now.folder, true);
     now.begin();
     core::make_folder(work);
     if (!fs::exists(fs::symlink_status(images)))
-        capture::extract_frames(now.input, images, now.options.frames, work / "log.txt", now.progress);
+        say(capture::extract_frames(now.videos, images, now.options.frames, work / "log.txt", now.progress),
+            now.progress);
     const capture::Chosen chosen{capture::photos_in(images), {}, {}};
     return search(now.folder, chosen, now.options, now.progress);
 }
 
+/// What the folder has beside photos, which are all that is searched.
+std::vector<std::string> remarks_on_others(const fs::path& photos) {
+    std::vector<std::string> remarks;
+    const auto add = [&](const std::vector<fs::path>& files, const char* noun, const char* reason) {
+        if (files.empty()) return;
+        std::string text = core::counted(files.size(), noun) + " " +
+                           std::string(core::is_or_are(files.size())) + reason +
+                           core::one_line(files.front().string());
+        if (files.size() > 1) text += " and " + std::to_string(files.size() - 1) + " more";
+        remarks.push_back(text);
+    };
+    const capture::Pictures pictures = capture::pictures_in(photos);
+    add(pictures.others, "picture", " not searched, by the name a mask, a depth map or a copy: ");
+    std::vector<fs::path> films = capture::films_in(photos);
+    std::erase_if(films, [&](const fs::path& film) {  // the moving part of a photo
+        return std::ranges::any_of(pictures.photos, [&](const fs::path& photo) {
+            return photo.parent_path() / photo.stem() == film.parent_path() / film.stem();
+        });
+    });
+    add(films, "video", " not used beside photos: ");
+    return remarks;
+}
+
+/// Converts what COLMAP does not read. The names become those of images/.
+void convert(Making& now, const fs::path& photos, const fs::path& link, capture::Chosen& chosen) {
+    const fs::path images = now.folder / "images";
+    if (!fs::exists(fs::symlink_status(images))) {
+        if (std::ranges::any_of(chosen.names, capture::is_heif))
+            capture::convert_photos(photos, chosen.names, images, now.folder / "colmap/log.txt",
+                                    now.progress);
+        else
+            fs::create_directory_symlink(link, images);
+    }
+    std::vector<capture::Skipped> skipped;
+    std::set<std::string> gone;
+    for (const std::string& name : chosen.gone) gone.insert(capture::converted_name(name).string());
+    chosen.gone = gone;
+    for (fs::path& name : chosen.names)
+        if (capture::is_heif(name)) {
+            const fs::path original = name;
+            name = capture::converted_name(name);
+            if (!is_file(images / name)) skipped.push_back({original, "it cannot be converted"});
+        }
+    std::erase_if(chosen.names, [&](const fs::path& name) { return !is_file(images / name); });
+    if (!skipped.empty()) say({capture::skipped_text(skipped)}, now.progress);
+}
+
 /// link: what images/ refers to.
 Capture make_of_photos(Making& now, const fs::path& photos, const fs::path& link) {
-    const capture::Chosen chosen = choose(photos, now.folder, now.before, now.record, now.progress);
+    capture::Chosen chosen = choose(photos, now.folder, now.before, now.record, now.progress);
     require_programs(now.folder, false);
+    if (now.before.is_null()) say(remarks_on_others(photos), now.progress);
     say(chosen.remarks, now.progress);
     now.begin();
     core::make_folder(now.folder / "colmap");
-    const fs::path images = now.folder / "images";
-    if (!fs::exists(fs::symlink_status(images))) fs::create_directory_symlink(link, images);
+    convert(now, photos, link, chosen);
+    const size_t masked =
+        capture::copy_masks(photos, chosen.names, now.folder / "images", now.folder / "masks", now.progress);
+    if (masked > 0)
+        say({std::to_string(masked) + " of " + core::counted(chosen.names.size(), "photo") +
+             (masked == 1 ? " has a mask" : " have masks") +
+             ": what is black there is neither searched nor trained"},
+            now.progress);
     return search(now.folder, chosen, now.options, now.progress);
 }
 
@@ -284,18 +378,21 @@ Capture make_of_archive(Making& now) {
 
 Capture make(const fs::path& input, const fs::path& folder, const CaptureOptions& options,
              const capture::ProgressFunction& progress) {
-    const bool video = is_video(input);
-    Making now{input, folder, options, progress, record_of(input, options, video), {}};
+    const std::vector<fs::path> videos = videos_of(input);
+    const bool video = !videos.empty();
+    Making now{input, folder, options, progress, record_of(input, options, video), {}, videos};
     now.before = check_claim(folder, now.record, video);
     if (video) return make_of_video(now);
     if (is_archive(input)) return make_of_archive(now);
-    const fs::path photos = folder_of_photos(input);
+    // A search that has begun keeps its folder.
+    const fs::path images = folder / "images";
+    const fs::path photos =
+        fs::is_symlink(images) && is_folder(images) ? fs::canonical(images) : folder_of_photos(input);
     return make_of_photos(now, photos, fs::canonical(photos));
 }
 
 bool is_photo(const fs::path& file) try {
-    const std::string extension = extension_of(file);
-    return extension == ".heic" || extension == ".heif" || !image::format_name(file).empty();
+    return capture::is_heif(file) || !image::format_name(file).empty();
 } catch (const InputError&) {
     return false;
 }
@@ -348,19 +445,28 @@ fs::path unpack_archive(const fs::path& archive, const fs::path& folder) {
 bool is_capture(const fs::path& path) {
     if (is_video(path) || is_archive(path)) return true;
     return is_folder(path) && !io::is_dataset_folder(path) &&
-           !capture::photo_files(folder_of_photos(path)).empty();
+           (!capture::photo_files(folder_of_photos(path)).empty() || !capture::films_in(path).empty());
+}
+
+bool has_videos(const fs::path& path) {
+    return !videos_of(path).empty();
 }
 
 ImageSize smallest_image(const fs::path& input) {
-    if (is_video(input)) return capture::video_size(input);
     ImageSize smallest;
-    if (!is_folder(input)) return smallest;
+    const auto keep = [&](const ImageSize& size) {
+        const bool smaller = std::min(size.width, size.height) < std::min(smallest.width, smallest.height);
+        if (size.width > 0 && (smaller || smallest.width == 0)) smallest = size;
+    };
+    for (const fs::path& video : videos_of(input)) try {
+            keep(capture::video_size(video));
+        } catch (const InputError&) {
+            if (video == input) throw;  // the others may do
+        }
+    if (!is_folder(input) || smallest.width > 0) return smallest;
     const fs::path folder = folder_of_photos(input);
     for (const fs::path& name : capture::photo_files(folder)) try {
-            const ImageSize size = read_image_size(folder / name);
-            const bool smaller =
-                std::min(size.width, size.height) < std::min(smallest.width, smallest.height);
-            if (smaller || smallest.width == 0) smallest = size;
+            keep(read_image_size(folder / name));
         } catch (const InputError&) {
             continue;  // make_dataset says so
         }
@@ -390,6 +496,7 @@ void check_training_input(const fs::path& path) {
                          name + "; to search them again, ewa cameras " + core::one_line(path.string()) +
                          " -o DIR");
     }
+    if (is_folder(path)) refuse_made(path);
     if (is_capture(path) || (is_folder(path) && io::is_dataset_folder(path))) return;
     if (is_file(path) && (extension_of(path) == ".json" || io::find_importer(path))) return;
     if (const std::string advice = io::export_advice(path); !advice.empty())
@@ -411,9 +518,15 @@ Capture make_dataset(const fs::path& input, const fs::path& folder, const Captur
         throw InputError(core::one_line(input.string()) +
                          " is a dataset: its images have cameras; ewa train " +
                          core::one_line(input.string()) + " trains on them");
+    if (is_folder(input)) refuse_made(input);
     if (!is_capture(input)) refuse(input, "neither a video nor a folder with photos");
+    capture::Times times(options.matching);
+    const auto timed = [&](CaptureProgress now) {
+        times.complete(now);
+        return progress(now);
+    };
     try {
-        return make(input, folder, options, progress);
+        return make(input, folder, options, timed);
     } catch (const capture::Stopped&) {
         Capture result;
         result.interrupted = true;

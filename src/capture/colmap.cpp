@@ -7,6 +7,7 @@
 #include <set>
 
 #include "capture/comparing.h"
+#include "capture/feature_database.h"
 #include "capture/panoramas.h"
 #include "capture/steps.h"
 #include "core/atomic_file.h"
@@ -23,7 +24,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kBlock = 1225;  // pairs that COLMAP verifies before it says so
+constexpr size_t kMostLine = 4096;  // bytes; COLMAP's own are shorter
+constexpr int kBlock = 1225;        // pairs that COLMAP verifies before it says so
 constexpr int kMostCompared =
     200;  // photos, the rest of which are compared with all where looks have not placed them
 constexpr int kMostPanoramas = 50;  // 360° photos, all pairs of which are compared
@@ -59,14 +61,12 @@ class Colmap {
 
     /// The help of a command: names of options differ between releases.
     bool has_option(const std::string& command, const std::string& option) const {
-        std::string help;
-        core::run_program(
+        const core::Answer help = core::ask_program(
             {.command = {"colmap", command, "--help"}, .environment = {kNoDisplay}, .log = log()},
-            [&](std::string_view piece) {
-                help += piece;
-                return true;
-            });
-        return help.find("--" + option + " ") != std::string::npos;
+            [&] { return progress_({}); });
+        if (help.ended == core::Ended::stopped) throw Stopped();
+        if (help.cut && help.text.empty()) throw RunError("colmap " + command + " --help gives no answer");
+        return help.text.find("--" + option + " ") != std::string::npos;
     }
 
     /// The option that has a matcher use a GPU, which COLMAP 3.13 has renamed.
@@ -82,11 +82,19 @@ class Colmap {
         std::string rest;
         const std::string name = command[0] + (command[0] == "colmap" ? " " + command[1] : "");
         const core::Ended ended = core::run_program(
-            {.command = std::move(command), .environment = {kNoDisplay}, .log = log(), .output_to_log = true},
+            {.command = std::move(command),
+             .environment = {kNoDisplay},
+             .log = log(),
+             .output_to_log = true,
+             .joined = true},  // COLMAP 3.9 reports on standard error
             [&](std::string_view piece) {
-                rest += piece;
-                for (size_t end; (end = rest.find('\n')) != std::string::npos; rest.erase(0, end + 1))
-                    now.done = std::max(now.done, std::min(done(rest.substr(0, end)).value_or(0), now.total));
+                for (size_t end; (end = piece.find('\n')) != std::string::npos;
+                     piece.remove_prefix(end + 1)) {
+                    rest += piece.substr(0, end);
+                    now.done = std::max(now.done, std::min(done(rest).value_or(0), now.total));
+                    rest.clear();
+                }
+                if (rest.size() < kMostLine) rest += piece;
                 return progress_(now);
             });
         if (ended == core::Ended::stopped) throw Stopped();
@@ -173,7 +181,14 @@ void extract_features(const Colmap& colmap, const Photos& photos, const Panorama
                                 : "--SiftExtraction.use_gpu";
     static const std::regex pattern(R"(Processed file \[(\d+)/(\d+)\])");
     int before = 0;
+    // Of a search that was interrupted: COLMAP passes over them.
+    std::set<fs::path> known;
+    if (core::is_file(work / "database.db"))
+        if (const FeatureDatabase database(work / "database.db"); database.is_known())
+            for (const auto& [name, number] : database.images()) known.insert(name);
     for (const LensWords& group : lens_words(photos, views)) {
+        const auto done =
+            std::ranges::count_if(group.photos, [&](const fs::path& name) { return known.contains(name); });
         std::string list;
         for (const fs::path& name : group.photos) list += name.string() + "\n";
         core::write_text_file(work / "photos.txt", list);
@@ -181,9 +196,16 @@ void extract_features(const Colmap& colmap, const Photos& photos, const Panorama
             "colmap",       "feature_extractor",     "--database_path",   argument(work / "database.db"),
             "--image_path", argument(photos.folder), "--image_list_path", argument(work / "photos.txt")};
         words.insert(words.end(), group.words.begin(), group.words.end());
+        if (!photos.masks.empty())
+            words.insert(words.end(), {"--ImageReader.mask_path", argument(photos.masks)});
         words.insert(words.end(), {gpu, "0"});
         colmap.run(std::move(words),
-                   {CapturePhase::features, "searched", units(views), before, int(photos.names.size()), {}},
+                   {CapturePhase::features,
+                    "searched",
+                    units(views),
+                    before + int(done),
+                    int(photos.names.size()),
+                    {}},
                    [before](const std::string& line) -> std::optional<int> {
                        const auto numbers = numbers_in(line, pattern);
                        return numbers ? std::optional(before + numbers->first) : std::nullopt;

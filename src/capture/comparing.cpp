@@ -72,15 +72,23 @@ std::optional<std::vector<ImagePair>> compare_photos(const std::filesystem::path
         return images[size_t(pair.first)] != 0 && images[size_t(pair.second)] != 0;
     };
     std::erase_if(pairs, [&](const ImagePair& pair) { return !has_features(pair); });
+    const auto numbers_of = [&](const ImagePair& pair) {
+        return std::pair(images[size_t(pair.first)], images[size_t(pair.second)]);
+    };
+    std::vector<ImagePair> left;  // of a search that was interrupted
+    std::ranges::copy_if(pairs, std::back_inserter(left), [&](const ImagePair& pair) {
+        const auto [a, b] = numbers_of(pair);
+        return !database.is_compared(a, b);
+    });
     std::atomic<int> written = 0;
     const auto compare = [&](size_t i) {
-        const std::int64_t a = images[size_t(pairs[i].first)], b = images[size_t(pairs[i].second)];
-        if (database.is_compared(a, b)) return;
+        const auto [a, b] = numbers_of(left[i]);
         database.write(a, b, matches_of(database.descriptors(a), database.descriptors(b)));
         if (++written % kLasting == 0) database.commit();
     };
     try {
-        on_all_cores({CapturePhase::matches, "matched", "pairs", 0, int(pairs.size()), {}}, progress,
+        const int done = int(pairs.size() - left.size());
+        on_all_cores({CapturePhase::matches, "matched", "pairs", done, int(pairs.size()), {}}, progress,
                      compare);
     } catch (const Stopped&) {
         database.commit();

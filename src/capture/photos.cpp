@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The photos of a folder: which of its files they are, which of them can be read, and which of them share a lens.
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <cctype>
 #include <chrono>
 #include <future>
 #include <map>
+#include <set>
 
 #include "capture/steps.h"
 #include "core/folders.h"
@@ -25,11 +28,6 @@ namespace fs = std::filesystem;
 constexpr uint64_t kDecodingBytes = uint64_t(2) << 30;  // that all threads together may hold
 constexpr size_t kWholeLens = 10;                       // photos that determine four terms of distortion
 
-bool is_heic(const fs::path& path) {
-    const std::string extension = core::lower(path.extension().string());
-    return extension == ".heic" || extension == ".heif";
-}
-
 /// Whether a folder between `folder` and the file in it was made by ewa. known: the answers so far.
 bool below_made(const fs::path& folder, const fs::path& name, std::map<fs::path, bool>& known) {
     const fs::path parent = name.parent_path();
@@ -37,6 +35,42 @@ bool below_made(const fs::path& folder, const fs::path& name, std::map<fs::path,
     const auto found = known.find(parent);
     if (found != known.end()) return found->second;
     return known[parent] = io::is_made_by_ewa(folder / parent) || below_made(folder, parent, known);
+}
+
+/// The words of a name, in lower case.
+std::vector<std::string> words_of(const std::string& name) {
+    std::vector<std::string> words(1);
+    for (const char c : core::lower(name))
+        if (std::isalpha(static_cast<unsigned char>(c)) != 0)
+            words.back() += c;
+        else if (!words.back().empty())
+            words.emplace_back();
+    if (words.size() > 1 && words.back().empty()) words.pop_back();
+    return words;
+}
+
+/// Whether the word means pictures that belong to photos.
+bool is_companion(const std::string& word) {
+    constexpr std::array kWords{"mask",        "masks",        "depth",         "depths", "depthmap",
+                                "depthmaps",   "segmentation", "segmentations", "seg",    "confidence",
+                                "confidences", "matte",        "mattes",        "normal", "normals",
+                                "semantic",    "semantics"};
+    return std::ranges::find(kWords, word) != kWords.end();
+}
+
+/// Whether the file's folder, or one above it, has such a name.
+bool below_companions(const fs::path& file) {
+    return std::ranges::any_of(file.parent_path(), [](const fs::path& part) {
+        return std::ranges::any_of(words_of(part.string()), is_companion);
+    });
+}
+
+/// The photo's name of "IMG_1_mask.png", without the extension. Empty for other names.
+std::string photo_of_companion(const fs::path& file) {
+    const std::string stem = core::lower(file.stem().string());
+    const size_t last = stem.find_last_of("_-.");
+    if (last == std::string::npos || !is_companion(stem.substr(last + 1))) return {};
+    return (file.parent_path() / fs::path(stem.substr(0, last)).stem()).string();
 }
 
 /// COLMAP takes the names as lines, without the blanks around them.
@@ -49,6 +83,8 @@ bool fits_a_line(const std::string& name) {
 /// Why COLMAP should not get the photo; empty if it should.
 std::string fault_of(const fs::path& folder, const fs::path& name) {
     if (!fits_a_line(name.string())) return "its name has a line break, or a blank at an end";
+    if (is_heif(name))
+        return core::is_file(folder / name) && fs::file_size(folder / name) > 0 ? "" : "the file is empty";
     const std::string fault = image::image_fault(folder / name);
     if (!fault.empty()) return fault;
     const std::string_view format = image::format_name(folder / name);
@@ -61,7 +97,7 @@ uint64_t decoded_bytes(const fs::path& folder, const std::vector<fs::path>& name
     constexpr uint64_t kPixelBytes = 16;
     uint64_t most = 1;
     for (const fs::path& name : names) try {
-            if (image::format_name(folder / name) == "jpeg") continue;
+            if (is_heif(name) || image::format_name(folder / name) == "jpeg") continue;
             const ImageSize size = read_image_size(folder / name);
             most = std::max(most, uint64_t(size.width) * uint64_t(size.height) * kPixelBytes);
         } catch (const InputError&) {
@@ -72,22 +108,62 @@ uint64_t decoded_bytes(const fs::path& folder, const std::vector<fs::path>& name
 
 }  // namespace
 
-std::vector<fs::path> photo_files(const fs::path& folder) {
-    std::vector<fs::path> files = image::images_below(folder);
+bool is_run(const fs::path& folder) {
+    return is_file(folder / "config.json") &&
+           (is_file(folder / "metrics.jsonl") || is_file(folder / "checkpoint.ewa") ||
+            is_file(folder / "splats.ply"));
+}
+
+Pictures pictures_in(const fs::path& folder) {
+    Pictures pictures;
     std::map<fs::path, bool> made;
-    std::erase_if(files, [&](const fs::path& file) { return below_made(folder, file, made); });
-    return files;
+    std::set<std::string> stems;
+    const auto stem_of = [](const fs::path& file) {
+        return (file.parent_path() / core::lower(file.stem().string())).string();
+    };
+    for (const fs::path& file : image::images_below(folder)) {
+        if (below_made(folder, file, made)) continue;
+        (below_companions(file) ? pictures.others : pictures.photos).push_back(file);
+        if (!is_heif(file)) stems.insert(stem_of(file));
+    }
+    if (pictures.photos.empty()) std::swap(pictures.photos, pictures.others);
+    std::erase_if(pictures.photos, [&](const fs::path& file) {
+        // A telephone may leave a JPEG beside each photo.
+        const bool other = stems.contains(is_heif(file) ? stem_of(file) : photo_of_companion(file));
+        if (other) pictures.others.push_back(file);
+        return other;
+    });
+    return pictures;
+}
+
+std::vector<fs::path> photo_files(const fs::path& folder) {
+    return pictures_in(folder).photos;
+}
+
+std::vector<fs::path> films_in(const fs::path& folder) try {
+    std::vector<fs::path> films;
+    std::map<fs::path, bool> made;
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
+        const fs::path inside = entry.path().lexically_relative(folder);
+        if (entry.is_regular_file() && is_film(inside) && !core::is_of_desktop(inside) &&
+            !below_made(folder, inside, made))
+            films.push_back(inside);
+    }
+    std::ranges::sort(films);
+    return films;
+} catch (const fs::filesystem_error& error) {
+    throw InputError(
+        core::one_line(folder.string() + ": the folder cannot be read: " + error.code().message()));
 }
 
 std::vector<fs::path> photos_in(const fs::path& folder) {
     const std::string name = core::one_line(folder.string());
     std::vector<fs::path> files = photo_files(folder);
-    if (const auto heic = std::ranges::count_if(files, is_heic); heic > 0)
-        throw InputError(
-            name + ": " + core::counted(uint64_t(heic), "photo") + " " +
-            std::string(core::is_or_are(uint64_t(heic))) +
-            " HEIC, which COLMAP cannot read; convert them, for example with "
-            "heif-convert IMG.HEIC IMG.jpg (Debian: libheif-examples), and remove the originals");
+    if (const auto heif = std::ranges::count_if(files, is_heif); heif > 0 && !converts_heif())
+        throw InputError(name + ": " + core::counted(uint64_t(heif), "photo") + " " +
+                         std::string(core::is_or_are(uint64_t(heif))) +
+                         " HEIC or AVIF, and no program here reads them; heif-convert does "
+                         "(Debian: apt install libheif-examples)");
     for (const fs::path& file : files)
         if (!core::links_stay_inside(folder, file))
             throw InputError(core::one_line((folder / file).string()) +
@@ -107,11 +183,11 @@ void require_photos(const fs::path& folder, size_t count, const std::vector<Skip
 void on_all_cores(CaptureProgress now, const ProgressFunction& progress,
                   const std::function<void(size_t)>& work, size_t most) {
     if (!progress(now)) throw Stopped();
-    std::atomic<int> done = 0;
+    std::atomic<int> done = now.done;
     std::atomic<bool> stopped = false;
     std::future<void> all = std::async(std::launch::async, [&] {
         core::on_all_cores(
-            size_t(now.total),
+            size_t(now.total - now.done),
             [&](size_t i) {
                 if (stopped) return;
                 work(i);

@@ -20,8 +20,8 @@ using ProgressFunction = std::function<bool(const CaptureProgress&)>;
 /// Thrown when the caller's progress function has ended the run.
 struct Stopped {};
 
-/// Calls work(i) for each i < now.total on all cores, and says how many are done. most: of them at once. Throws Stopped, and what
-/// work throws.
+/// Calls work(i) for each i < now.total - now.done on all cores, and says how many are done. most: of them at once. Throws Stopped,
+/// and what work throws.
 void on_all_cores(CaptureProgress now, const ProgressFunction& progress,
                   const std::function<void(size_t)>& work, size_t most = SIZE_MAX);
 
@@ -32,18 +32,27 @@ double sharpness(const std::uint8_t* pixels, int width, int height);
 /// The index of the sharpest image in each of `parts` parts of equal length, in order; all of them if there are fewer.
 std::vector<int> sharpest(const std::vector<double>& sharpness, int parts);
 
-/// Takes the images out of a stream of binary PGM files that arrives in pieces of any size.
+/// Takes the images out of a stream of binary PGM or PPM files that arrives in pieces of any size.
 class PgmStream {
   public:
-    explicit PgmStream(std::function<void(const std::uint8_t* pixels, int width, int height)> image)
-        : image_(std::move(image)) {}
-    /// Throws RunError where the stream is not PGM of 8 bits with at most 16 million pixels.
+    struct Kind {
+        std::string_view magic;
+        uint64_t largest, pixel_bytes, most_pixels;
+    };
+    static constexpr Kind kGrey{"P5", 255, 1, uint64_t(1) << 24};
+    static constexpr Kind kDeepColour{"P6", 65535, 6, uint64_t(1) << 27};
+
+    explicit PgmStream(std::function<void(const std::uint8_t* pixels, int width, int height)> image,
+                       const Kind& kind = kGrey)
+        : image_(std::move(image)), kind_(kind) {}
+    /// Throws RunError where the stream is not of this kind.
     void add(std::string_view bytes);
 
   private:
     bool take_one();
 
     std::function<void(const std::uint8_t*, int, int)> image_;
+    Kind kind_;
     std::string rest_;
 };
 
@@ -51,21 +60,59 @@ class PgmStream {
 void require_ffmpeg();
 void require_colmap();
 
-/// Writes the sharpest frames of a video to `images` as JPEG files. Programs write to the log. Throws
-/// InputError if ffmpeg cannot read the video, RunError, Stopped.
-void extract_frames(const std::filesystem::path& video, const std::filesystem::path& images, int frames,
-                    const std::filesystem::path& log, const ProgressFunction& progress);
+/// Arguments with which ffmpeg and ffprobe read a video. A name that begins with a dash, or has a colon, is a file all the same.
+/// A playlist would lead to other files, and is refused whatever its name.
+std::vector<std::string> film_input(const std::filesystem::path& video);
+
+/// Writes the sharpest frames of videos to `images` as JPEG files of sRGB. Those of several videos go into folders with their names.
+/// Programs write to the log. Returns remarks. Throws InputError if ffmpeg can read no video, RunError, Stopped.
+std::vector<std::string> extract_frames(const std::vector<std::filesystem::path>& videos,
+                                        const std::filesystem::path& images, int frames,
+                                        const std::filesystem::path& log, const ProgressFunction& progress);
 
 constexpr size_t kLeastPhotos = 3;
 constexpr size_t kNamed = 8;  // photos that a line names
 
-/// The size of the frames. 0 x 0 where ffprobe does not say it.
+/// The size of the frames. 0 x 0 where it is not known. Throws as film_info.
 ImageSize video_size(const std::filesystem::path& video);
 
-/// The files of a folder that may be photos, relative to it and sorted. Folders below it that ewa has made do not count.
+/// The pictures of a folder, relative to it and sorted. Folders below it that ewa has made do not count.
+struct Pictures {
+    std::vector<std::filesystem::path> photos;
+    std::vector<std::filesystem::path> others;  // masks, depth maps and their like, by their names
+};
+Pictures pictures_in(const std::filesystem::path& folder);
+/// The photos alone.
 std::vector<std::filesystem::path> photo_files(const std::filesystem::path& folder);
-/// The same. Throws InputError if one is HEIC, or a link out of the folder.
+/// The same. Throws InputError if one is HEIC that nothing here converts, or a link out of the folder.
 std::vector<std::filesystem::path> photos_in(const std::filesystem::path& folder);
+
+/// Whether the folder is that of a training run.
+bool is_run(const std::filesystem::path& folder);
+
+/// Whether the extension is a film's.
+bool is_film(const std::filesystem::path& file);
+/// The films of a folder and the folders below it, as the photos.
+std::vector<std::filesystem::path> films_in(const std::filesystem::path& folder);
+
+/// Whether the photo is of HEIF's family (HEIC, AVIF), which COLMAP does not read.
+bool is_heif(const std::filesystem::path& file);
+/// Whether a program is here that converts such photos.
+bool converts_heif();
+/// The name of a photo among those that COLMAP gets.
+std::filesystem::path converted_name(const std::filesystem::path& name);
+/// Makes a folder of the photos by those names: HEIF as JPEG, and links to the others' files, or copies. A photo that cannot be
+/// converted is left out. Throws RunError, Stopped.
+void convert_photos(const std::filesystem::path& photos, const std::vector<std::filesystem::path>& names,
+                    const std::filesystem::path& folder, const std::filesystem::path& log,
+                    const ProgressFunction& progress);
+
+/// Copies the masks of photos into a folder as COLMAP wants them: NAME.png of the photo's name and size. Values of 0 and 1 become 0
+/// and 255. They lie among the photos, or in masks/ or mask/ beside their folder. names: of the photos in `images`. Newer copies
+/// stay. Returns the number of photos with masks. Throws InputError, RunError, Stopped.
+size_t copy_masks(const std::filesystem::path& photos, const std::vector<std::filesystem::path>& names,
+                  const std::filesystem::path& images, const std::filesystem::path& masks,
+                  const ProgressFunction& progress);
 
 /// A photo that COLMAP does not get.
 struct Skipped {
@@ -135,6 +182,7 @@ struct Photos {
     std::filesystem::path folder;              // of the images
     std::vector<std::filesystem::path> names;  // relative to it
     Pairing pairing = Pairing::all;
+    std::filesystem::path masks = {};  // NAME.png of each name; empty: none
 };
 
 /// Runs COLMAP in `work` and leaves its largest model in `model` (cameras.bin, images.bin, points3D.bin). Throws

@@ -3,39 +3,48 @@
 // writes those that were chosen.
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstddef>
+#include <numeric>
+#include <optional>
+#include <set>
 
+#include "capture/film.h"
 #include "capture/steps.h"
+#include "core/atomic_file.h"
 #include "core/folders.h"
 #include "core/process.h"
 #include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
+#include "image/image_files.h"
 
 namespace ewa::capture {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kSmallWidth = 480;  // px, of the frames whose sharpness is compared
-constexpr uint64_t kMostPixels = uint64_t(1) << 24;
+constexpr int kSmallWidth = 480;   // px, of the frames whose sharpness is compared
+constexpr int kQuality = 97;       // of a JPEG whose flat colours are exact
+constexpr double kUsualRate = 25;  // frames a second, of a film that names none
+// Frames keep their number where ffmpeg neither repeats nor drops any: they are counted at 25 Hz. Releases of ffmpeg have no other
+// way in common, since -vsync ends before 9, and -fps_mode begins with 5.1.
+constexpr const char* kCounted = "settb=1/25,setpts=N";
+constexpr const char* kExact = ":flags=bicubic+accurate_rnd+full_chroma_int+full_chroma_inp";
 
-/// Arguments with which ffmpeg and ffprobe read the video. A name that begins with a dash, or has a colon, is a file all the same.
-/// A playlist would lead to other files, and is refused whatever its name.
-std::vector<std::string> input_words(const fs::path& video) {
-    return {"-v",
-            "error",
-            "-protocol_whitelist",
-            "file",
-            "-format_whitelist",
-            "mov,matroska,avi,mpegts,mpeg",
-            "-i",
-            "file:" + video.string()};
-}
+struct Film {
+    fs::path path;
+    FilmInfo info;
+    std::vector<double> sharpness;  // of each frame
+};
 
-std::vector<std::string> ffmpeg(const fs::path& video) {
-    std::vector<std::string> words{"ffmpeg", "-nostdin", "-hide_banner"};
-    for (std::string& word : input_words(video)) words.push_back(std::move(word));
-    words.insert(words.end(), {"-map", "0:v:0"});
+std::vector<std::string> ffmpeg(const Film& film, const std::vector<std::string>& more) {
+    std::vector<std::string> words{"ffmpeg", "-nostdin", "-hide_banner", "-v", "error"};
+    for (std::string& word : film_input(film.path)) words.push_back(std::move(word));
+    // V: pictures that are no cover of a record.
+    const int stream = film.info.stream;
+    words.insert(words.end(), {"-map", "0:" + (stream < 0 ? "V:0" : std::to_string(stream))});
+    words.insert(words.end(), more.begin(), more.end());
     return words;
 }
 
@@ -46,56 +55,147 @@ std::string frame_pattern(const fs::path& folder) {
     return text + "/frame_%05d.jpg";
 }
 
-/// Throws Error, with `what`, if ffmpeg has failed.
+std::string frame_name(int number) {
+    const std::string digits = std::to_string(number);
+    return "frame_" + std::string(size_t(std::max(0, 5 - int(digits.size()))), '0') + digits + ".jpg";
+}
+
+/// Runs ffmpeg on a film. Returns whether it has read the film to its end. Throws Error, with `what`, if there is nothing to keep.
 template <class Error>
-void check(core::Ended ended, const fs::path& video, const char* what, const fs::path& log) {
+bool run(const Film& film, const std::vector<std::string>& more, const fs::path& log, const char* what,
+         const std::function<bool(std::string_view)>& output, const std::function<bool()>& has_some) {
+    const core::Ended ended =
+        core::run_program({.command = ffmpeg(film, more), .environment = {}, .log = log}, output);
     if (ended == core::Ended::stopped) throw Stopped();
-    if (ended == core::Ended::failed)
-        throw Error(core::one_line(video.string()) + ": " + what + "; " + core::one_line(log.string()) +
+    if (ended == core::Ended::failed && !has_some())
+        throw Error(core::one_line(film.path.string()) + ": " + what + "; " + core::one_line(log.string()) +
                     " has its reason");
+    return ended == core::Ended::done;
 }
 
-/// What ffprobe says of the video; empty if it says nothing.
-std::string probe(const fs::path& video, const char* entries, const fs::path& log) {
-    if (core::find_program("ffprobe").empty()) return {};
-    std::vector<std::string> words{"ffprobe"};
-    for (std::string& word : input_words(video)) words.push_back(std::move(word));
-    words.insert(words.end(), {"-select_streams", "v:0", "-show_entries", entries, "-of", "csv=p=0"});
-    std::string text;
-    const core::Program program{.command = std::move(words), .environment = {}, .log = log};
-    const core::Ended ended = core::run_program(program, [&](std::string_view piece) {
-        text += piece;
-        return true;
-    });
-    return ended == core::Ended::done ? std::string(core::trim(text)) : std::string();
-}
+/// Measures the frames of all films.
+class Measuring {
+  public:
+    Measuring(const fs::path& log, const ProgressFunction& progress) : log_(log), progress_(progress) {}
 
-/// The number of frames that the video's header states; 0 if it states none.
-int stated_frames(const fs::path& video, const fs::path& log) {
-    return core::parse_integer<int>(probe(video, "stream=nb_frames", log)).value_or(0);
-}
-
-std::vector<double> measure(const fs::path& video, const fs::path& log, const ProgressFunction& progress) {
-    const int total = stated_frames(video, log);
-    std::vector<double> result;
-    PgmStream stream([&](const std::uint8_t* pixels, int width, int height) {
-        result.push_back(sharpness(pixels, width, height));
-    });
-    std::vector<std::string> command = ffmpeg(video);
-    for (const char* word : {"-vf", "scale=480:-2", "-vsync", "0", "-f", "image2pipe", "-c:v", "pgm", "-"})
-        command.emplace_back(word);
-    static_assert(kSmallWidth == 480);
-    check<InputError>(
-        core::run_program(
-            {.command = std::move(command), .environment = {}, .log = log},
+    void look_at(Film& film) {
+        film.info = film_info(film.path, [&] { return say(0); });
+        expected_ += film.info.frames;
+    }
+    /// Returns a remark; usually empty.
+    std::string measure(Film& film) {
+        PgmStream stream([&](const std::uint8_t* pixels, int width, int height) {
+            film.sharpness.push_back(sharpness(pixels, width, height));
+        });
+        static_assert(kSmallWidth == 480);
+        const bool whole = run<InputError>(
+            film,
+            {"-vf", std::string("scale=480:-2,format=gray,") + kCounted, "-r", "25", "-f", "image2pipe",
+             "-c:v", "pgm", "-"},
+            log_, "ffmpeg cannot read the video",
             [&](std::string_view piece) {
                 stream.add(piece);
-                const int done = int(result.size());
-                return progress(
-                    {CapturePhase::frames, "looked at", "frames", done, std::max(total, done), {}});
-            }),
-        video, "ffmpeg cannot read the video", log);
-    return result;
+                return say(film.sharpness.size());
+            },
+            [&] { return !film.sharpness.empty(); });
+        done_ += film.sharpness.size();
+        const std::string name = core::one_line(film.path.string());
+        if (film.sharpness.empty()) throw InputError(name + ": the video has no frames");
+        const size_t read = film.sharpness.size(), stated = size_t(std::max(0, film.info.stated));
+        if (whole && 10 * read >= 9 * stated) return {};
+        return name + " is damaged: ffmpeg has read " +
+               (stated > read ? std::to_string(read) + " of its " + core::counted(stated, "frame")
+                              : core::counted(read, "frame") + " of it");
+    }
+    void end() {
+        expected_ = int(done_);
+        if (!say(0)) throw Stopped();
+    }
+
+  private:
+    /// A film may have more frames than it states, or state none. The total then stays ahead, since each change at the end is told.
+    bool say(size_t more) {
+        constexpr int kAhead = 2, kLeast = 100;
+        const int done = int(done_ + more);
+        if (done > expected_) expected_ = std::max(kLeast, kAhead * done);
+        return progress_({CapturePhase::frames, "looked at", "frames", done, expected_, {}});
+    }
+
+    fs::path log_;
+    const ProgressFunction& progress_;
+    size_t done_ = 0;
+    int expected_ = 0;
+};
+
+/// The parts of each film, of which one frame is taken: about as many a second of each film, together `frames`.
+std::vector<int> parts_of(const std::vector<Film>& films, int frames) {
+    std::vector<double> seconds;
+    for (const Film& film : films)
+        seconds.push_back(double(film.sharpness.size()) / (film.info.rate > 0 ? film.info.rate : kUsualRate));
+    const double all = std::accumulate(seconds.begin(), seconds.end(), 0.0);
+    std::vector<int> parts;
+    for (const double each : seconds) parts.push_back(std::max(1, int(std::lround(frames * each / all))));
+    return parts;
+}
+
+/// Names of folders for the films: their own names as far as these differ and fit a line of COLMAP's lists.
+std::vector<std::string> folder_names(const std::vector<Film>& films) {
+    std::set<std::string> taken;
+    std::vector<std::string> names;
+    for (const Film& film : films) {
+        std::string name = film.path.stem().string();
+        for (char& c : name)
+            if (static_cast<unsigned char>(c) <= ' ' || c == 0x7f) c = '_';
+        const std::string usual = name;
+        for (int i = 2; !taken.insert(name).second; ++i) name = usual + "-" + std::to_string(i);
+        names.push_back(name);
+    }
+    return names;
+}
+
+/// Writes these frames of a film. done(count): called now and then; false ends the work.
+void write_frames(const Film& film, const std::vector<int>& chosen, const fs::path& folder,
+                  const fs::path& log, const std::function<bool(int)>& done) {
+    core::make_folder(folder);
+    std::string filter = "select='";
+    for (size_t i = 0; i < chosen.size(); ++i) {
+        filter += i > 0 ? "+eq(n," : "eq(n,";
+        filter += std::to_string(chosen[i]);
+        filter += ")";
+    }
+    filter += std::string("',") + kCounted + ",scale=in_color_matrix=" + matrix_word(film.info) + kExact;
+    std::vector<std::string> words{"-vf", filter, "-r", "25", "-frames:v", std::to_string(chosen.size())};
+    const HdrTransfer transfer = hdr_transfer(film.info);
+    int written = 0;
+    const HdrMap map(transfer);
+    PgmStream deep(
+        [&](const std::uint8_t* pixels, int width, int height) {
+            const std::vector<unsigned char> jpeg =
+                image::encode_jpeg(map.map(pixels, width, height), kQuality);
+            core::AtomicFile file(folder / frame_name(++written));
+            file.write(jpeg.data(), jpeg.size());
+            file.commit();
+        },
+        PgmStream::kDeepColour);
+    if (transfer == HdrTransfer::none) {
+        // A JPEG has the matrix and range of JFIF, which ffmpeg does not convert to by itself.
+        words[1] += std::string(",format=gbrp,scale=out_color_matrix=bt601:out_range=full") + kExact;
+        words.insert(words.end(), {"-q:v", "2", frame_pattern(folder)});
+    } else {
+        words[1] += ",format=rgb48be";
+        words.insert(words.end(), {"-f", "image2pipe", "-c:v", "ppm", "-"});
+    }
+    const auto count = [&] {
+        return transfer == HdrTransfer::none ? int(std::distance(fs::directory_iterator(folder), {}))
+                                             : written;
+    };
+    run<RunError>(
+        film, words, log, "ffmpeg cannot write the frames",
+        [&](std::string_view piece) {
+            if (transfer != HdrTransfer::none) deep.add(piece);
+            return done(count());
+        },
+        [&] { return count() > 0; });
 }
 
 }  // namespace
@@ -132,11 +232,11 @@ void PgmStream::add(std::string_view bytes) {
 }
 
 bool PgmStream::take_one() {
-    // P5, width, height and the largest value, with single white space between them.
+    // P5 or P6, width, height and the largest value, with single white space between them.
     uint64_t numbers[3];
     size_t at = 2;
     if (rest_.size() < 2) return false;
-    bool good = rest_.starts_with("P5");
+    bool good = rest_.starts_with(kind_.magic);
     for (uint64_t& number : numbers) {
         while (at < rest_.size() && std::string_view(" \t\n\r").find(rest_[at]) != std::string_view::npos)
             ++at;
@@ -151,10 +251,10 @@ bool PgmStream::take_one() {
         at = end;
     }
     const uint64_t width = numbers[0], height = numbers[1];
-    if (!good || width == 0 || height == 0 || numbers[2] != 255 || width > kMostPixels ||
-        height > kMostPixels / width)
+    if (!good || width == 0 || height == 0 || numbers[2] != kind_.largest || width > kind_.most_pixels ||
+        height > kind_.most_pixels / width)
         throw RunError("ffmpeg's output is not PGM");
-    const size_t first = at + 1, size = size_t(width * height);
+    const size_t first = at + 1, size = size_t(width * height) * kind_.pixel_bytes;
     if (rest_.size() < first + size) return false;
     image_(reinterpret_cast<const std::uint8_t*>(rest_.data() + first), int(width), int(height));
     rest_.erase(0, first + size);
@@ -166,44 +266,68 @@ void require_ffmpeg() {
         throw RunError("a video needs ffmpeg, which is not installed (Debian: apt install ffmpeg)");
 }
 
-ImageSize video_size(const fs::path& video) {
-    const std::string text = probe(video, "stream=width,height", "/dev/null");
-    const size_t comma = text.find(',');
-    if (comma == std::string::npos) return {};
-    const auto width = core::parse_integer<int>(text.substr(0, comma)),
-               height = core::parse_integer<int>(text.substr(comma + 1));
-    return width && height ? ImageSize{*width, *height} : ImageSize();
+std::vector<std::string> film_input(const fs::path& video) {
+    return {"-protocol_whitelist",
+            "file",
+            "-format_whitelist",
+            "mov,matroska,avi,mpegts,mpeg,asf,ogg,gif,flv,mxf",
+            "-i",
+            "file:" + video.string()};
 }
 
-void extract_frames(const fs::path& video, const fs::path& images, int frames, const fs::path& log,
-                    const ProgressFunction& progress) {
-    const std::vector<int> chosen = sharpest(measure(video, log, progress), frames);
-    if (chosen.empty()) throw InputError(core::one_line(video.string()) + ": the video has no frames");
-    std::string filter = "select='";
-    for (size_t i = 0; i < chosen.size(); ++i) {
-        filter += i > 0 ? "+eq(n," : "eq(n,";
-        filter += std::to_string(chosen[i]);
-        filter += ")";
+ImageSize video_size(const fs::path& video) {
+    const FilmInfo info = film_info(video, [] { return true; });
+    return {info.width, info.height};
+}
+
+std::vector<std::string> extract_frames(const std::vector<fs::path>& paths, const fs::path& images,
+                                        int frames, const fs::path& log, const ProgressFunction& progress) {
+    std::vector<Film> films;
+    std::vector<std::string> remarks;
+    std::optional<InputError> fault;
+    Measuring measuring(log, progress);
+    const auto each = [&](const std::function<std::string(Film&)>& work) {
+        std::erase_if(films, [&](Film& film) {
+            try {
+                if (const std::string remark = work(film); !remark.empty()) remarks.push_back(remark);
+                return false;
+            } catch (const InputError& error) {
+                fault = error;
+                remarks.push_back(std::string(error.what()) + "; it is not used");
+                return true;
+            }
+        });
+    };
+    for (const fs::path& path : paths) films.push_back({path, {}, {}});
+    each([&](Film& film) {
+        measuring.look_at(film);
+        return std::string();
+    });
+    each([&](Film& film) { return measuring.measure(film); });
+    if (films.empty()) throw *fault;
+    measuring.end();
+    const std::vector<int> parts = parts_of(films, frames);
+    std::vector<std::vector<int>> chosen;
+    int total = 0, before = 0;
+    for (size_t i = 0; i < films.size(); ++i) {
+        chosen.push_back(sharpest(films[i].sharpness, paths.size() == 1 ? frames : parts[i]));
+        total += int(chosen[i].size());
     }
     fs::path partial = images;
     partial += ".partial";
     fs::remove_all(partial);
     core::make_folder(partial);
-    std::vector<std::string> command = ffmpeg(video);
-    for (const std::string& word : {std::string("-vf"), filter + "'", std::string("-vsync"), std::string("0"),
-                                    std::string("-q:v"), std::string("2"), frame_pattern(partial)})
-        command.push_back(word);
-    const int total = int(chosen.size());
-    check<RunError>(
-        core::run_program(
-            {.command = std::move(command), .environment = {}, .log = log},
-            [&](std::string_view) {
-                const auto files = std::distance(fs::directory_iterator(partial), {});
+    const std::vector<std::string> names = folder_names(films);
+    for (size_t i = 0; i < films.size(); ++i) {
+        write_frames(
+            films[i], chosen[i], paths.size() == 1 ? partial : partial / names[i], log, [&](int done) {
                 return progress(
-                    {CapturePhase::frames, "extracted", "frames", std::min(int(files), total), total, {}});
-            }),
-        video, "ffmpeg cannot write the frames", log);
+                    {CapturePhase::frames, "extracted", "frames", std::min(before + done, total), total, {}});
+            });
+        before += int(chosen[i].size());
+    }
     fs::rename(partial, images);
+    return remarks;
 }
 
 }  // namespace ewa::capture

@@ -27,10 +27,11 @@ struct CamerasArguments {
 };
 
 int run(const CLI::App& app, const CamerasArguments& arguments) {
-    if (app.count("--frames") > 0 && (fs::is_directory(arguments.input) || is_archive(arguments.input)))
+    if (app.count("--frames") > 0 && !has_videos(arguments.input) &&
+        (fs::is_directory(arguments.input) || is_archive(arguments.input)))
         refuse_frames(std::to_string(arguments.options.frames), arguments.input);
     Progress progress("searched", 1, "photos", arguments.quiet);
-    place_with_progress(arguments.input, arguments.output, arguments.options, progress, {});
+    place_with_progress(arguments.input, arguments.output, arguments.options, progress);
     return 0;
 }
 
@@ -42,9 +43,10 @@ void refuse_frames(const std::string& frames, const fs::path& photos) {
 }
 
 void place_with_progress(const fs::path& input, const fs::path& folder, const CaptureOptions& options,
-                         Progress& progress, const CaptureProgressLine::After& after) {
+                         Progress& progress, const CaptureProgressLine::After& after,
+                         const CaptureProgressLine::Before& before) {
     const InterruptWatch watch;
-    CaptureProgressLine line(progress, options.matching, after);
+    CaptureProgressLine line(progress, after, before);
     const Capture capture = make_dataset(input, folder, options, [&](const CaptureProgress& now) {
         line.update(now);
         return !interrupted();
@@ -63,8 +65,8 @@ Action add_cameras(CLI::App& app) {
     CaptureOptions& options = arguments->options;
     app.add_option(
            "INPUT", arguments->input,
-           "Folder with photos (JPEG, PNG, TIFF or BMP), or a video. COLMAP finds the cameras, ffmpeg "
-           "reads the video; both must be installed")
+           "Folder with photos (JPEG, PNG, TIFF or BMP), a video, or a folder with videos. COLMAP finds the "
+           "cameras, ffmpeg reads the video; both must be installed")
         ->required()
         ->type_name("");
     app.add_option(
@@ -74,7 +76,8 @@ Action add_cameras(CLI::App& app) {
         ->type_name("DIR");
     app.add_option(
            "--frames", options.frames,
-           "Number of frames to take from a video, about: the sharpest of each of as many equal parts")
+           "Number of frames to take from a video, or from all videos of a folder, about: the sharpest of "
+           "each of as many equal parts")
         ->transform(in_range(kFewestVideoFrames, kMostVideoFrames))
         ->type_name("N")
         ->capture_default_str();

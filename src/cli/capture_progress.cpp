@@ -1,51 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/capture_progress.h"
 
+#include <spdlog/fmt/fmt.h>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 
+#include "core/text.h"
 #include "ewa/device.h"
 #include "run/forecast.h"
 
 namespace ewa::cli {
 namespace {
 
-// Seconds by those to search a photo, from photos of 270x480 and 540x960. Photos with twice the details take twice the time to
-// search, and four times to compare.
-double seconds_of_pair(double search) {
-    constexpr double kMostDetails = 0.2;  // COLMAP keeps 8,192 details of a photo
-    return std::min(kMostDetails, 0.24 * std::pow(search, 1.75));
-}
-double seconds_to_place(double search) {
-    return 1.05 * std::pow(search, 0.8);
-}
-
-constexpr double kInSequence = 19, kByLook = 7;  // pairs by photo
-constexpr int kMostByLook = 1000;                // photos, with Matching::automatic
 // Costs on the machine of docs/performance.md, used until this machine has measured its own.
 constexpr double kSearchPerPixel = 0.8e-6;  // s
 constexpr double kPointsPerPixel = 0.1;     // first splats, of the pixels of one photo
 
 }  // namespace
-
-/// Seconds of the parts after this one.
-double CaptureProgressLine::rest() const {
-    const double after = after_ ? after_(photos_, search_seconds_) : 0;
-    if (phase_ == CapturePhase::cameras) return after;
-    const double placing = photos_ * seconds_to_place(search_seconds_) + after;
-    if (phase_ == CapturePhase::matches && (what_ == "matched" || what_ == "verified")) return placing;
-    const bool automatic = matching_ == Matching::automatic;
-    double each = (photos_ - 1) / 2.0;
-    if (automatic && photos_ <= kMostByLook)
-        each = std::min(each, kByLook);
-    else if (automatic || matching_ == Matching::sequence)
-        each = std::min(each, kInSequence);
-    const double matching = photos_ * each * seconds_of_pair(search_seconds_) + placing;
-    return phase_ == CapturePhase::photos || phase_ == CapturePhase::frames
-               ? matching + photos_ * search_seconds_
-               : matching;
-}
 
 void CaptureProgressLine::update(const CaptureProgress& now) {
     if (!now.note.empty()) progress_.note(now.note);
@@ -54,17 +26,16 @@ void CaptureProgressLine::update(const CaptureProgress& now) {
         phase_ = now.phase;
         what_ = now.what;
         total_ = now.total;
-        first_ = done_ = now.done;  // an interrupted search continues
         progress_.begin(now.what, now.total, now.unit);
-        progress_.skip(now.done);
+        progress_.skip(now.done);  // an interrupted search continues
         if (now.unit == "photos" || now.what == "extracted") photos_ = now.total;
+        if (const int photos = photos_; photos > 0 && before_)
+            progress_.note(std::exchange(before_, {})(photos));
     }
     // A video may have more frames than its header says.
     if (now.total != total_) progress_.set_total(total_ = now.total);
-    if (phase_ == CapturePhase::features && now.done > done_)
-        search_seconds_ = progress_.seconds() / (now.done - first_);
-    done_ = now.done;
-    progress_.set_rest(rest());
+    progress_.set_left(now.left < 0 ? std::nullopt : std::optional(now.left));
+    if (after_ && now.photo_seconds > 0) progress_.set_rest(after_(photos_, now.photo_seconds));
     progress_.update(now.done);
 }
 
@@ -79,6 +50,26 @@ CaptureProgressLine::After training_after(const RunOptions& options) {
                                      .splats = uint32_t(splats),
                                      .evaluated = size_t(std::min(photos, 40))},
                                     train, on_cpu);
+    };
+}
+
+CaptureProgressLine::Before advice_before(const RunOptions& options, const ImageSize& size,
+                                          CaptureProgressLine::After training) {
+    constexpr int kShortRun = 2000;  // steps of --quality low
+    if (options.train.steps <= kShortRun || size.width < 1 ||
+        device_info(*open_device(options.device)).type != "cpu")
+        return {};
+    return [=, steps = options.train.steps](int photos) {
+        const double widest =
+            options.max_width > 0 ? double(options.max_width) * options.downscale : size.width;
+        const double scale = std::min(1.0, widest / size.width);
+        const double search = kSearchPerPixel * size.width * size.height * scale * scale;
+        RunOptions shorter = options;
+        shorter.train.steps = kShortRun;
+        return fmt::format(
+            "{} steps take about {} on a processor; --quality low takes about {} for a first look", steps,
+            core::duration_text(training(photos, search)),
+            core::duration_text(training_after(shorter)(photos, search)));
     };
 }
 

@@ -11,30 +11,31 @@
 
 namespace ewa::cli {
 
-/// The time left is measured for the part at hand. Parts to come are estimated from the time that COLMAP takes to search a photo;
-/// docs/capture.md has the ratios.
 class CaptureProgressLine {
   public:
     /// Seconds of the work after the capture, for so many photos that take so many seconds each to search.
     using After = std::function<double(int photos, double search_seconds)>;
+    /// A line for the user before so many photos are searched.
+    using Before = std::function<std::string(int photos)>;
 
-    CaptureProgressLine(Progress& progress, Matching matching, After after)
-        : progress_(progress), matching_(matching), after_(std::move(after)) {}
+    CaptureProgressLine(Progress& progress, After after, Before before)
+        : progress_(progress), after_(std::move(after)), before_(std::move(before)) {}
     void update(const CaptureProgress& now);
 
   private:
-    double rest() const;
-
     Progress& progress_;
-    Matching matching_;
     After after_;
+    Before before_;     // until it is said
     std::string what_;  // empty before the first part
     CapturePhase phase_ = CapturePhase::photos;
-    int first_ = 0, done_ = 0, total_ = 0, photos_ = 0;
-    double search_seconds_ = 0.5;  // of a photo; a guess before the first
+    int total_ = 0, photos_ = 0;
 };
 
 /// The time of a training with these options.
 CaptureProgressLine::After training_after(const RunOptions& options);
+
+/// What proposes a shorter training, where these options take long on a CPU. size: of the photos. training: its time.
+CaptureProgressLine::Before advice_before(const RunOptions& options, const ImageSize& size,
+                                          CaptureProgressLine::After training);
 
 }  // namespace ewa::cli

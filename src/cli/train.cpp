@@ -149,7 +149,7 @@ void check_before_scene(const TrainArguments& arguments) {
     if (!is_mesh_scene(options.scene)) {
         const bool archive = is_archive(options.scene);
         const bool searched = !archive || !archive_has_cameras(options.scene);
-        if (!fs::is_directory(options.scene) && !archive)
+        if (has_videos(options.scene))
             video_frames(options.frames);
         else if (options.frames != "all" && searched)
             refuse_frames(options.frames, options.scene);
@@ -173,12 +173,15 @@ std::unique_ptr<Progress> place_photos(TrainArguments& arguments) {
     run.dataset = run.output / live::kMadeDataset;
     train::check_free(run.output, run);
     CaptureOptions capture;
-    if (!fs::is_directory(run.scene) && !is_archive(run.scene)) {
+    if (has_videos(run.scene)) {
         capture.frames = video_frames(run.frames);
         run.frames = "all";
     }
     auto progress = std::make_unique<Progress>("searched", 1, "photos", arguments.output.quiet);
-    place_with_progress(run.scene, run.dataset, capture, *progress, training_after(run));
+    const CaptureProgressLine::After training = training_after(run);
+    place_with_progress(
+        run.scene, run.dataset, capture, *progress, training,
+        arguments.quality.empty() ? advice_before(run, smallest_image(run.scene), training) : nullptr);
     return progress;
 }
 

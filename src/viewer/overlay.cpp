@@ -9,6 +9,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/text.h"
 #include "scene/frustum.h"
 
 namespace ewa::viewer {
@@ -290,6 +291,7 @@ bool draw_search(const CaptureProgress& progress, const Rectangle& area) {
         if (progress.total > 0)
             text = progress.what + " " + std::to_string(progress.done) + " of " +
                    std::to_string(progress.total) + " " + progress.unit;
+        if (progress.left >= 0) text += ", about " + core::duration_text(progress.left) + " left";
         ImGui::TextUnformatted(text.c_str());
         const float line = ImGui::GetTextLineHeight();
         ImGui::ProgressBar(float(progress.done) / float(std::max(1, progress.total)),

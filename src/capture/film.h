@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Films: what ffprobe or ffmpeg says of one, and the colours of films of high dynamic range.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "ewa/image.h"
+
+namespace ewa::capture {
+
+/// What is known of a film before its frames are read. Numbers that are not known are 0, and names are empty.
+struct FilmInfo {
+    int stream = -1;  // of the largest pictures; -1: not known
+    int width = 0, height = 0;
+    int frames = 0;                // about
+    int stated = 0;                // frames by its header
+    double rate = 0;               // frames a second
+    std::string matrix, transfer;  // ITU-T H.273's, by ffmpeg's names
+    int streams = 0;               // of pictures
+};
+
+/// Asks ffprobe, or ffmpeg where there is no ffprobe. All is unknown where neither can read the film. Throws InputError for a film
+/// without pictures, and for one of two fisheyes, Stopped. go_on: asked now and then.
+FilmInfo film_info(const std::filesystem::path& film, const std::function<bool()>& go_on);
+
+/// The matrix by which YCbCr becomes RGB, as ffmpeg's filter `scale` calls it. A film that names none has the one of its size.
+std::string matrix_word(const FilmInfo& info);
+
+/// A transfer function of high dynamic range (ITU-R BT.2100).
+enum class HdrTransfer { none, hlg, pq };
+HdrTransfer hdr_transfer(const FilmInfo& info);
+
+/// Frames of high dynamic range become sRGB. The primaries are those of BT.2020. 203 cd/m², the white of BT.2408, becomes white, and
+/// what is brighter is clipped.
+class HdrMap {
+  public:
+    explicit HdrMap(HdrTransfer transfer);
+    /// rgb: 16 bits a value, the most significant first.
+    Image map(const std::uint8_t* rgb, int width, int height) const;
+
+  private:
+    HdrTransfer transfer_;
+    std::vector<float> linear_;  // by code value, 1 for white; of HLG, the light of the scene
+    std::vector<float> coded_;   // sRGB by linear value
+};
+
+}  // namespace ewa::capture
