@@ -70,8 +70,8 @@ std::filesystem::path dataset_of_images(const std::filesystem::path& folder);
 /// folder of images whose cameras a dataset has, which the message names.
 void check_training_input(const std::filesystem::path& path);
 
-/// Makes a dataset of a folder of photos (JPEG, PNG, TIFF, BMP; subfolders too; HEIC and AVIF where a program converts them), a
-/// video, a folder of videos, or a zip archive. An archive is
+/// Makes a dataset of a folder of photos, a video, a folder of videos, or a zip archive. Photos are JPEG, PNG, TIFF or BMP, and
+/// HEIC or AVIF where a program converts them. Subfolders count. An archive is
 /// unpacked into unpacked/. If it holds a dataset, that becomes the folder's, and nothing is searched.
 /// - images: the frames of the videos, or a link to the photos' folder, or the photos with those that were converted.
 /// - masks: those that lie among the photos, or in masks/ beside their folder.

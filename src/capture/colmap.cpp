@@ -181,7 +181,7 @@ void extract_features(const Colmap& colmap, const Photos& photos, const Panorama
                                 : "--SiftExtraction.use_gpu";
     static const std::regex pattern(R"(Processed file \[(\d+)/(\d+)\])");
     int before = 0;
-    // Of a search that was interrupted: COLMAP passes over them.
+    // COLMAP passes over those that an interrupted search has done.
     std::set<fs::path> known;
     if (core::is_file(work / "database.db"))
         if (const FeatureDatabase database(work / "database.db"); database.is_known())

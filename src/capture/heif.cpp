@@ -50,7 +50,7 @@ bool convert(const fs::path& photo, const fs::path& plain, const fs::path& jpeg,
         words.push_back(out);
         const core::Answer answer =
             core::ask_program({.command = std::move(words), .environment = {}, .log = log});
-        // Of several pictures in the file, the first is the photo.
+        // The first of several pictures in the file is the photo.
         for (const std::string& made : {out, plain.string() + "-1.jpg"})
             if (answer.ended == core::Ended::done && core::is_file(made) &&
                 image::image_fault(made).empty()) {

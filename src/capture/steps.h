@@ -102,7 +102,7 @@ bool converts_heif();
 /// The name of a photo among those that COLMAP gets.
 std::filesystem::path converted_name(const std::filesystem::path& name);
 /// Makes a folder of the photos by those names: HEIF as JPEG, and links to the others' files, or copies. A photo that cannot be
-/// converted is left out. Throws RunError, Stopped.
+/// converted is skipped. Throws RunError, Stopped.
 void convert_photos(const std::filesystem::path& photos, const std::vector<std::filesystem::path>& names,
                     const std::filesystem::path& folder, const std::filesystem::path& log,
                     const ProgressFunction& progress);

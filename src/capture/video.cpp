@@ -113,7 +113,7 @@ class Measuring {
     }
 
   private:
-    /// A film may have more frames than it states, or state none. The total then stays ahead, since each change at the end is told.
+    /// A film may have more frames than it states, or state none. The total then stays ahead, since a line is printed where it is reached.
     bool say(size_t more) {
         constexpr int kAhead = 2, kLeast = 100;
         const int done = int(done_ + more);

@@ -226,7 +226,7 @@ Ended run_program(const Program& program, const std::function<bool(std::string_v
     out.to.close();
     if (errors) errors->to.close();
     std::array<char, 65536> buffer;
-    // A program that has ended may have left its output to another one, which keeps it open. Others close theirs and go on.
+    // A program that has ended may have left its output to another one, which keeps it open. Others close theirs and continue.
     for (bool ended = false;;) {
         pollfd ready[] = {{out.from.get(), POLLIN, 0}, {errors ? errors->from.get() : -1, POLLIN, 0}};
         const bool open = ready[0].fd >= 0 || ready[1].fd >= 0;
