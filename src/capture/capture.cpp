@@ -83,10 +83,10 @@ void refuse_made(const fs::path& input) {
                    ? "its cameras are in " + core::one_line(fs::proximate(dataset).string())
                    : "its config.json names the dataset with its cameras";
     };
-    if (capture::is_run(path) && !io::is_dataset_folder(path))
+    if (io::is_run_folder(path) && !io::is_dataset_folder(path))
         throw InputError(name + " is a run: " + cameras_of(path));
     const fs::path folder = path.filename();
-    if (capture::is_run(path.parent_path()) && (folder == "test" || folder == "passers_by"))
+    if (io::is_run_folder(path.parent_path()) && (folder == "test" || folder == "passers_by"))
         throw InputError(name + " has pictures that a run has made: " + cameras_of(path.parent_path()));
     if (is_file(path / "capture.json") && !io::is_dataset_folder(path))
         throw InputError(

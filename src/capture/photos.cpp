@@ -108,12 +108,6 @@ uint64_t decoded_bytes(const fs::path& folder, const std::vector<fs::path>& name
 
 }  // namespace
 
-bool is_run(const fs::path& folder) {
-    return is_file(folder / "config.json") &&
-           (is_file(folder / "metrics.jsonl") || is_file(folder / "checkpoint.ewa") ||
-            is_file(folder / "splats.ply"));
-}
-
 Pictures pictures_in(const fs::path& folder) {
     Pictures pictures;
     std::map<fs::path, bool> made;

@@ -87,9 +87,6 @@ std::vector<std::filesystem::path> photo_files(const std::filesystem::path& fold
 /// The same. Throws InputError if one is HEIC that nothing here converts, or a link out of the folder.
 std::vector<std::filesystem::path> photos_in(const std::filesystem::path& folder);
 
-/// Whether the folder is that of a training run.
-bool is_run(const std::filesystem::path& folder);
-
 /// Whether the extension is a film's.
 bool is_film(const std::filesystem::path& file);
 /// The films of a folder and the folders below it, as the photos.

@@ -68,11 +68,14 @@ fs::path entry_in(const fs::path& folder, const std::string& name) {
     return folder / found;
 }
 
+bool is_run_folder(const fs::path& folder) {
+    return core::is_file(folder / "config.json") &&
+           (core::is_file(folder / "metrics.jsonl") || core::is_file(folder / "checkpoint.ewa") ||
+            core::is_file(folder / "splats.ply"));
+}
+
 bool is_made_by_ewa(const fs::path& folder) {
-    return core::is_file(folder / "capture.json") ||
-           (core::is_file(folder / "config.json") &&
-            (core::is_file(folder / "metrics.jsonl") || core::is_file(folder / "checkpoint.ewa") ||
-             core::is_file(folder / "splats.ply")));
+    return core::is_file(folder / "capture.json") || is_run_folder(folder);
 }
 
 bool is_named_as_image(const fs::path& file) {
