@@ -40,7 +40,7 @@ SplatScene read_splat_level(const std::filesystem::path& path, size_t level);
 /// The number of splats of each level of a lod-meta.json, the finest first. Throws InputError.
 std::vector<size_t> level_counts(const std::filesystem::path& path);
 
-/// Reads the splats alone. Skipped contents are warnings on standard error.
+/// Reads the splats alone. Skipped contents are warnings for the log handler (ewa/log.h). Throws as read_splats does.
 Gaussians load_splats(const std::filesystem::path& path);
 
 /// Writes the format of the extension to a temporary file and renames it. So the path never holds half a
@@ -61,7 +61,8 @@ std::vector<std::string> save_levels(const std::filesystem::path& path, Gaussian
 std::string sog_bytes(const std::filesystem::path& path, const Gaussians& gaussians,
                       const SaveOptions& options, std::vector<std::string>& remarks);
 
-/// The same as save_splats with default options. Returned lines become warnings. `comments` are PLY comments, one line each.
+/// The same as save_splats with default options. Returned lines become warnings for the log handler (ewa/log.h). `comments` are
+/// PLY comments, one line each.
 void save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                  const std::vector<std::string>& comments = {});
 

@@ -6,10 +6,36 @@
 #include <spdlog/spdlog.h>
 
 #include <memory>
+#include <mutex>
+#include <utility>
 
 #include "core/text.h"
+#include "ewa/log.h"
 
-namespace ewa::core {
+namespace ewa {
+namespace {
+
+struct Log {
+    std::recursive_mutex mutex;
+    std::shared_ptr<const LogHandler> handler;  // shared with a call of it, in which it may be replaced
+};
+
+/// Never destroyed: other objects may warn while they are.
+Log& log_of_process() {
+    static Log& log = *new Log;
+    return log;
+}
+
+}  // namespace
+
+void set_log_handler(LogHandler handler) {
+    Log& log = log_of_process();
+    auto next = handler ? std::make_shared<const LogHandler>(std::move(handler)) : nullptr;
+    const std::lock_guard lock(log.mutex);
+    log.handler.swap(next);
+}
+
+namespace core {
 
 std::string bytes_text(uint64_t bytes) {
     static constexpr const char* kUnits[] = {"B", "kB", "MB", "GB", "TB"};
@@ -23,15 +49,21 @@ std::string bytes_text(uint64_t bytes) {
 }
 
 void warn(const std::string& text) {
-    static const std::shared_ptr<spdlog::logger> logger = [] {
-        std::shared_ptr<spdlog::logger> made = spdlog::get("ewa");
-        if (!made) {
-            made = spdlog::stderr_color_mt("ewa");
-            made->set_pattern("%^%l%$: %v");
-        }
-        return made;
-    }();
-    logger->warn("{}", one_line(text));
+    Log& log = log_of_process();
+    const std::lock_guard lock(log.mutex);
+    if (const auto handler = log.handler) (*handler)(LogLevel::warning, one_line(text));
 }
 
-}  // namespace ewa::core
+void print_warnings() {
+    set_log_handler([](LogLevel, std::string_view text) {
+        static const std::shared_ptr<spdlog::logger> logger = [] {
+            auto made = spdlog::stderr_color_mt("ewa");
+            made->set_pattern("%^%l%$: %v");
+            return made;
+        }();
+        logger->warn("{}", text);
+    });
+}
+
+}  // namespace core
+}  // namespace ewa

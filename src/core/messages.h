@@ -9,8 +9,10 @@ namespace ewa::core {
 /// Bytes with three digits in powers of 1000, such as "850 B" or "12.3 MB".
 std::string bytes_text(uint64_t bytes);
 
-/// Prints a line on standard error through the spdlog logger named "ewa", whose level can silence it.
-/// Standard output is reserved for results.
+/// Gives a line to the log handler of ewa/log.h.
 void warn(const std::string& text);
+
+/// Sets the log handler of ewa's programs: it prints "warning: text" on standard error. Standard output is for results.
+void print_warnings();
 
 }  // namespace ewa::core

@@ -16,6 +16,7 @@
 
 #include "core/exclusion.h"
 #include "core/folders.h"
+#include "core/messages.h"
 #include "core/outputs.h"
 #include "core/pixel_size.h"
 #include "core/terminal.h"
@@ -371,6 +372,7 @@ int run(const Arguments& arguments) {
 
 int main(int argc, char** argv) {
     core::open_standard_streams();
+    core::print_warnings();
     CLI::App app{"Shows a 3D Gaussian splat scene in a window. F1 in the window lists the keys."};
     app.name("ewa-view");
     app.set_version_flag("--version", "ewa-view " EWA_VERSION);
