@@ -45,10 +45,16 @@ struct ColorGrid {
 
 using Appearance = std::variant<Exposure, Ppisp, ColorGrid>;
 
-/// The first three channels as the camera shows them. Other channels stay. 3 channels or more. Ppisp clamps to 0..1.
+/// Throws InputError unless a ColorGrid has all of its cells. Functions that take an Appearance call it.
+void check(const Appearance& appearance);
+/// The same for each, and unless all have one model.
+void check(const std::vector<Appearance>& appearances);
+
+/// The first three channels as the camera shows them. Other channels stay. Ppisp clamps to 0..1. Throws InputError for fewer
+/// than 3 channels.
 Image with_appearance(Image image, const Appearance& appearance);
 
-/// The mean over images, value by value. All have one model; at least one.
+/// The mean over images, value by value. Throws InputError unless there is one or more, all of one model.
 Appearance mean_appearance(const std::vector<Appearance>& appearances);
 
 /// What an image shows that training has not seen: the mean of those that it has seen, or the splats' own colours with
@@ -59,7 +65,7 @@ std::optional<Appearance> new_view_appearance(const std::vector<Appearance>& app
 /// InputError if the file cannot be read, or values are missing or not finite.
 std::map<std::string, Appearance> load_appearances(const std::filesystem::path& path);
 /// Writes appearance.json. names: one for each of the appearances, which have one model and are not Exposure. Throws
-/// RunError.
+/// RunError (disk), InputError (others).
 void save_appearances(const std::filesystem::path& path, const std::vector<std::string>& names,
                       const std::vector<Appearance>& appearances);
 

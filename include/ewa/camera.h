@@ -59,8 +59,8 @@ struct Camera {
 };
 
 /// The same view at 1/factor of the resolution, to match downscale(Image, factor). Sizes are rounded down, to
-/// at least 1 px. Focal lengths and principal point are scaled by the exact ratio of sizes per axis. factor
-/// >= 1.
+/// at least 1 px. Focal lengths and principal point are scaled by the exact ratio of sizes per axis. Throws
+/// InputError for a factor below 1.
 Camera downscale(const Camera& camera, int factor);
 
 /// The same view in an image of another size in px.

@@ -135,11 +135,14 @@ struct DatasetOptions {
 /// made, an image that is cut off or no image counts as missing. Throws InputError.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options);
 
+/// Throws InputError unless `frames` are indices into dataset.frames. Functions that take both call it.
+void check(const Dataset& dataset, const std::vector<int>& frames);
+
 /// Loads the frame's image as `frame.camera` sees it: turned, reduced, undistorted and downscaled.
 /// Undistortion is bilinear and keeps the focal lengths; the size changes so that no pixel is blank
 /// (src/scene/lens.h). The result has 3 channels, or 4 if the frame has a mask or the file has alpha. The
 /// fourth is their product, which is used as frame.masks says. With frame.left_out, it is the weight of pixels.
-/// Throws InputError, also if a value of the file is not finite.
+/// Throws InputError, also if a value of the file is not finite or left_out is not an image of one channel.
 Image load_frame_image(const Frame& frame);
 
 /// The frame's image in the form that a render is compared with.
@@ -158,13 +161,13 @@ struct Split {
 Split split_frames(const Dataset& dataset, int test_every);
 
 /// 1.1 times the largest distance of a camera from the cameras' mean position (INRIA's cameras_extent,
-/// getNerfppNorm).
+/// getNerfppNorm). Throws InputError for frames that the dataset lacks.
 double scene_extent(const Dataset& dataset, const std::vector<int>& frames);
 
 /// One splat per point, as in INRIA's create_from_pcd: identity rotation, opacity 0.1, colour in SH degree 0.
 /// The scale is the root of the mean squared distance to the 3 nearest neighbours, which is at least 1e-7.
 /// With fewer neighbours, the mean is over these; a single point has scale 1. Throws InputError without
-/// points, or if one is not finite.
+/// points, if one is not finite or has no colour, or for an SH degree that is not 0 to 3.
 Gaussians gaussians_from_points(const PointCloud& points, int sh_degree);
 
 }  // namespace ewa

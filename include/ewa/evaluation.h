@@ -47,7 +47,8 @@ struct Evaluation {
 /// frames: indices into dataset.frames.
 /// appearances: applied to the renders, one for each of `frames` in the same order; or empty.
 /// before_frame: called before each frame; an exception from it ends the evaluation.
-/// Throws InputError (an image that cannot be read or changed its size), RunError (device).
+/// Throws InputError (an image that cannot be read or changed its size, arrays of a wrong length, frames that the dataset
+/// lacks), RunError (device).
 Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
                     const std::vector<int>& frames, const RenderOptions& options,
                     const std::vector<Appearance>& appearances = {},

@@ -15,8 +15,8 @@ namespace ewa {
 using Exposure = std::array<float, 12>;
 inline constexpr Exposure kIdentityExposure{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
-/// Applies the exposure to the first three channels, without clamping. Other channels stay. 3 channels or
-/// more.
+/// Applies the exposure to the first three channels, without clamping. Other channels stay. Throws InputError for
+/// fewer than 3 channels.
 Image exposed(Image image, const Exposure& exposure);
 
 /// The exposures of training images under their Frame::name: exposures.json of a run's folder. Throws InputError if the

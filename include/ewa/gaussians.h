@@ -41,6 +41,10 @@ struct Gaussians {
     }
 };
 
+/// Throws InputError unless sh_degree is 0 to kMaxShDegree and each array has its length. Every function of libewa that takes
+/// Gaussians calls it, and throws what it throws.
+void check(const Gaussians& gaussians);
+
 /// The highest degree with a non-zero coefficient: the degree that the scene needs, which may be below
 /// sh_degree.
 int sh_degree_present(const Gaussians& gaussians);
@@ -48,13 +52,13 @@ int sh_degree_present(const Gaussians& gaussians);
 /// Sets the means to these world positions, and the origin with them. The origin is zero if the scene is
 /// within 1,000 units, or 64 times its size, of the world's origin. Otherwise, as in a georeferenced capture,
 /// it is the middle of the positions in whole units. The middle ignores the outermost tenth and positions
-/// that are not finite.
+/// that are not finite. Throws InputError unless there is one position for each splat.
 void set_world_means(Gaussians& gaussians, const std::vector<glm::dvec3>& positions);
 
 /// The same with the scene's own positions. They move by at most float32's rounding.
 void settle_origin(Gaussians& gaussians);
 
-/// Whether all values of splat i are finite and its quaternion is not zero. Other splats are never visible.
+/// Whether all values of splat i < size are finite and its quaternion is not zero. Other splats are never visible.
 bool drawable(const Gaussians& gaussians, size_t i);
 
 }  // namespace ewa

@@ -24,6 +24,9 @@ struct Image {
     const float* at(int x, int y) const { return &pixels[(size_t(y) * width + x) * channels]; }
 };
 
+/// Throws InputError unless there are as many pixels as the sizes say. Functions that take an Image call it.
+void check(const Image& image);
+
 /// The contents of an image file's header. Damage to the pixels may go unnoticed: they are not decoded.
 struct ImageSize {
     int width = 0, height = 0;  // as the pixels are stored
@@ -33,7 +36,7 @@ struct ImageSize {
 /// Throws InputError.
 ImageSize read_image_size(const std::filesystem::path& path);
 
-/// The image turned by EXIF's orientation (1..8). 5 to 8 exchange width and height.
+/// The image turned by EXIF's orientation (1..8). 5 to 8 exchange width and height. Throws InputError for another one.
 Image oriented(const Image& image, int orientation);
 
 /// Reads PNG, JPEG, TIFF, EXR, WebP, BMP, binary PPM and PGM, and Radiance HDR, recognised by their first
@@ -54,16 +57,17 @@ void save_panorama(const std::filesystem::path& path, const Image& image);
 
 /// Divides the size by factor >= 1, rounded down, to at least 1 px. Each new pixel is the mean over the area
 /// that it covers. These areas have the exact ratio of sizes; pixels on their borders are weighted by their
-/// share.
+/// share. Throws InputError for a factor below 1 and for an image without pixels.
 Image downscale(const Image& image, int factor);
 
-/// The image with a smaller size, as downscale makes it. width, height: 1 to those of the image.
+/// The image with a smaller size, as downscale makes it. width, height: 1 to those of the image. Throws InputError for others.
 Image reduced(const Image& image, int width, int height);
 
-/// The RGB of an image composited over a background. RGB images stay as they are.
+/// The RGB of an image composited over a background. RGB images stay as they are. Throws InputError for other images than RGB
+/// and RGBA.
 Image over_background(const Image& image, const std::array<float, 3>& background);
 
-/// An RGBA image from an RGB image and a one-channel image of the same size.
+/// An RGBA image from an RGB image and a one-channel image of the same size. Throws InputError for others.
 Image with_alpha(const Image& color, const Image& alpha);
 
 /// 10 log10(1 / MSE) over RGB, with both images clamped to [0, 1]. +inf for equal images. weights: of each

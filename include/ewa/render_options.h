@@ -32,6 +32,10 @@ struct RenderOptions {
     std::shared_ptr<const SkyMap> sky{};  // in place of the background; null: none
 };
 
+/// Throws InputError for a negative SH degree, for samples or spheres outside 1 to kMostSamples and kMostNearest, and what
+/// check of the sky throws. Functions that take RenderOptions call it.
+void check(const RenderOptions& options);
+
 enum class Drawing {
     color,
     depth,         // Rendering::depth also

@@ -34,8 +34,8 @@ struct Rendering {
 
 class Renderer {
   public:
-    /// Uploads the scene. Throws RunError when it does not fit in the device's memory (the text says how much
-    /// it needs).
+    /// Uploads the scene. Throws InputError for arrays of a wrong length and options out of range. Throws RunError when it
+    /// does not fit in the device's memory (the text says how much it needs).
     Renderer(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const RenderOptions& options);
     ~Renderer();
     Renderer(Renderer&&) noexcept;
@@ -53,7 +53,7 @@ class Renderer {
     const std::vector<uint8_t>& render_bytes(const Camera& camera, const DrawOptions& options);
 
     /// Another scene in place of the present one, with the kernels that there are. Throws as the constructor
-    /// does; the renderer then has no splats.
+    /// does; after a RunError the renderer has no splats.
     void replace(const Gaussians& gaussians);
 
     /// Splats skipped in the last render because a stored value is not finite or the quaternion is zero.
@@ -80,13 +80,14 @@ struct LossGradient {
 
 /// The training loss of one view and its gradient. target: RGB, or RGBA that is composited over the
 /// background or, with alpha_is_weight, in which alpha says how much a pixel counts; of the camera's size. depths: its
-/// depth map of one channel, for that term of the loss; 0 where it has no depth. Empty: none.
+/// depth map of one channel, for that term of the loss; 0 where it has no depth. Empty: none. Throws InputError for arrays and
+/// images of other lengths.
 LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
                            const Camera& camera, const Image& target, const RenderOptions& options,
                            bool alpha_is_weight = false, const LossWeights& weights = {},
                            const Image& depths = {});
 
-/// What a Renderer of this scene skips, in colour images with these options.
+/// What a Renderer of this scene skips, in colour images with these options. Throws InputError as the renderer does.
 std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options);
 
 }  // namespace ewa

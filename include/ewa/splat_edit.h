@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Edits of a whole splat scene.
+// Edits of a whole splat scene. All throw InputError for arrays of a wrong length, see check() of ewa/gaussians.h.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -19,13 +19,13 @@ namespace ewa {
 /// InputError if the matrix is not finite, is not affine or flattens space.
 void transform_splats(Gaussians& gaussians, const glm::dmat4& matrix);
 
-/// Replaces the scene by the splats of `indices`, in that order. Each index is < size and may be repeated.
+/// Replaces the scene by the splats of `indices`, in that order. Each index is < size and may be repeated. Throws InputError.
 void select_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices);
 
-/// The same in place, for ascending indices without repetition: it takes no memory for a copy.
+/// The same in place, for ascending indices without repetition: it takes no memory for a copy. Throws InputError.
 void keep_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices);
 
-/// Sets the SH degree (0..3). Higher coefficients are cut, new ones are zero.
+/// Sets the SH degree (0..3). Higher coefficients are cut, new ones are zero. Throws InputError for another degree.
 void set_sh_degree(Gaussians& gaussians, int degree);
 
 /// Merges near splats until `target` of them are left, at least one. A merged splat has the mean, the covariance and the colour of

@@ -46,8 +46,8 @@ Gaussians load_splats(const std::filesystem::path& path);
 /// Writes the format of the extension to a temporary file and renames it. So the path never holds half a
 /// file. All formats but .ply skip the splats that are not drawable. Returns one line for each thing that the
 /// format cannot store: what is dropped, and the number of bits of quantised values. Throws RunError (disk).
-/// Throws InputError for an unknown extension or values out of the format's range. The values of a .gltf or a meta.json
-/// go to files beside it whose names are free; those that the replaced file named are removed.
+/// Throws InputError for an unknown extension, arrays of a wrong length, or values out of the format's range. The values of a
+/// .gltf or a meta.json go to files beside it whose names are free; those that the replaced file named are removed.
 std::vector<std::string> save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                      const SaveOptions& options);
 
@@ -57,7 +57,7 @@ std::vector<std::string> save_levels(const std::filesystem::path& path, Gaussian
                                      const SaveOptions& options);
 
 /// The bytes of the .sog that save_splats would write. Adds a line to `remarks` for each thing that it does not store.
-/// `path` is what errors name. Throws InputError for more splats than a WebP image has pixels.
+/// `path` is what errors name. Throws InputError for arrays of a wrong length, and for more splats than a WebP image has pixels.
 std::string sog_bytes(const std::filesystem::path& path, const Gaussians& gaussians,
                       const SaveOptions& options, std::vector<std::string>& remarks);
 

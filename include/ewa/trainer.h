@@ -37,7 +37,8 @@ class Training;
 class Trainer {
   public:
     /// train_frames: indices into dataset.frames. start: the first splats, at most options.max_splats unless that is automatic.
-    /// Pass an rvalue to spare a copy of them. Throws InputError (no frame, no or too many splats, an image that cannot be read), RunError (memory).
+    /// Pass an rvalue to spare a copy of them. Throws InputError (no frame or one that the dataset lacks, no or too many
+    /// splats, arrays of a wrong length, an image that cannot be read), RunError (memory).
     /// ranks: the processes that train together. Each makes a trainer of the same arguments, and holds a share of the
     /// splats. Rank 0 calls the functions below; all others call follow() alone. The results do not depend on the number
     /// of ranks.

@@ -85,6 +85,19 @@ std::string lower(std::string_view text) {
     return result;
 }
 
+std::string grouped(uint64_t number) {
+    std::string text = std::to_string(number);
+    for (auto at = std::ptrdiff_t(text.size()) - 3; at > 0; at -= 3) text.insert(size_t(at), 1, ',');
+    return text;
+}
+
+InputError wrong_length(std::string_view array, uint64_t values, std::string_view who_needs,
+                        uint64_t needed) {
+    return InputError(std::string(array) + " has " + grouped(values) +
+                      (values == 1 ? " value; " : " values; ") + std::string(who_needs) + " " +
+                      grouped(needed));
+}
+
 std::string duration_text(double seconds) {
     if (!(seconds < 3.6e7)) return "very long";
     const long total = std::lround(std::max(0.0, seconds));

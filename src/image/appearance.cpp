@@ -11,6 +11,9 @@
 #include <glm/vec3.hpp>
 #include <utility>
 
+#include "core/text.h"
+#include "core/typing.h"
+#include "ewa/error.h"
 #include "shared/constants.h"
 #include "shared/layouts.h"
 
@@ -150,6 +153,13 @@ void average(const std::vector<Appearance>& all, Model& mean, const Values& valu
     }
 }
 
+void check_colors(const Image& image) {
+    check(image);
+    if (image.channels < 3)
+        throw InputError("an image of " + core::counted(uint64_t(image.channels), "channel") +
+                         " has no colours");
+}
+
 }  // namespace
 
 std::array<float, 27> Ppisp::neutral_camera() {
@@ -171,7 +181,14 @@ std::vector<float> ColorGrid::identity_cells() {
     return cells;
 }
 
+void check(const Appearance& appearance) {
+    const auto* grid = std::get_if<ColorGrid>(&appearance);
+    if (grid && grid->cells.size() != GRID_FLOATS)
+        throw core::wrong_length("cells", grid->cells.size(), "a bilateral grid needs", GRID_FLOATS);
+}
+
 Image exposed(Image image, const Exposure& exposure) {
+    check_colors(image);
     for (size_t p = 0; p < image.pixels.size(); p += size_t(image.channels)) {
         float* color = &image.pixels[p];
         const float r = color[0], g = color[1], b = color[2];
@@ -183,13 +200,24 @@ Image exposed(Image image, const Exposure& exposure) {
 }
 
 Image with_appearance(Image image, const Appearance& appearance) {
+    check(appearance);
+    check_colors(image);
     if (const auto* exposure = std::get_if<Exposure>(&appearance))
         return exposed(std::move(image), *exposure);
     if (const auto* ppisp = std::get_if<Ppisp>(&appearance)) return with_ppisp(std::move(image), *ppisp);
     return with_grid(std::move(image), std::get<ColorGrid>(appearance));
 }
 
+void check(const std::vector<Appearance>& appearances) {
+    for (const Appearance& each : appearances) {
+        check(each);
+        if (each.index() != appearances.front().index()) throw InputError("appearances of several models");
+    }
+}
+
 Appearance mean_appearance(const std::vector<Appearance>& appearances) {
+    check(appearances);
+    if (appearances.empty()) throw InputError("there is no appearance to take the mean of");
     Appearance mean = appearances.front();
     if (auto* exposure = std::get_if<Exposure>(&mean))
         average(

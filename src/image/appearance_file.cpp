@@ -9,6 +9,7 @@
 
 #include "core/json.h"
 #include "core/text.h"
+#include "core/typing.h"
 #include "ewa/appearance.h"
 #include "ewa/error.h"
 #include "ewa/exposure.h"
@@ -95,6 +96,12 @@ std::map<std::string, Appearance> load_appearances(const std::filesystem::path& 
 
 void save_appearances(const std::filesystem::path& path, const std::vector<std::string>& names,
                       const std::vector<Appearance>& appearances) {
+    check(appearances);
+    if (names.size() != appearances.size())
+        throw InputError(core::counted(names.size(), "name") + " for " +
+                         core::counted(appearances.size(), "appearance"));
+    if (!appearances.empty() && std::holds_alternative<Exposure>(appearances.front()))
+        throw InputError("exposures are no appearance.json");
     nlohmann::ordered_json all;
     const bool grid = !appearances.empty() && std::holds_alternative<ColorGrid>(appearances.front());
     all["model"] = grid ? "grid" : "ppisp";

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <cassert>
+#include <string>
 
+#include "core/text.h"
+#include "ewa/error.h"
 #include "ewa/image.h"
+#include "ewa/sky_map.h"
 
 namespace ewa {
 
@@ -29,15 +32,43 @@ std::vector<Cover> covers(int old_size, int new_size) {
     return result;
 }
 
+std::string size_text(const Image& image) {
+    return std::to_string(image.width) + " x " + std::to_string(image.height) + " px and " +
+           std::to_string(image.channels) + (image.channels == 1 ? " channel" : " channels");
+}
+
 }  // namespace
 
+void check(const Image& image) {
+    if (image.width < 0 || image.height < 0 || image.channels < 0)
+        throw InputError("an image of " + size_text(image));
+    const size_t needed = size_t(image.width) * size_t(image.height) * size_t(image.channels);
+    if (image.pixels.size() != needed)
+        throw core::wrong_length("pixels", image.pixels.size(), "an image of " + size_text(image) + " needs",
+                                 needed);
+}
+
+void check(const SkyMap& sky) {
+    if (sky.size < 1 || sky.size > kMostSkyTexels)
+        throw InputError("a sky map of " + std::to_string(sky.size) + " texels a side; it can have 1 to " +
+                         std::to_string(kMostSkyTexels));
+    const size_t needed = size_t(3) * size_t(sky.size) * size_t(sky.size);
+    if (sky.texels.size() != needed)
+        throw core::wrong_length("texels", sky.texels.size(),
+                                 "a sky map of " + std::to_string(sky.size) + " texels a side needs", needed);
+}
+
 Image downscale(const Image& image, int factor) {
-    assert(factor >= 1);
+    if (factor < 1)
+        throw InputError("an image is reduced by a factor of 1 or more, not " + std::to_string(factor));
     return reduced(image, std::max(1, image.width / factor), std::max(1, image.height / factor));
 }
 
 Image reduced(const Image& image, int width, int height) {
-    assert(width >= 1 && height >= 1 && width <= image.width && height <= image.height);
+    check(image);
+    if (width < 1 || height < 1 || width > image.width || height > image.height)
+        throw InputError("an image of " + size_text(image) + " cannot be reduced to " +
+                         std::to_string(width) + " x " + std::to_string(height) + " px");
     if (width == image.width && height == image.height) return image;
     Image result(width, height, image.channels);
     const std::vector<Cover> columns = covers(image.width, result.width);
@@ -62,6 +93,9 @@ Image reduced(const Image& image, int width, int height) {
 }
 
 Image over_background(const Image& image, const std::array<float, 3>& background) {
+    check(image);
+    if (image.channels != 3 && image.channels != 4)
+        throw InputError("an image of " + size_text(image) + " is neither RGB nor RGBA");
     if (image.channels == 3) return image;
     Image result(image.width, image.height, 3);
     for (size_t i = 0; 4 * i < image.pixels.size(); ++i) {
@@ -73,8 +107,12 @@ Image over_background(const Image& image, const std::array<float, 3>& background
 }
 
 Image with_alpha(const Image& color, const Image& alpha) {
-    assert(color.channels == 3 && alpha.channels == 1);
-    assert(color.width == alpha.width && color.height == alpha.height);
+    check(color);
+    check(alpha);
+    if (color.channels != 3 || alpha.channels != 1 || color.width != alpha.width ||
+        color.height != alpha.height)
+        throw InputError("an image of " + size_text(color) + " gets no alpha from one of " +
+                         size_text(alpha));
     Image result(color.width, color.height, 4);
     for (size_t i = 0; i < alpha.pixels.size(); ++i) {
         std::copy_n(&color.pixels[3 * i], 3, &result.pixels[4 * i]);
@@ -84,7 +122,9 @@ Image with_alpha(const Image& color, const Image& alpha) {
 }
 
 Image oriented(const Image& image, int orientation) {
-    assert(orientation >= 1 && orientation <= 8);
+    check(image);
+    if (orientation < 1 || orientation > 8)
+        throw InputError("EXIF has orientations 1 to 8, not " + std::to_string(orientation));
     if (orientation == 1) return image;
     // EXIF 2.32, tag 274: where the first row and column of the stored image are in the upright one.
     const bool swapped = orientation >= 5;

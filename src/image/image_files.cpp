@@ -138,6 +138,7 @@ void save(const fs::path& path, const Image& image, const std::string& xmp) {
     const bool jpeg = extension == ".jpg" || extension == ".jpeg";
     if (extension != ".png" && extension != ".exr" && !jpeg)
         throw InputError(core::one_line(path.string() + ": pictures are written as .png, .jpg or .exr"));
+    check(image);
     if (image.width < 1 || image.height < 1 || image.channels < 1)
         throw InputError(core::one_line(path.string() + ": a picture without pixels cannot be written"));
     // AtomicFile notices a full disk. The codecs' own writers may not.

@@ -100,6 +100,7 @@ Meter::Meter(const std::vector<std::string>& names, const std::filesystem::path&
 std::vector<Figure> Meter::measure(const Image& image, const Image& reference, const Image& weights) const {
     if (!names_.empty() && image::compared_channels(image, reference) != 3)
         throw InputError("metrics beside PSNR and SSIM need images of three channels");
+    image::weight_sum(weights, image);  // refuses weights of another size
     const auto asked = [&](std::string_view prefix) {
         return std::any_of(names_.begin(), names_.end(),
                            [&](const auto& name) { return name.starts_with(prefix); });

@@ -13,6 +13,8 @@ namespace ewa {
 namespace image {
 
 int compared_channels(const Image& a, const Image& b) {
+    check(a);
+    check(b);
     const int channels = std::min(a.channels, 3);
     if (a.width != b.width || a.height != b.height || channels != std::min(b.channels, 3) || a.pixels.empty())
         throw InputError("pictures of " + std::to_string(a.width) + " x " + std::to_string(a.height) + " x " +
@@ -23,6 +25,7 @@ int compared_channels(const Image& a, const Image& b) {
 }
 
 double weight_sum(const Image& weights, const Image& image) {
+    check(weights);
     if (weights.pixels.empty()) return double(image.width) * image.height;
     if (weights.width != image.width || weights.height != image.height || weights.channels != 1)
         throw InputError("the weights of a picture have another size");
@@ -109,6 +112,9 @@ double psnr(const Image& a, const Image& b, const Image& weights) {
 
 ImageDifference compare_images(const Image& a, const Image& b, double tolerance) {
     const double of_colours = psnr(a, b);  // refuses images that cannot be compared
+    if (a.channels != b.channels && std::max(a.channels, b.channels) > 4)
+        throw InputError("images of " + std::to_string(a.channels) + " and " + std::to_string(b.channels) +
+                         " channels cannot be compared");
     ImageDifference out =
         a.channels == 3 && b.channels == 4   ? compare_values(with_opaque_alpha(a), b, tolerance)
         : a.channels == 4 && b.channels == 3 ? compare_values(a, with_opaque_alpha(b), tolerance)

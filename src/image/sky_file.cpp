@@ -34,6 +34,7 @@ SkyMap load_sky(const std::filesystem::path& path) {
 }
 
 void save_sky(const std::filesystem::path& path, const SkyMap& sky) {
+    check(sky);
     core::write_json(path, {{"size", sky.size}, {"texels", sky.texels}});
 }
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "ewa/error.h"
+#include "core/text.h"
 #include "gpu/buffer.h"
 
 namespace ewa::operators {
@@ -60,8 +60,7 @@ class Array {
 /// Throws InputError unless an array has the size that its shape says. shape: for the text, such as "[N, 3]".
 inline void check_size(const char* argument, size_t size, size_t expected, const char* shape) {
     if (size != expected)
-        throw InputError(std::string(argument) + " has " + std::to_string(size) + " values; its shape " +
-                         shape + " needs " + std::to_string(expected));
+        throw core::wrong_length(argument, size, std::string("its shape ") + shape + " needs", expected);
 }
 
 }  // namespace ewa::operators

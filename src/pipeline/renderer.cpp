@@ -32,6 +32,8 @@ Gaussians with_degree(const Gaussians& gaussians, int degree) {
 }
 
 PlanRequest image_request(const Gaussians& gaussians, const RenderOptions& options) {
+    check(gaussians);
+    check(options);
     return {.purpose = Purpose::image,
             .scene_degree = gaussians.sh_degree,
             .present_degree = sh_degree_present(gaussians),
@@ -289,8 +291,8 @@ const std::vector<uint8_t>& Renderer::render_bytes(const Camera& camera, const D
 
 void Renderer::replace(const Gaussians& gaussians) {
     State& s = *state_;
-    s.model = {};  // free its memory first
     s.request = image_request(gaussians, s.options);
+    s.model = {};  // free its memory first
     s.upload(gaussians);
 }
 
@@ -309,11 +311,15 @@ std::vector<PassTime> Renderer::pass_times() const {
 LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
                            const Camera& camera, const Image& target, const RenderOptions& options,
                            bool alpha_is_weight, const LossWeights& weights, const Image& depths) {
-    if (target.width != camera.width || target.height != camera.height || target.channels < 3)
+    check(gaussians);
+    check(target);
+    check(depths);
+    if (target.width != camera.width || target.height != camera.height || target.channels < 3 ||
+        target.channels > 4)
         throw InputError("the training image is " + std::to_string(target.width) + "x" +
                          std::to_string(target.height) + " with " + std::to_string(target.channels) +
                          " channels, the camera " + std::to_string(camera.width) + "x" +
-                         std::to_string(camera.height) + " RGB");
+                         std::to_string(camera.height) + " RGB or RGBA");
     if (!depths.pixels.empty() && (depths.width != camera.width || depths.height != camera.height ||
                                    depths.channels != 1 || !camera.distortion.none() || camera.readout))
         throw InputError("a depth map has one channel and the size of its camera, which is a pinhole");

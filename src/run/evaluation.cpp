@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "image/metric.h"
 #include "image/pillow.h"
@@ -201,6 +202,11 @@ Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussi
                     const std::vector<int>& frames, const RenderOptions& options,
                     const std::vector<Appearance>& appearances, const std::function<void()>& before_frame,
                     const Measures& measures) {
+    check(dataset, frames);
+    for (const Appearance& each : appearances) check(each);
+    if (!appearances.empty() && appearances.size() != frames.size())
+        throw InputError(core::counted(appearances.size(), "appearance") + " for " +
+                         core::counted(frames.size(), "frame"));
     return train::evaluate_views(train::view_renderer_of(std::move(device), gaussians, options), dataset,
                                  frames, options, appearances, before_frame, {}, measures);
 }

@@ -2,7 +2,6 @@
 #include "scene/camera.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <glm/ext/quaternion_double.hpp>
@@ -10,10 +9,15 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
 #include <stdexcept>
+#include <string>
+
+#include "ewa/error.h"
+
 namespace ewa {
 
 Camera downscale(const Camera& camera, int factor) {
-    assert(factor >= 1);
+    if (factor < 1)
+        throw InputError("an image is reduced by a factor of 1 or more, not " + std::to_string(factor));
     return resized(camera, std::max(1, camera.width / factor), std::max(1, camera.height / factor));
 }
 

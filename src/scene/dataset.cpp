@@ -54,6 +54,9 @@ Image load_file(const Frame& frame) {
 
 /// The image with the weights of its pixels as alpha. frame: with left_out.
 Image without_left_out(const Image& image, const Frame& frame) {
+    check(*frame.left_out);
+    if (frame.left_out->channels != 1 || frame.left_out->pixels.empty())
+        throw InputError("frame " + frame.name + ": the mask left_out is not an image of one channel");
     const bool cut = frame.masks == MaskUse::cut && frame.behind && image.channels == 4;
     return with_mask(cut ? over_background(image, *frame.behind) : image, *frame.left_out);
 }
@@ -90,7 +93,15 @@ Split split_frames(const Dataset& dataset, int test_every) {
     return split;
 }
 
+void check(const Dataset& dataset, const std::vector<int>& frames) {
+    for (const int i : frames)
+        if (i < 0 || size_t(i) >= dataset.frames.size())
+            throw InputError("there is no frame " + std::to_string(i) + " in a dataset of " +
+                             std::to_string(dataset.frames.size()));
+}
+
 double scene_extent(const Dataset& dataset, const std::vector<int>& frames) {
+    check(dataset, frames);
     glm::dvec3 mean(0.0);
     for (int i : frames) mean += dataset.frames[size_t(i)].camera.position() / double(frames.size());
     double largest = 0;

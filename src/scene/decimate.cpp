@@ -362,6 +362,7 @@ void merge_rounds(Gaussians& gaussians, size_t target, const scene::MergeTrace& 
 }  // namespace
 
 void decimate_splats(Gaussians& gaussians, size_t target, const std::function<void(size_t)>& progress) {
+    check(gaussians);
     if (gaussians.size() <= target) return;
     std::vector<uint32_t> kept;
     for (size_t i = 0; i < gaussians.size(); ++i)

@@ -96,6 +96,9 @@ Image depths_of_points(const Frame& frame, std::span<const glm::dvec3> points) {
     const bool by_distance = scene::ordered_by_distance(camera.distortion.lens);
     Image depths(camera.width, camera.height, 1);
     for (const uint32_t i : *frame.seen) {
+        if (i >= points.size())
+            throw InputError("frame " + frame.name + " has seen point " + std::to_string(i) + " of " +
+                             std::to_string(points.size()));
         const glm::dvec3 p = camera.rotation * points[i] + camera.translation;
         const auto pixel = scene::pixel_of(camera, limit, p);
         if (!pixel ||

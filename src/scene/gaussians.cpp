@@ -2,8 +2,10 @@
 #include "ewa/gaussians.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "core/text.h"
 #include "ewa/dataset.h"
 #include "ewa/error.h"
 #include "scene/statistics.h"
@@ -37,9 +39,50 @@ glm::dvec3 origin_for(const std::vector<glm::dvec3>& positions) {
     return {std::round(middle.x), std::round(middle.y), std::round(middle.z)};
 }
 
+bool has_degree(const Gaussians& g) {
+    return g.sh_degree >= 0 && g.sh_degree <= kMaxShDegree;
+}
+
+/// Fast, for what is called for each splat.
+bool fit(const Gaussians& g) {
+    const size_t n = g.size();
+    return has_degree(g) && g.means.size() == 3 * n && g.quaternions.size() == 4 * n &&
+           g.log_scales.size() == 3 * n && g.sh.size() == n * g.sh_stride();
+}
+
 }  // namespace
 
+void check(const Gaussians& gaussians) {
+    if (fit(gaussians)) return;
+    if (!has_degree(gaussians))
+        throw InputError("sh_degree is " + std::to_string(gaussians.sh_degree) + "; it can be 0 to " +
+                         std::to_string(kMaxShDegree));
+    struct Array {
+        const char* name;
+        size_t size, each;
+    };
+    const std::array<Array, 5> arrays{{{"means", gaussians.means.size(), 3},
+                                       {"quaternions", gaussians.quaternions.size(), 4},
+                                       {"log_scales", gaussians.log_scales.size(), 3},
+                                       {"opacity_logits", gaussians.opacity_logits.size(), 1},
+                                       {"sh", gaussians.sh.size(), gaussians.sh_stride()}}};
+    // What most arrays have room for is the number of splats.
+    const auto fitting = [&](size_t splats) {
+        return std::ranges::count_if(arrays, [&](const Array& a) { return a.size == a.each * splats; });
+    };
+    size_t splats = gaussians.size();
+    for (const Array& a : arrays)
+        if (fitting(a.size / a.each) > fitting(splats)) splats = a.size / a.each;
+    const auto wrong =
+        *std::ranges::find_if(arrays, [&](const Array& a) { return a.size != a.each * splats; });
+    std::string whose = core::grouped(splats) + (splats == 1 ? " splat" : " splats");
+    if (wrong.name == std::string_view("sh")) whose += " of sh_degree " + std::to_string(gaussians.sh_degree);
+    throw core::wrong_length(wrong.name, wrong.size, whose + (splats == 1 ? " needs" : " need"),
+                             wrong.each * splats);
+}
+
 int sh_degree_present(const Gaussians& gaussians) {
+    check(gaussians);
     const size_t stride = gaussians.sh_stride();
     for (int degree = gaussians.sh_degree; degree > 0; --degree) {
         const size_t begin = size_t(sh_coefficients(degree - 1)) * 3,
@@ -54,6 +97,10 @@ int sh_degree_present(const Gaussians& gaussians) {
 }
 
 bool drawable(const Gaussians& gaussians, size_t i) {
+    if (!fit(gaussians)) check(gaussians);
+    if (i >= gaussians.size())
+        throw InputError("there is no splat " + std::to_string(i) + " in a scene of " +
+                         std::to_string(gaussians.size()));
     const auto finite = [](const float* values, size_t count) {
         return std::all_of(values, values + count, [](float v) { return std::isfinite(v); });
     };
@@ -66,6 +113,10 @@ bool drawable(const Gaussians& gaussians, size_t i) {
 }
 
 void set_world_means(Gaussians& gaussians, const std::vector<glm::dvec3>& positions) {
+    check(gaussians);
+    if (positions.size() != gaussians.size())
+        throw InputError(core::grouped(positions.size()) + " positions for " +
+                         core::grouped(gaussians.size()) + " splats");
     gaussians.origin = origin_for(positions);
     gaussians.means.resize(3 * positions.size());
     for (size_t i = 0; i < positions.size(); ++i)
@@ -74,12 +125,16 @@ void set_world_means(Gaussians& gaussians, const std::vector<glm::dvec3>& positi
 }
 
 void settle_origin(Gaussians& gaussians) {
+    check(gaussians);
     std::vector<glm::dvec3> positions(gaussians.size());
     for (size_t i = 0; i < positions.size(); ++i) positions[i] = gaussians.world_mean(i);
     set_world_means(gaussians, positions);
 }
 
 Gaussians gaussians_from_points(const PointCloud& points, int sh_degree) {
+    Gaussians gaussians;
+    gaussians.sh_degree = sh_degree;
+    check(gaussians);
     if (points.positions.empty()) throw InputError("there are no points to create splats from");
     if (points.colors.size() != points.positions.size())
         throw InputError(std::to_string(points.positions.size()) + " points have " +
@@ -91,8 +146,6 @@ Gaussians gaussians_from_points(const PointCloud& points, int sh_degree) {
                 throw InputError("point " + std::to_string(i) + " has a coordinate that is not finite");
 
     const std::vector<double> squared = scene::mean_squared_neighbor_distance(points.positions);
-    Gaussians gaussians;
-    gaussians.sh_degree = sh_degree;
     gaussians.resize(n);
     set_world_means(gaussians, points.positions);
     for (size_t i = 0; i < n; ++i) {

@@ -5,9 +5,25 @@
 
 #include "core/exclusion.h"
 #include "ewa/error.h"
+#include "ewa/sky_map.h"
 #include "scene/readout.h"
 
-namespace ewa::scene {
+namespace ewa {
+
+void check(const RenderOptions& options) {
+    if (options.sh_degree < 0)
+        throw InputError("the SH degree of a render is " + std::to_string(options.sh_degree) +
+                         "; it can be 0 or more");
+    if (options.samples < 1 || options.samples > kMostSamples)
+        throw InputError(std::to_string(options.samples) + " samples of a ray; it can have 1 to " +
+                         std::to_string(kMostSamples));
+    if (options.nearest < 1 || options.nearest > kMostNearest)
+        throw InputError(std::to_string(options.nearest) + " spheres at a pixel; it can have 1 to " +
+                         std::to_string(kMostNearest));
+    if (options.sky) check(*options.sky);
+}
+
+namespace scene {
 namespace {
 
 using core::Relation;
@@ -49,6 +65,7 @@ void check_look(const Look& look) {
 }
 
 void check_lens(const RenderOptions& render, const Camera& camera) {
+    check(render);
     if (camera.distortion.none() && !moves(camera)) return;
     const std::string_view option = render.points                            ? "--points"
                                     : render.integrator != Integrator::splat ? "--integrator"
@@ -65,4 +82,5 @@ void check_lens(const RenderOptions& render, const Camera& camera) {
                          " draws through pinholes only; take --lens undistort for images of another lens");
 }
 
-}  // namespace ewa::scene
+}  // namespace scene
+}  // namespace ewa

@@ -31,7 +31,7 @@ struct Look {
 /// Throws InputError for options that exclude each other, or need another one.
 void check_look(const Look& look);
 
-/// Throws InputError where splats cannot be drawn so through the camera's lens.
+/// Throws InputError where splats cannot be drawn so through the camera's lens, and what check() of the options throws.
 void check_lens(const RenderOptions& render, const Camera& camera);
 
 }  // namespace ewa::scene

@@ -44,6 +44,7 @@ float density_logit(float shown_logit) {
 }  // namespace scene
 
 void fit_opacities(Gaussians& gaussians, bool density) {
+    check(gaussians);
     if (gaussians.density == density) return;
     for (float& logit : gaussians.opacity_logits)
         logit = density ? scene::density_logit(logit) : scene::shown_logit(logit);

@@ -27,6 +27,8 @@ glm::dvec3 map_direction(double x, double y) {
 }  // namespace
 
 Gaussians sky_splats(const SkyMap& sky, const Gaussians& scene) {
+    check(sky);
+    check(scene);
     const scene::Framing framing = scene::frame_scene(scene, 1, 1);
     const double radius = kSkyDistance * framing.radius;
     Gaussians out;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <functional>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
@@ -27,10 +28,8 @@ constexpr int kMortonBits = 21;  // three axes fill 63 bits
 /// Keeps the values of the indexed splats, `stride` values per splat.
 void select_values(std::vector<float>& values, size_t stride, const std::vector<uint32_t>& indices) {
     std::vector<float> selected(indices.size() * stride);
-    for (size_t i = 0; i < indices.size(); ++i) {
-        assert((indices[i] + size_t(1)) * stride <= values.size());
+    for (size_t i = 0; i < indices.size(); ++i)
         std::copy_n(values.data() + indices[i] * stride, stride, selected.data() + i * stride);
-    }
     values = std::move(selected);
 }
 
@@ -163,14 +162,26 @@ void turn_general(Gaussians& gaussians, const glm::dmat3& linear) {
     }
 }
 
+/// Also the scene's own lengths.
+void check_indices(const Gaussians& gaussians, const std::vector<uint32_t>& indices) {
+    check(gaussians);
+    const auto wrong = std::ranges::find_if(indices, [&](uint32_t i) { return i >= gaussians.size(); });
+    if (wrong != indices.end())
+        throw InputError("there is no splat " + std::to_string(*wrong) + " in a scene of " +
+                         std::to_string(gaussians.size()));
+}
+
 }  // namespace
 
 void select_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices) {
+    check_indices(gaussians, indices);
     for (const auto& [values, each] : scene::arrays_of(gaussians)) select_values(*values, each, indices);
 }
 
 void keep_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices) {
-    assert(std::is_sorted(indices.begin(), indices.end()));
+    check_indices(gaussians, indices);
+    if (std::ranges::adjacent_find(indices, std::greater_equal()) != indices.end())
+        throw InputError("keep_splats takes ascending indices; select_splats takes others");
     for (const auto& [values, each] : scene::arrays_of(gaussians)) {
         for (size_t i = 0; i < indices.size(); ++i)
             if (indices[i] != i)
@@ -180,7 +191,10 @@ void keep_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices) {
 }
 
 void set_sh_degree(Gaussians& gaussians, int degree) {
-    assert(degree >= 0 && degree <= kMaxShDegree);
+    check(gaussians);
+    if (degree < 0 || degree > kMaxShDegree)
+        throw InputError("an SH degree of " + std::to_string(degree) + "; it can be 0 to " +
+                         std::to_string(kMaxShDegree));
     if (degree == gaussians.sh_degree) return;
     const size_t n = gaussians.size(), from = gaussians.sh_stride();
     gaussians.sh_degree = degree;
@@ -192,6 +206,9 @@ void set_sh_degree(Gaussians& gaussians, int degree) {
 }
 
 void append_splats(Gaussians& gaussians, const Gaussians& more) {
+    check(gaussians);
+    check(more);
+    if (&gaussians == &more) return append_splats(gaussians, Gaussians(more));
     if (gaussians.size() == 0) gaussians.density = more.density;
     if (gaussians.density != more.density) {
         fit_opacities(gaussians, false);
@@ -220,6 +237,7 @@ void append_splats(Gaussians& gaussians, const Gaussians& more) {
 }
 
 std::vector<uint32_t> morton_order(const Gaussians& gaussians) {
+    check(gaussians);
     const Bounds bounds = bounds_of(gaussians);
     struct Entry {
         uint64_t code;
@@ -246,6 +264,7 @@ std::vector<uint32_t> morton_order(const Gaussians& gaussians) {
 }
 
 void transform_splats(Gaussians& gaussians, const glm::dmat4& matrix) {
+    check(gaussians);
     scene::check_transform(matrix);
     const glm::dmat3 linear(matrix);
     const double determinant = glm::determinant(linear);

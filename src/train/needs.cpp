@@ -120,6 +120,7 @@ namespace ewa {
 
 SplatCap splat_cap(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& train_frames,
                    const Gaussians& start, const TrainOptions& options) {
+    check(start);
     const TrainOptions resolved = resolve(options, dataset, train_frames);
     return train::Needs(device, dataset, train_frames, start, resolved).cap();
 }
@@ -127,12 +128,15 @@ SplatCap splat_cap(const gpu::Device& device, const Dataset& dataset, const std:
 MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset,
                                const std::vector<int>& train_frames, const Gaussians& start,
                                const TrainOptions& options) {
+    check(start);
     const TrainOptions resolved = resolve(options, dataset, train_frames);
     train::Needs needs(device, dataset, train_frames, start, resolved);
     return needs.memory(needs.cap().splats);
 }
 
 std::vector<PlanLine> plan_lines(const Gaussians& start, const TrainOptions& options, bool masks) {
+    check(start);
+    check(options.render);
     const pipeline::Plan plan = pipeline::plan_for(train::plan_request(start, options, masks));
     return pipeline::describe(plan, start.sh_degree, start.size());
 }

@@ -94,6 +94,15 @@ void check_exclusions(const TrainOptions& options, int ranks) {
 }
 
 void check_training(const TrainOptions& options, int ranks) {
+    if (options.steps < 1) throw InputError("--steps: a training has at least one step");
+    if (options.sh_degree != kAutomaticShDegree &&
+        (options.sh_degree < 0 || options.sh_degree > kMaxShDegree))
+        throw InputError("--sh-degree " + std::to_string(options.sh_degree) + "; it can be 0 to " +
+                         std::to_string(kMaxShDegree));
+    if (options.moment_bits != 16 && options.moment_bits != 32)
+        throw InputError("moments of " + std::to_string(options.moment_bits) +
+                         " bits; they can have 16 or 32");
+    check(options.render);
     if (options.batch < 1) throw InputError("--batch: a step has at least one view");
     if (options.bands < 1) throw InputError("--bands: a view has at least one band");
     check_exclusions(options, ranks);
@@ -274,6 +283,7 @@ bool starts_coarse(const TrainOptions& options, const Dataset& dataset,
 }  // namespace
 
 TrainOptions resolve(TrainOptions options, const Dataset& dataset, const std::vector<int>& train_frames) {
+    check(dataset, train_frames);
     const bool adc_asked_for = options.absolute_gradients || options.revised_opacity || options.render.points;
     if (options.strategy == Strategy::automatic)
         options.strategy = adc_asked_for ? Strategy::adc : strategy_for(options.steps);

@@ -98,6 +98,8 @@ Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
                  std::shared_ptr<Ranks> ranks) {
     if (train_frames.empty())
         throw InputError("there is no training image; a larger --test-every leaves more of them");
+    check(start);
+    check(dataset, train_frames);
     train::check_start(start.size(), options);
     train::check_training(options, ranks->size());
     const double extent = extent_for(dataset, train_frames, start);

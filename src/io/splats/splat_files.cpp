@@ -267,6 +267,7 @@ Gaussians load_splats(const std::filesystem::path& path) {
 
 std::vector<std::string> save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                      const SaveOptions& options) {
+    check(gaussians);
     const SplatFormat format = format_to_write(path);
     if (format == SplatFormat::sog_levels) return save_levels(path, gaussians, options);
     std::vector<std::string> remarks, more;
@@ -305,6 +306,7 @@ std::vector<std::string> save_splats(const std::filesystem::path& path, const Ga
 
 std::vector<std::string> save_levels(const std::filesystem::path& path, Gaussians gaussians,
                                      const SaveOptions& options) {
+    check(gaussians);
     std::vector<std::string> remarks;
     if (gaussians.origin != glm::dvec3(0)) {
         remarks.push_back(rounding_remark(gaussians.origin));
@@ -325,6 +327,7 @@ std::vector<std::string> save_levels(const std::filesystem::path& path, Gaussian
 
 std::string sog_bytes(const std::filesystem::path& path, const Gaussians& gaussians,
                       const SaveOptions& options, std::vector<std::string>& remarks) {
+    check(gaussians);
     Gaussians plain = gaussians;
     if (plain.origin != glm::dvec3(0)) {
         remarks.push_back(rounding_remark(plain.origin));
