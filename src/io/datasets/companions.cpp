@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // Ranks of folders. The first usual folder has kUsual, the next ones more.
-constexpr int kSmaller = 0, kUsual = 1, kOther = 8, kBeside = 9;
+constexpr int kSmaller = 0, kUsual = 1, kElsewhere = 8, kBeside = 9;
 
 constexpr std::string_view kBetween = "_-. ";  // a name and a word
 constexpr std::array<std::string_view, 2> kMaskFolders{"masks", "mask"}, kDepthFolders{"depth", "depths"};
@@ -94,7 +94,7 @@ Companions::Companions(Kind kind, const ImageRecords& images, const fs::path& da
         const std::string key = name_key(at->path().filename());
         const bool smaller = key.starts_with(std::string(names.folders[0]) + "_") &&
                              key != "masks_" + std::to_string(downscale);
-        if (smaller && kind == Kind::masks) list(root_ / at->path().filename(), kOther);
+        if (smaller && kind == Kind::masks) list(root_ / at->path().filename(), kElsewhere);
         if (core::is_file(at->path()) && is_listed(at->path()) &&
             std::ranges::count(names.folders, name_key(at->path().stem())) > 0)
             files_.push_back({root_, at->path().filename(), rank});
@@ -189,12 +189,12 @@ fs::path Companions::find(const ImageRecord& image) {
         return named;
     }
     if (!named.empty())
-        if (const File* file = look(named, kUsual, kOther)) return take(*file);
+        if (const File* file = look(named, kUsual, kElsewhere)) return take(*file);
     if (const File* file = look(image.path, kUsual, kBeside)) return take(*file);
     // Folders of a rig's cameras may each have one mask.
     const fs::path above = split_below(image.path, {folder_, root_}).second.parent_path();
     if (!above.empty() && kind_ == Kind::masks)
-        if (const File* file = look(above, kUsual, kOther)) return take(*file);
+        if (const File* file = look(above, kUsual, kElsewhere)) return take(*file);
     if (!named.empty()) missing_.insert(named);
     return kind_ == Kind::masks ? fs::path() : named;
 }

@@ -86,7 +86,7 @@ ImageRecords import_reality_scan_csv(const ImportSource& source);
 ImageRecords import_polycam(const ImportSource& source);
 ImageRecords import_record3d(const ImportSource& source);
 ImageRecords import_inria(const ImportSource& source);
-
-}  // namespace ewa::io
 ImageRecords import_bundler(const ImportSource& source);
 ImageRecords import_llff(const ImportSource& source);
+
+}  // namespace ewa::io

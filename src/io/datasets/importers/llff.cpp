@@ -70,7 +70,7 @@ ImageRecords import_llff(const ImportSource& source) {
     const ImageFinder images(source.dataset, {"images"});
     if (images.names().size() != rows.size())
         throw InputError(name + ": has " + core::counted(rows.size(), "pose") + ", and " +
-                         core::one_line(images.place().string()) + " has " +
+                         core::one_line(images.folder().string()) + " has " +
                          core::counted(images.names().size(), "image") +
                          "; keep only the images that have poses");
     ImageRecords records;
