@@ -98,7 +98,8 @@ endif()
 set(ewa_package ${CMAKE_INSTALL_LIBDIR}/cmake/ewa)
 install(EXPORT ewaTargets NAMESPACE ewa:: DESTINATION ${ewa_package})
 file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/ewaConfig.cmake @ONLY CONTENT [[
-# The public headers speak of GLM's vectors and of nothing else that is not the standard's.
+# The public headers speak of GLM's vectors and of nothing else that is not the standard's. Only ewa/gpu_interop.h speaks of Vulkan,
+# which its users find themselves.
 include(CMakeFindDependencyMacro)
 find_dependency(glm)
 include(${CMAKE_CURRENT_LIST_DIR}/ewaTargets.cmake)

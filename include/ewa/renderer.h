@@ -3,6 +3,7 @@
 #pragma once
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,9 @@
 #include "ewa/render_options.h"
 
 namespace ewa {
+
+struct DeviceTarget;  // ewa/gpu_interop.h, for renders that stay on the device
+struct DeviceSync;
 
 struct Rendering {
     Image color;  // RGB, background blended in, not clamped
@@ -63,6 +67,8 @@ class Renderer {
     std::vector<PassTime> pass_times() const;  // of the last frame
 
   private:
+    friend void render_to(Renderer&, const Camera&, const DrawOptions&, std::span<const DeviceTarget>,
+                          const DeviceSync&);
     struct State;
     std::unique_ptr<State> state_;
 };

@@ -112,6 +112,11 @@ EWA_UINT(BLEND_DEPTH, 1u);       // also writes PLANE_DEPTH
 EWA_UINT(BLEND_COUNT, 2u);       // also writes PLANE_COUNT
 EWA_UINT(BLEND_ELLIPSOIDS, 3u);  // draws the nearest splat as a solid instead of blending
 EWA_UINT(BLEND_MEDIAN, 4u);      // writes PLANE_MEDIAN and PLANE_T alone, of records with PROJECT_SLOPES
+// pack.comp: what a pixel becomes
+EWA_UINT(PACK_OPAQUE, 0u);  // a word: 8-bit RGB and an alpha of 255
+EWA_UINT(PACK_BYTES, 1u);   // a word: 8-bit RGB and alpha
+EWA_UINT(PACK_FLOATS, 2u);  // four words: floats of RGB and alpha
+EWA_UINT(PACK_DEPTH, 3u);   // a word: a float, the mean depth
 // radix_scatter.comp, bits
 EWA_UINT(SORT_OWN_INDICES, 1u);  // the values are the items' own indices
 EWA_UINT(SORT_DROP_KEYS, 2u);    // last pass: the sorted keys are not needed

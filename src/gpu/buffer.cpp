@@ -193,6 +193,7 @@ void Buffer::copy_through_staging(std::span<const std::byte> source, std::span<s
     vk::CommandPoolCreateInfo pool_info;
     pool_info.setQueueFamilyIndex(device_->queue_family());
     const auto pool = device.createCommandPoolUnique(pool_info);
+    const auto fence = device.createFenceUnique({});
     for (size_t done = 0; done < total; done += piece) {
         const size_t size = std::min(piece, total - done);
         if (up) std::memcpy(staging.mapped(), source.data() + done, size);
@@ -213,8 +214,11 @@ void Buffer::copy_through_staging(std::span<const std::byte> source, std::span<s
         commands->end();
         vk::SubmitInfo submit;
         submit.setCommandBuffers(*commands);
-        device_->queue().submit(submit);
-        device_->queue().waitIdle();
+        with_driver_errors(*device_, [&] {
+            device_->submit(submit, *fence);
+            (void)device.waitForFences(*fence, true, ~uint64_t(0));
+            device.resetFences(*fence);
+        });
         if (!up) std::memcpy(target.data() + done, staging.mapped(), size);
     }
 }

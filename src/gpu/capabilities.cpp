@@ -6,6 +6,8 @@
 #include <bit>
 #include <string_view>
 
+#include "ewa/gpu_interop.h"
+
 namespace ewa::gpu {
 namespace {
 
@@ -22,32 +24,39 @@ std::string type_text(vk::PhysicalDeviceType type) {
     return size_t(type) < kNames.size() ? kNames[size_t(type)] : "other";
 }
 
-/// The first feature that kernels need and the device lacks. Empty if it lacks none.
-std::string missing_features(vk::PhysicalDevice device) {
+/// What kernels need and the device lacks, or does not have enabled. Empty if it lacks nothing.
+std::string missing_features(vk::PhysicalDevice device, const Subgroups& subgroups, const Enabled* enabled) {
     if (device.getProperties().apiVersion < kNeededVersion) return "Vulkan 1.2";
-    if (!compute_family(device.getQueueFamilyProperties(), false)) return "a compute queue";
+    std::string missing;
+    const auto lacks = [&](bool lacking, const std::string& what) {
+        if (lacking) missing += (missing.empty() ? "" : ", ") + what;
+    };
+    lacks(!compute_family(device.getQueueFamilyProperties(), false), "a compute queue");
     const auto features =
         device.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceVulkan12Features>()
             .get<vk::PhysicalDeviceVulkan12Features>();
-    if (!features.scalarBlockLayout) return "scalarBlockLayout";
+    lacks(!features.scalarBlockLayout, "scalarBlockLayout");
+    lacks(features.scalarBlockLayout && enabled && !enabled->scalar_blocks,
+          "scalarBlockLayout, which is not enabled");
     const auto subgroup =
         device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>()
             .get<vk::PhysicalDeviceSubgroupProperties>();
     const auto needed = vk::SubgroupFeatureFlagBits::eBasic | vk::SubgroupFeatureFlagBits::eVote |
                         vk::SubgroupFeatureFlagBits::eShuffle;
-    if ((subgroup.supportedOperations & needed) != needed ||
-        !(subgroup.supportedStages & vk::ShaderStageFlagBits::eCompute))
-        return "subgroup shuffles in compute shaders";
-    if (const uint32_t lanes = subgroups_of(device).lanes; lanes > kMostLanes || !std::has_single_bit(lanes))
-        return "subgroups of " + std::to_string(kMostLanes) + " lanes or fewer";
-    return "";
+    lacks((subgroup.supportedOperations & needed) != needed ||
+              !(subgroup.supportedStages & vk::ShaderStageFlagBits::eCompute),
+          "subgroup shuffles in compute shaders");
+    lacks(subgroups.lanes > kMostLanes || !std::has_single_bit(subgroups.lanes),
+          "subgroups of " + std::to_string(kMostLanes) + " lanes or fewer" +
+              (enabled ? ", without subgroupSizeControl and computeFullSubgroups" : ""));
+    return missing;
 }
 
-OptionalParts optional_parts_of(vk::PhysicalDevice device) {
+OptionalParts optional_parts_of(vk::PhysicalDevice device, const Subgroups& subgroups) {
     using Flag = vk::MemoryPropertyFlagBits;
     OptionalParts parts;
     parts.cpu = device.getProperties().deviceType == vk::PhysicalDeviceType::eCpu;
-    parts.subgroups = subgroups_of(device);
+    parts.subgroups = subgroups;
     parts.ballots =
         bool(device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>()
                  .get<vk::PhysicalDeviceSubgroupProperties>()
@@ -81,12 +90,12 @@ uint32_t subgroup_lanes(uint32_t natural, uint32_t least, uint32_t most) {
     return std::clamp(std::min(natural, kMostLanes), least, most);
 }
 
-Subgroups subgroups_of(vk::PhysicalDevice device) {
+Subgroups subgroups_of(vk::PhysicalDevice device, uint32_t version) {
     const auto natural =
         device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>();
     Subgroups result{natural.get<vk::PhysicalDeviceSubgroupProperties>().subgroupSize};
-    const bool core =
-        natural.get<vk::PhysicalDeviceProperties2>().properties.apiVersion >= VK_API_VERSION_1_3;
+    const uint32_t own = natural.get<vk::PhysicalDeviceProperties2>().properties.apiVersion;
+    const bool core = std::min(own, version) >= VK_API_VERSION_1_3;
     result.extension = !core && has_extension(device.enumerateDeviceExtensionProperties(),
                                               VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME);
     if (core || result.extension) {
@@ -103,6 +112,36 @@ Subgroups subgroups_of(vk::PhysicalDevice device) {
             result.lanes = subgroup_lanes(result.lanes, sizes.minSubgroupSize, sizes.maxSubgroupSize);
     }
     return result;
+}
+
+Enabled enabled_by(const VkDeviceCreateInfo& info) {
+    Enabled enabled;
+    const auto sizes = [&](VkBool32 controlled, VkBool32 full) {
+        enabled.subgroup_sizes |= controlled && full;
+    };
+    if (info.pEnabledFeatures) enabled.int64 = info.pEnabledFeatures->shaderInt64;
+    for (const auto* next = static_cast<const VkBaseInStructure*>(info.pNext); next; next = next->pNext) {
+        if (next->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2)
+            enabled.int64 |= reinterpret_cast<const VkPhysicalDeviceFeatures2*>(next)->features.shaderInt64;
+        if (next->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES)
+            enabled.scalar_blocks |=
+                reinterpret_cast<const VkPhysicalDeviceVulkan12Features*>(next)->scalarBlockLayout;
+        if (next->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES)
+            enabled.scalar_blocks |=
+                reinterpret_cast<const VkPhysicalDeviceScalarBlockLayoutFeatures*>(next)->scalarBlockLayout;
+        if (next->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES) {
+            const auto* part = reinterpret_cast<const VkPhysicalDeviceVulkan13Features*>(next);
+            sizes(part->subgroupSizeControl, part->computeFullSubgroups);
+        }
+        if (next->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_SIZE_CONTROL_FEATURES) {
+            const auto* part = reinterpret_cast<const VkPhysicalDeviceSubgroupSizeControlFeatures*>(next);
+            sizes(part->subgroupSizeControl, part->computeFullSubgroups);
+        }
+    }
+    for (uint32_t i = 0; i < info.enabledExtensionCount; ++i)
+        enabled.host_memory |=
+            std::string_view(info.ppEnabledExtensionNames[i]) == VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME;
+    return enabled;
 }
 
 std::optional<uint32_t> compute_family(std::span<const vk::QueueFamilyProperties> families, bool own_queue) {
@@ -140,9 +179,10 @@ std::vector<std::string> lacks_of(const OptionalParts& parts) {
     return lacks;
 }
 
-DeviceInfo describe(vk::PhysicalDevice device, int index) {
+DeviceInfo describe(vk::PhysicalDevice device, int index, uint32_t version, const Enabled* enabled) {
     const auto chain =
-        device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceDriverProperties>();
+        device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceDriverProperties,
+                              vk::PhysicalDeviceSubgroupProperties>();
     const auto& properties = chain.get<vk::PhysicalDeviceProperties2>().properties;
     const auto& driver = chain.get<vk::PhysicalDeviceDriverProperties>();
     DeviceInfo info;
@@ -151,13 +191,16 @@ DeviceInfo describe(vk::PhysicalDevice device, int index) {
     info.type = type_text(properties.deviceType);
     info.driver = std::string(driver.driverName.data()) + " " + driver.driverInfo.data();
     info.api_version = version_text(properties.apiVersion);
-    info.subgroup_size = subgroups_of(device).lanes;
+    Subgroups subgroups = subgroups_of(device, version);
+    if (enabled && !enabled->subgroup_sizes && subgroups.controlled)
+        subgroups = {chain.get<vk::PhysicalDeviceSubgroupProperties>().subgroupSize};
+    info.subgroup_size = subgroups.lanes;
     const auto memory = device.getMemoryProperties();
     for (uint32_t i = 0; i < memory.memoryHeapCount; ++i)
         if (memory.memoryHeaps[i].flags & vk::MemoryHeapFlagBits::eDeviceLocal)
             info.memory_bytes = std::max<uint64_t>(info.memory_bytes, memory.memoryHeaps[i].size);
-    info.unusable = missing_features(device);
-    if (info.unusable.empty()) info.lacks = lacks_of(optional_parts_of(device));
+    info.unusable = missing_features(device, subgroups, enabled);
+    if (info.unusable.empty()) info.lacks = lacks_of(optional_parts_of(device, subgroups));
     return info;
 }
 

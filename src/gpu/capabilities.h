@@ -14,6 +14,8 @@
 
 namespace ewa::gpu {
 
+inline constexpr uint32_t kUsedVersion = VK_API_VERSION_1_3;  // of what a device has
+
 bool has_extension(std::span<const vk::ExtensionProperties> available, std::string_view name);
 
 constexpr uint32_t kMostLanes = 64;  // of a subgroup: a tile's pixels
@@ -26,7 +28,17 @@ struct Subgroups {
     bool controlled = false;  // a pipeline can ask for this size
     bool extension = false;   // what asks for it is no part of the device's version of Vulkan
 };
-Subgroups subgroups_of(vk::PhysicalDevice device);
+/// version: of the instance.
+Subgroups subgroups_of(vk::PhysicalDevice device, uint32_t version = kUsedVersion);
+
+/// What a device was created with, of what ewa uses.
+struct Enabled {
+    bool scalar_blocks = false;
+    bool subgroup_sizes = false;
+    bool int64 = false;
+    bool host_memory = false;  // VK_EXT_external_memory_host
+};
+Enabled enabled_by(const VkDeviceCreateInfo& info);
 
 /// The first queue family with compute. own_queue: one without graphics if there is one. Its work and the
 /// desktop's do not wait for each other.
@@ -54,6 +66,8 @@ struct OptionalParts {
 /// consequence on a CPU device.
 std::vector<std::string> lacks_of(const OptionalParts& parts);
 
-DeviceInfo describe(vk::PhysicalDevice device, int index);
+/// enabled: of a device that is open; null: all that there is can be enabled.
+DeviceInfo describe(vk::PhysicalDevice device, int index, uint32_t version = kUsedVersion,
+                    const Enabled* enabled = nullptr);
 
 }  // namespace ewa::gpu

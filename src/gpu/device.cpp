@@ -22,8 +22,7 @@ namespace gpu {
 namespace {
 
 constexpr uint32_t kVendorAmd = 0x1002;
-constexpr uint64_t kManyTexels = 1 << 27;              // lavapipe's. Its fetches from texel buffers are fast
-constexpr uint32_t kUsedVersion = VK_API_VERSION_1_3;  // of what a device has
+constexpr uint64_t kManyTexels = 1 << 27;  // lavapipe's. Its fetches from texel buffers are fast
 
 /// The loader hides drivers for portable subsets of Vulkan (MoltenVK) from who does not ask for them.
 vk::UniqueInstance make_instance(const std::vector<const char*>& layers,
@@ -77,6 +76,50 @@ VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT
     return VK_FALSE;
 }
 
+bool shares_memory(const vk::PhysicalDeviceProperties& properties) {
+    return properties.deviceType == vk::PhysicalDeviceType::eCpu ||
+           properties.deviceType == vk::PhysicalDeviceType::eIntegratedGpu;
+}
+
+/// Whether kernels with texel buffers suit the device. They also store words of 64 bits, and a lane of theirs has at least two
+/// pixels of a tile.
+bool fetches_fast(const vk::PhysicalDeviceProperties& properties, uint32_t lanes) {
+    return properties.deviceType == vk::PhysicalDeviceType::eCpu &&
+           properties.limits.maxTexelBufferElements >= kManyTexels && lanes <= 32;
+}
+
+/// What the caller's device is. Throws InputError that names what is missing.
+DeviceInfo described(const VulkanDevice& borrowed) {
+    std::string missing;
+    const auto lacks = [&](bool lacking, const std::string& what) {
+        if (lacking) missing += (missing.empty() ? "" : "; ") + what;
+    };
+    lacks(!borrowed.instance, "no instance");
+    lacks(!borrowed.physical, "no physical device");
+    lacks(!borrowed.device, "no device");
+    lacks(!borrowed.queue, "no queue");
+    lacks(!borrowed.created_with, "no VkDeviceCreateInfo that the device was created with");
+    DeviceInfo info;
+    if (missing.empty()) {
+        lacks(borrowed.api_version < VK_API_VERSION_1_2, "an instance of a version of Vulkan before 1.2");
+        const vk::PhysicalDevice physical(borrowed.physical);
+        const Enabled enabled = enabled_by(*borrowed.created_with);
+        const auto all = vk::Instance(borrowed.instance).enumeratePhysicalDevices();
+        const auto place = std::ranges::find(all, physical);
+        lacks(place == all.end(), "the physical device is not of the instance");
+        const auto families = physical.getQueueFamilyProperties();
+        lacks(borrowed.queue_family >= families.size() ||
+                  !(families[borrowed.queue_family].queueFlags & vk::QueueFlagBits::eCompute),
+              "queue family " + std::to_string(borrowed.queue_family) + " has no compute");
+        info = describe(physical, int(place - all.begin()), borrowed.api_version, &enabled);
+        lacks(!info.unusable.empty(), info.name + " lacks " + info.unusable);
+    }
+    if (!missing.empty())
+        throw InputError("a Vulkan device that cannot be borrowed: " + missing +
+                         "; ewa::DeviceNeeds has what to enable");
+    return info;
+}
+
 /// Mesa's compiler for CPUs crashes where it gets no memory.
 void check_address_space(const DeviceInfo& info) {
     constexpr uint64_t kLeast = uint64_t(960) << 20;
@@ -101,8 +144,26 @@ Device::Device(const DeviceInfo& info, bool validation, bool own_queue, vk::Uniq
     }
 }
 
+Device::Device(const VulkanDevice& borrowed)
+    : info_(described(borrowed)),
+      physical_(borrowed.physical),
+      device_(borrowed.device),
+      queue_(borrowed.queue),
+      submit_(borrowed.submit),
+      queue_family_(borrowed.queue_family) {
+    check_address_space(info_);
+    try {
+        Enabled enabled = enabled_by(*borrowed.created_with);
+        enabled.subgroup_sizes &= subgroups_of(physical_, borrowed.api_version).controlled;
+        enabled.host_memory &= shares_memory(physical_.getProperties());
+        use_device(enabled);
+    } catch (const vk::SystemError& error) {
+        throw RunError("cannot use Vulkan device " + info_.name + ": " + error.what());
+    }
+}
+
 Device::~Device() {
-    if (device_) (void)vkDeviceWaitIdle(*device_);
+    if (own_device_) (void)vkDeviceWaitIdle(device_);
     if (messenger_) {
         const auto destroy = reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(
             vkGetInstanceProcAddr(*instance_, "vkDestroyDebugUtilsMessengerEXT"));
@@ -139,47 +200,28 @@ void Device::create_instance(bool validation) {
 }
 
 void Device::create_device(bool own_queue) {
-    const auto properties = physical_.getProperties();
-    const auto families = physical_.getQueueFamilyProperties();
-    const Subgroups subgroups = subgroups_of(physical_);
-    subgroup_size_control_ = subgroups.controlled;
-    limits_.subgroup_size = subgroups.lanes;
-    vk::PhysicalDeviceSubgroupSizeControlFeatures wanted_sizes;
-    wanted_sizes.setSubgroupSizeControl(true).setComputeFullSubgroups(true);
-    queue_family_ = *compute_family(families, own_queue);
+    const DeviceNeeds needs(physical_, kUsedVersion);
+    queue_family_ = *compute_family(physical_.getQueueFamilyProperties(), own_queue);
     const float priority = 1.0f;
     vk::DeviceQueueCreateInfo queue;
     queue.setQueueFamilyIndex(queue_family_).setQueuePriorities(priority);
-    std::vector<const char*> extensions;
-    if (subgroups.controlled && subgroups.extension)
-        extensions.push_back(VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME);
-    const bool shares_memory =
-        properties.deviceType == vk::PhysicalDeviceType::eCpu || info_.type == "integrated";
-    const bool imports = shares_memory && has_extension(physical_.enumerateDeviceExtensionProperties(),
-                                                        VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
-    if (imports) extensions.push_back(VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
-    // A driver for a subset of Vulkan wants its users to say that they know.
-    if (has_extension(physical_.enumerateDeviceExtensionProperties(), "VK_KHR_portability_subset"))
-        extensions.push_back("VK_KHR_portability_subset");
-    vk::PhysicalDeviceVulkan12Features features;
-    features.setScalarBlockLayout(true);
-    if (subgroup_size_control_) features.setPNext(&wanted_sizes);
+    vk::DeviceCreateInfo create;
+    create.setPNext(&needs.features).setQueueCreateInfos(queue).setPEnabledExtensionNames(needs.extensions);
+    own_device_ = physical_.createDeviceUnique(create);
+    device_ = *own_device_;
+    queue_ = device_.getQueue(queue_family_, 0);
+    use_device(enabled_by(create));
+}
+
+void Device::use_device(const Enabled& enabled) {
+    const auto properties = physical_.getProperties();
+    subgroup_size_control_ = enabled.subgroup_sizes;
+    limits_.subgroup_size = info_.subgroup_size;
     limits_.cpu = properties.deviceType == vk::PhysicalDeviceType::eCpu;
     if (limits_.cpu) limits_.threads = std::max(1u, std::thread::hardware_concurrency());
     limits_.max_texels = properties.limits.maxTexelBufferElements;
-    // The kernels with texel buffers also store words of 64 bits, and a lane of theirs has at least two pixels of a tile.
-    limits_.texel_buffers = limits_.cpu && limits_.max_texels >= kManyTexels && subgroups.lanes <= 32 &&
-                            physical_.getFeatures().shaderInt64;
-    vk::PhysicalDeviceFeatures core_features;
-    core_features.setShaderInt64(limits_.texel_buffers);
-    vk::DeviceCreateInfo create;
-    create.setPNext(&features)
-        .setPEnabledFeatures(&core_features)
-        .setQueueCreateInfos(queue)
-        .setPEnabledExtensionNames(extensions);
-    device_ = physical_.createDeviceUnique(create);
-    queue_ = device_->getQueue(queue_family_, 0);
-    pipeline_cache_ = device_->createPipelineCacheUnique({});
+    limits_.texel_buffers = enabled.int64 && fetches_fast(properties, info_.subgroup_size);
+    pipeline_cache_ = device_.createPipelineCacheUnique({});
     pipelines_ = std::make_unique<PipelineStore>();
 
     float_modes_ = float_modes_of(
@@ -201,15 +243,15 @@ void Device::create_device(bool own_queue) {
     limits_.max_storage_range = properties.limits.maxStorageBufferRange;
     limits_.uniform_alignment = properties.limits.minUniformBufferOffsetAlignment;
     limits_.storage_alignment = properties.limits.minStorageBufferOffsetAlignment;
-    limits_.timestamps = families[queue_family_].timestampValidBits > 0;
+    limits_.timestamps = physical_.getQueueFamilyProperties()[queue_family_].timestampValidBits > 0;
     limits_.timestamp_nanoseconds = properties.limits.timestampPeriod;
-    if (imports)
+    if (enabled.host_memory)
         limits_.host_page = physical_
                                 .getProperties2<vk::PhysicalDeviceProperties2,
                                                 vk::PhysicalDeviceExternalMemoryHostPropertiesEXT>()
                                 .get<vk::PhysicalDeviceExternalMemoryHostPropertiesEXT>()
                                 .minImportedHostPointerAlignment;
-    memory_ = std::make_unique<MemoryPool>(physical_, *device_, shares_memory);
+    memory_ = std::make_unique<MemoryPool>(physical_, device_, shares_memory(properties));
 }
 
 Memory Device::allocate(const vk::MemoryRequirements& requirements, bool host_visible) {
@@ -217,6 +259,14 @@ Memory Device::allocate(const vk::MemoryRequirements& requirements, bool host_vi
     while (!memory && make_room_ && make_room_()) memory = memory_->allocate(requirements, host_visible);
     if (!memory) throw out_of_memory(requirements.size);
     return std::move(*memory);
+}
+
+void Device::submit(const vk::SubmitInfo& info, vk::Fence fence) {
+    const std::lock_guard lock(queue_mutex_);
+    if (!submit_) return queue_.submit(info, fence);
+    const auto result = vk::Result(submit_(info, fence));
+    if (result == vk::Result::eErrorDeviceLost) throw vk::DeviceLostError("vkQueueSubmit");
+    if (result != vk::Result::eSuccess) throw vk::SystemError(vk::make_error_code(result), "vkQueueSubmit");
 }
 
 void Device::limit_memory(uint64_t bytes, std::function<bool()> make_room) {
@@ -269,6 +319,30 @@ void Device::check_validation() {
 
 }  // namespace gpu
 
+DeviceNeeds::DeviceNeeds(VkPhysicalDevice handle, uint32_t api_version) {
+    if (!handle) throw InputError("no physical device");
+    const vk::PhysicalDevice physical(handle);
+    const auto properties = physical.getProperties();
+    const auto available = physical.enumerateDeviceExtensionProperties();
+    const gpu::Subgroups subgroups = gpu::subgroups_of(physical, api_version);
+    const auto want = [&](bool wanted, const char* name) {
+        if (wanted && gpu::has_extension(available, name)) extensions.push_back(name);
+    };
+    want(subgroups.controlled && subgroups.extension, VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME);
+    want(gpu::shares_memory(properties), VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
+    // A driver for a subset of Vulkan wants its users to say that they know.
+    want(true, "VK_KHR_portability_subset");
+    features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+    features.pNext = &vulkan12;
+    features.features.shaderInt64 =
+        gpu::fetches_fast(properties, subgroups.lanes) && physical.getFeatures().shaderInt64;
+    vulkan12.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
+    vulkan12.scalarBlockLayout = true;
+    subgroup_sizes.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_SIZE_CONTROL_FEATURES;
+    subgroup_sizes.subgroupSizeControl = subgroup_sizes.computeFullSubgroups = subgroups.controlled;
+    if (subgroups.controlled) vulkan12.pNext = &subgroup_sizes;
+}
+
 namespace {
 
 struct Found {
@@ -303,6 +377,10 @@ std::shared_ptr<gpu::Device> open_device(const DeviceOptions& options) {
     if (options.validation) found.instance.reset();  // the validation layer comes with an instance of its own
     return std::make_shared<gpu::Device>(chosen, options.validation, options.own_queue,
                                          std::move(found.instance));
+}
+
+std::shared_ptr<gpu::Device> borrow_device(const VulkanDevice& vulkan) {
+    return std::make_shared<gpu::Device>(vulkan);
 }
 
 DeviceInfo device_info(const gpu::Device& device) {

@@ -13,6 +13,7 @@
 
 #include "ewa/device.h"
 #include "ewa/error.h"
+#include "ewa/gpu_interop.h"
 #include "gpu/capabilities.h"
 #include "gpu/memory.h"
 
@@ -46,19 +47,23 @@ class Device {
   public:
     /// own_queue: as in DeviceOptions. instance: of which `info` is a device, without validation. Null: it gets one of its own.
     Device(const DeviceInfo& info, bool validation, bool own_queue = true, vk::UniqueInstance instance = {});
+    /// Uses a caller's device, which stays the caller's. Throws what borrow_device throws.
+    explicit Device(const VulkanDevice& borrowed);
     ~Device();
     Device(const Device&) = delete;
     Device& operator=(const Device&) = delete;
 
     const DeviceInfo& info() const { return info_; }
     const Limits& limits() const { return limits_; }
-    vk::Device handle() const { return *device_; }
-    vk::Queue queue() const { return queue_; }
+    vk::Device handle() const { return device_; }
     uint32_t queue_family() const { return queue_family_; }
     vk::PhysicalDevice physical() const { return physical_; }
     bool subgroup_size_control() const { return subgroup_size_control_; }
     vk::PipelineCache pipeline_cache() const { return *pipeline_cache_; }
     PipelineStore& pipelines() { return *pipelines_; }
+
+    /// Submits to the queue. Calls may come from any thread.
+    void submit(const vk::SubmitInfo& info, vk::Fence fence);
 
     /// What pipelines ask of 32-bit floats: what there is. A CPU device is asked for nothing: lavapipe keeps NaN
     /// anyway, and computes other bytes when asked.
@@ -91,16 +96,21 @@ class Device {
   private:
     void create_instance(bool validation);
     void create_device(bool own_queue);
+    /// What ewa knows and needs of device_, which was created with `enabled`.
+    void use_device(const Enabled& enabled);
 
     DeviceInfo info_;
     Limits limits_;
-    vk::UniqueInstance instance_;
+    vk::UniqueInstance instance_;  // null if the device is a caller's
     VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
     vk::PhysicalDevice physical_;
-    vk::UniqueDevice device_;
+    vk::UniqueDevice own_device_;  // null if the device is a caller's
+    vk::Device device_;
     std::unique_ptr<MemoryPool> memory_;
     std::function<bool()> make_room_;
     vk::Queue queue_;
+    std::function<VkResult(const VkSubmitInfo&, VkFence)> submit_;  // in place of the queue's
+    std::mutex queue_mutex_;
     vk::UniquePipelineCache pipeline_cache_;
     std::unique_ptr<PipelineStore> pipelines_;
     uint32_t queue_family_ = 0;
@@ -109,5 +119,19 @@ class Device {
     std::mutex message_mutex_;
     std::vector<std::string> messages_;
 };
+
+/// Calls action, and gives the driver's errors words.
+template <class Action>
+void with_driver_errors(const Device& device, Action action) {
+    try {
+        action();
+    } catch (const vk::DeviceLostError&) {
+        throw RunError(
+            "device " + device.info().name +
+            " was lost: its driver has reset it, or it is gone; --resume continues a training run");
+    } catch (const vk::SystemError& error) {
+        throw RunError("device " + device.info().name + ": " + error.what());
+    }
+}
 
 }  // namespace ewa::gpu

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <deque>
 #include <stdexcept>
+#include <variant>
 
 #include "ewa/error.h"
 
@@ -11,21 +12,55 @@ namespace ewa::gpu {
 
 namespace {
 
-/// Calls action, and gives the driver's errors words.
-template <class Action>
-void with_driver_errors(const Device& device, Action action) {
-    try {
-        action();
-    } catch (const vk::DeviceLostError&) {
-        throw RunError(
-            "device " + device.info().name +
-            " was lost: its driver has reset it, or it is gone; --resume continues a training run");
-    } catch (const vk::SystemError& error) {
-        throw RunError("device " + device.info().name + ": " + error.what());
+constexpr uint64_t kForever = ~uint64_t(0);
+
+}  // namespace
+
+uint32_t pixel_bytes(VkFormat format) {
+    switch (format) {
+        case VK_FORMAT_R8G8B8A8_UNORM:
+        case VK_FORMAT_R8G8B8A8_SRGB:
+        case VK_FORMAT_R32_SFLOAT:
+            return 4;
+        case VK_FORMAT_R32G32B32A32_SFLOAT:
+            return 16;
+        default:
+            throw InputError(
+                "a render goes to a target of R8G8B8A8_UNORM, R8G8B8A8_SRGB, R32G32B32A32_SFLOAT or "
+                "R32_SFLOAT, not " +
+                vk::to_string(vk::Format(format)));
     }
 }
 
-}  // namespace
+void check_target(const DeviceTarget& target, uint32_t width, uint32_t height) {
+    const uint64_t pixel = pixel_bytes(target.format), row = pixel * width;
+    const std::string render =
+        "a render of " + std::to_string(width) + " x " + std::to_string(height) + " px";
+    if (const auto* to = std::get_if<DeviceImage>(&target.to)) {
+        if (!to->image) throw InputError("a target without an image");
+        if (to->place.x < 0 || to->place.y < 0 || uint64_t(to->place.x) + width > to->size.width ||
+            uint64_t(to->place.y) + height > to->size.height)
+            throw InputError(render + " at " + std::to_string(to->place.x) + ", " +
+                             std::to_string(to->place.y) + " does not fit in an image of " +
+                             std::to_string(to->size.width) + " x " + std::to_string(to->size.height) +
+                             " px");
+        if (to->layout_after == VK_IMAGE_LAYOUT_UNDEFINED ||
+            to->layout_after == VK_IMAGE_LAYOUT_PREINITIALIZED)
+            throw InputError("no image can change to the layout " +
+                             vk::to_string(vk::ImageLayout(to->layout_after)));
+        return;
+    }
+    const auto& to = std::get<DeviceBuffer>(target.to);
+    if (!to.buffer) throw InputError("a target without a buffer");
+    const uint64_t step = to.row_bytes ? to.row_bytes : row;
+    if (to.begin % 4 != 0 || step % 4 != 0 || step < row)
+        throw InputError("rows of a target begin at byte " + std::to_string(to.begin) + " and every " +
+                         std::to_string(step) + "; these are multiples of 4, and a row has " +
+                         std::to_string(row));
+    if (to.size < row || to.begin > to.size - row || (to.size - row - to.begin) / step < height - 1)
+        throw InputError(render + " does not fit in " + std::to_string(to.size) + " bytes from byte " +
+                         std::to_string(to.begin) + " with " + std::to_string(step) + " a row");
+}
 
 Executor::Executor(Device& device, uint32_t ahead) : device_(device), slots_(ahead) {
     vk::CommandPoolCreateInfo pool;
@@ -41,7 +76,11 @@ Executor::Executor(Device& device, uint32_t ahead) : device_(device), slots_(ahe
 }
 
 Executor::~Executor() {
-    if (unfinished_) (void)vkDeviceWaitIdle(device_.handle());
+    const vk::Device device = device_.handle();
+    for (const auto count = uint32_t(slots_.size()); unfinished_ > 0; --unfinished_) {
+        const VkFence fence = *slots_[(next_ + count - unfinished_) % count].fence;
+        (void)vkWaitForFences(device, 1, &fence, VK_TRUE, kForever);
+    }
 }
 
 void Executor::reserve(Slot& slot, const Recording& recording, bool timed) {
@@ -142,6 +181,21 @@ void Executor::record(const Recording& recording, const Slot& slot, bool timed) 
     commands.pipelineBarrier(work, Stage::eHost, {}, vk::MemoryBarrier(written, Flag::eHostRead), {}, {});
 }
 
+template <class Record>
+void Executor::submit(Slot& slot, vk::SubmitInfo info, Record record) {
+    with_driver_errors(device_, [&] {
+        slot.commands->reset();
+        slot.commands->begin(vk::CommandBufferBeginInfo(vk::CommandBufferUsageFlagBits::eOneTimeSubmit));
+        record();
+        slot.commands->end();
+        info.setCommandBuffers(*slot.commands);
+        device_.handle().resetFences(*slot.fence);
+        device_.submit(info, *slot.fence);
+    });
+    next_ = (next_ + 1) % uint32_t(slots_.size());
+    ++unfinished_;
+}
+
 void Executor::submit(const Recording& recording, bool timed) {
     if (unfinished_ == slots_.size()) throw std::logic_error("a submission too many ahead of the device");
     Slot& slot = slots_[next_];
@@ -149,26 +203,76 @@ void Executor::submit(const Recording& recording, bool timed) {
     slot.timed_names.clear();
     if (timed)
         for (const Command& command : recording.commands()) slot.timed_names.push_back(command.name);
-    with_driver_errors(device_, [&] {
+    submit(slot, {}, [&] {
         reserve(slot, recording, timed);
-        slot.commands->reset();
-        slot.commands->begin(vk::CommandBufferBeginInfo(vk::CommandBufferUsageFlagBits::eOneTimeSubmit));
         record(recording, slot, timed);
-        slot.commands->end();
-        vk::SubmitInfo submit;
-        submit.setCommandBuffers(*slot.commands);
-        device_.handle().resetFences(*slot.fence);
-        device_.queue().submit(submit, *slot.fence);
     });
-    next_ = (next_ + 1) % uint32_t(slots_.size());
-    ++unfinished_;
+}
+
+void Executor::record(std::span<const CopyOut> copies, vk::CommandBuffer commands) const {
+    using Stage = vk::PipelineStageFlagBits;
+    using Flag = vk::AccessFlagBits;
+    constexpr auto kSent = vk::ImageLayout::eTransferDstOptimal;
+    const vk::AccessFlags any = Flag::eMemoryRead | Flag::eMemoryWrite;
+    std::vector<vk::ImageMemoryBarrier> before, after;
+    for (const CopyOut& copy : copies) {
+        const auto* to = std::get_if<DeviceImage>(&copy.target->to);
+        if (!to) continue;
+        const vk::ImageSubresourceRange range(vk::ImageAspectFlagBits::eColor, to->mip_level, 1,
+                                              to->array_layer, 1);
+        const bool released =
+            to->family_after != VK_QUEUE_FAMILY_IGNORED && to->family_after != device_.queue_family();
+        before.emplace_back(vk::AccessFlags(), Flag::eTransferWrite, vk::ImageLayout(to->layout_before),
+                            kSent, VK_QUEUE_FAMILY_IGNORED, VK_QUEUE_FAMILY_IGNORED, to->image, range);
+        after.emplace_back(Flag::eTransferWrite, any, kSent, vk::ImageLayout(to->layout_after),
+                           released ? device_.queue_family() : VK_QUEUE_FAMILY_IGNORED,
+                           released ? to->family_after : VK_QUEUE_FAMILY_IGNORED, to->image, range);
+    }
+    commands.pipelineBarrier(
+        Stage::eAllCommands, Stage::eTransfer, {},
+        vk::MemoryBarrier(Flag::eMemoryWrite, Flag::eTransferRead | Flag::eTransferWrite), {}, before);
+    for (const CopyOut& copy : copies) {
+        const Buffer& source = *copy.source;
+        if (const auto* to = std::get_if<DeviceImage>(&copy.target->to)) {
+            const vk::ImageSubresourceLayers layers(vk::ImageAspectFlagBits::eColor, to->mip_level,
+                                                    to->array_layer, 1);
+            commands.copyBufferToImage(
+                source.handle(), to->image, kSent,
+                vk::BufferImageCopy(source.begin(), copy.stride, 0, layers, {to->place.x, to->place.y, 0},
+                                    {copy.width, copy.height, 1}));
+            continue;
+        }
+        const auto& to = std::get<DeviceBuffer>(copy.target->to);
+        const uint64_t pixel = pixel_bytes(copy.target->format), row = pixel * copy.width;
+        std::vector<vk::BufferCopy> rows;
+        for (uint64_t y = 0; y < copy.height; ++y)
+            rows.emplace_back(source.begin() + y * copy.stride * pixel,
+                              to.begin + y * (to.row_bytes ? to.row_bytes : row), row);
+        commands.copyBuffer(source.handle(), to.buffer, rows);
+    }
+    commands.pipelineBarrier(Stage::eTransfer, Stage::eAllCommands | Stage::eHost, {},
+                             vk::MemoryBarrier(Flag::eTransferWrite, any | Flag::eHostRead), {}, after);
+}
+
+void Executor::copy_out(std::span<const CopyOut> copies, const DeviceSync& sync) {
+    while (unfinished_) wait();
+    Slot& slot = slots_[next_];
+    slot.timed_names.clear();
+    const vk::Semaphore waits(sync.wait), signals(sync.signal);
+    const vk::PipelineStageFlags stage = vk::PipelineStageFlagBits::eAllCommands;
+    const vk::TimelineSemaphoreSubmitInfo values(1, &sync.wait_value, 1, &sync.signal_value);
+    vk::SubmitInfo info;
+    if (waits) info.setWaitSemaphores(waits).setWaitDstStageMask(stage);
+    if (signals) info.setSignalSemaphores(signals);
+    if (sync.wait_value || sync.signal_value) info.setPNext(&values);
+    submit(slot, info, [&] { record(copies, *slot.commands); });
+    wait();
 }
 
 void Executor::wait() {
     const auto count = uint32_t(slots_.size());
     Slot& slot = slots_[(next_ + count - unfinished_) % count];
     with_driver_errors(device_, [&] {
-        constexpr uint64_t kForever = ~uint64_t(0);
         if (device_.handle().waitForFences(*slot.fence, true, kForever) != vk::Result::eSuccess)
             throw RunError("the device did not finish");
         --unfinished_;

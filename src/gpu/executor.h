@@ -3,12 +3,18 @@
 // the other; the host may be a few ahead of it.
 #pragma once
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "gpu/recording.h"
 
 namespace ewa::gpu {
+
+/// Bytes of a pixel in a target. Throws InputError for a format that no target can have.
+uint32_t pixel_bytes(VkFormat format);
+/// Throws InputError unless the target holds an image of this size.
+void check_target(const DeviceTarget& target, uint32_t width, uint32_t height);
 
 class Executor {
   public:
@@ -29,6 +35,16 @@ class Executor {
     /// Submits, and waits for this and all before it.
     void run(const Recording& recording, bool timed = false);
 
+    /// What is copied into each target, pixel after pixel in rows of `stride` pixels. source has a word or, for
+    /// VK_FORMAT_R32G32B32A32_SFLOAT, four words a pixel.
+    struct CopyOut {
+        const Buffer* source;
+        uint32_t stride, width, height;
+        const DeviceTarget* target;
+    };
+    /// Copies into a caller's images and buffers after all earlier submissions, and waits.
+    void copy_out(std::span<const CopyOut> copies, const DeviceSync& sync);
+
     /// The times of the last timed submission that is done: one entry a name, in the order of recording, with
     /// the sum of all commands of that name. The time of a command begins at the end of the one before it.
     const std::vector<PassTime>& timings() const { return timings_; }
@@ -47,6 +63,10 @@ class Executor {
 
     vk::DescriptorSet bind(const Command& command, vk::DescriptorPool pool);
     void record(const Recording& recording, const Slot& slot, bool timed);
+    void record(std::span<const CopyOut> copies, vk::CommandBuffer commands) const;
+    /// Records by record(), and submits with what `info` has besides.
+    template <class Record>
+    void submit(Slot& slot, vk::SubmitInfo info, Record record);
     void read_timings(const Slot& slot);
     void reserve(Slot& slot, const Recording& recording, bool timed);
 

@@ -328,7 +328,7 @@ struct GatherSlots {
         features, absolute;
 };
 
-/// Packs the colour planes into 8-bit RGBA. packed: plane_floats words.
+/// Packs the planes of an image. packed: plane_floats words, or four times as many with PACK_FLOATS. Variant: SPEC_MODE (PACK_*).
 struct Pack {
     static constexpr char shader[] = "pack";
     struct Work : ElementGroup<shared::PackPush> {

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "ewa/error.h"
+#include "ewa/gpu_interop.h"
 #include "passes/passes.h"
 #include "pipeline/backward.h"
 #include "pipeline/image_reader.h"
@@ -65,7 +66,8 @@ struct Renderer::State {
     shared::Counts counts{};
     std::shared_ptr<const SkyMap> sky;  // that was uploaded
     SkyTexels sky_texels;
-    gpu::Buffer packed;  // host visible; allocated at the first render_bytes
+    gpu::Buffer packed;                 // host visible; allocated at the first render_bytes
+    std::vector<gpu::Buffer> outgoing;  // of render_to, one for each target
     std::vector<uint8_t> bytes;
 
     State(std::shared_ptr<gpu::Device> d, const Gaussians& gaussians, const RenderOptions& o)
@@ -280,13 +282,53 @@ const std::vector<uint8_t>& Renderer::render_bytes(const Camera& camera, const D
             s.packed = gpu::Buffer(*s.device, "packed", needed, gpu::Texel::none, false, true);
         }
         on.record(passes::Pack{.planes = s.frame.planes, .packed = s.packed},
-                  {.plane_floats = sizes.plane_floats});
+                  {.plane_floats = sizes.plane_floats}, {{shared::SPEC_MODE, shared::PACK_OPAQUE}});
     });
     const size_t row = size_t(camera.width) * 4, stride = size_t(s.frame.sizes.stride) * 4;
     s.bytes.resize(row * size_t(camera.height));
     for (size_t y = 0; y < size_t(camera.height); ++y)
         std::memcpy(&s.bytes[y * row], s.packed.mapped() + y * stride, row);
     return s.bytes;
+}
+
+namespace {
+
+uint32_t pack_mode(const DeviceTarget& target, Drawing drawing) {
+    const bool depth = target.format == VK_FORMAT_R32_SFLOAT;
+    if (depth && drawing != Drawing::depth) throw InputError("a target of R32_SFLOAT needs Drawing::depth");
+    return depth                                            ? shared::PACK_DEPTH
+           : target.format == VK_FORMAT_R32G32B32A32_SFLOAT ? shared::PACK_FLOATS
+                                                            : shared::PACK_BYTES;
+}
+
+}  // namespace
+
+void render_to(Renderer& renderer, const Camera& camera, const DrawOptions& options,
+               std::span<const DeviceTarget> targets, const DeviceSync& sync) {
+    Renderer::State& s = *renderer.state_;
+    const Plan plan = s.plan_of(options);
+    if (targets.empty()) throw InputError("a render to no target");
+    if (plan.surface()) throw InputError("median depths and normals are not rendered to targets");
+    std::vector<gpu::Executor::CopyOut> copies;
+    s.submit(camera, plan, options.render, [&](const passes::Recorder& on) {
+        const Sizes& sizes = s.frame.sizes;
+        s.outgoing.resize(std::max(s.outgoing.size(), targets.size()));
+        copies.clear();
+        for (size_t i = 0; i < targets.size(); ++i) {
+            gpu::check_target(targets[i], sizes.width, sizes.height);
+            const uint32_t mode = pack_mode(targets[i], plan.drawing);
+            const uint64_t needed = uint64_t(sizes.plane_floats) * gpu::pixel_bytes(targets[i].format);
+            gpu::Buffer& packed = s.outgoing[i];
+            if (!packed || packed.bytes() < needed) {
+                packed = gpu::Buffer();
+                packed = gpu::Buffer(*s.device, "outgoing", needed);
+            }
+            on.record(passes::Pack{.planes = s.frame.planes, .packed = packed},
+                      {.plane_floats = sizes.plane_floats}, {{shared::SPEC_MODE, mode}});
+            copies.push_back({&packed, sizes.stride, sizes.width, sizes.height, &targets[i]});
+        }
+    });
+    s.executor.copy_out(copies, sync);
 }
 
 void Renderer::replace(const Gaussians& gaussians) {

@@ -131,7 +131,7 @@ void compile_splatting(Compiler& compiler) {
           {0, BLEND_BACKWARD_ABSOLUTE, BLEND_BACKWARD_ALPHA, BLEND_BACKWARD_ABSOLUTE | BLEND_BACKWARD_ALPHA,
            BLEND_BACKWARD_ALPHA | BLEND_BACKWARD_FOURTH}},
          {SPEC_KERNEL, {KERNEL_PEAK, KERNEL_ANTIALIAS, KERNEL_DENSITY}}});
-    compiler.compile<passes::Pack>();
+    compiler.compile<passes::Pack>({{SPEC_MODE, {PACK_OPAQUE, PACK_BYTES, PACK_FLOATS, PACK_DEPTH}}});
 }
 
 void compile_points(Compiler& compiler) {
