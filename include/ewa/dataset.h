@@ -98,7 +98,9 @@ struct Dataset {
     std::string first_dropped_point;  // position of the first: file and byte, line or vertex
     /// False if the dataset has "view_dependent": false. Then SH degree 0 suffices.
     bool color_depends_on_view = true;
-    std::string format, program;     // of the cameras; the program may be unknown, and empty
+    std::string format, program;  // of the cameras; the program may be unknown, and empty
+    double frame_rate =
+        0;  // of a path of cameras for a film, which has no images: frames per second; 0: no path
     std::vector<std::string> notes;  // what of the cameras' file is skipped
     std::vector<UsedOf> used;        // what was found, and is used; only what is there
 };

@@ -59,7 +59,7 @@ const std::vector<Encoder>& encoders() {
 }
 
 std::vector<std::string> arguments_of(const fs::path& program, const std::string& encoder,
-                                      const fs::path& made, int width, int height) {
+                                      const fs::path& made, int width, int height, double rate) {
     std::vector<std::string> arguments = {program.string(),
                                           "-hide_banner",
                                           "-loglevel",
@@ -72,7 +72,7 @@ std::vector<std::string> arguments_of(const fs::path& program, const std::string
                                           "-video_size",
                                           fmt::format("{}x{}", width, height),
                                           "-framerate",
-                                          std::to_string(kFilmRate),
+                                          fmt::format("{:.6g}", rate),
                                           "-i",
                                           "pipe:0",
                                           "-an",
@@ -133,7 +133,7 @@ std::string find_encoder(const std::string& codec, const fs::path& file) {
     throw RunError("--codec " + codec + ": this ffmpeg has no encoder for it, such as " + wanted);
 }
 
-Film::Film(const fs::path& file, int width, int height, const std::string& encoder)
+Film::Film(const fs::path& file, int width, int height, const std::string& encoder, double rate)
     : file_(file), folder_("ewa-film-"), made_(folder_.path() / ("film" + file.extension().string())) {
     if (width < 2 || height < 2) throw InputError("a film needs at least 2x2 pixels");
     const fs::path program = find_ffmpeg();
@@ -144,7 +144,7 @@ Film::Film(const fs::path& file, int width, int height, const std::string& encod
     input_ = ends[0];
     const int log = open((folder_.path() / "log").c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
     try {
-        process_ = core::start_program(arguments_of(program, encoder, made_, width, height), {},
+        process_ = core::start_program(arguments_of(program, encoder, made_, width, height, rate), {},
                                        {.input = ends[1], .output = -1, .errors = log});
     } catch (...) {
         for (const int descriptor : {ends[0], ends[1], log}) close(descriptor);

@@ -12,7 +12,7 @@
 
 namespace ewa::cli {
 
-inline constexpr int kFilmRate = 30;  // frames per second
+inline constexpr int kFilmRate = 30;  // frames per second, of films that have no rate of their own
 
 /// Whether the name is that of a film: .mp4, .mov, .mkv or .webm.
 bool is_film_name(const std::filesystem::path& path);
@@ -30,8 +30,8 @@ std::string find_encoder(const std::string& codec, const std::filesystem::path& 
 class Film {
   public:
     /// file: its name decides the format. width, height: of each frame, px. An odd last row or column is cut, since
-    /// films have none. encoder: of find_encoder. Throws RunError.
-    Film(const std::filesystem::path& file, int width, int height, const std::string& encoder = {});
+    /// films have none. encoder: of find_encoder. rate: frames per second. Throws RunError.
+    Film(const std::filesystem::path& file, int width, int height, const std::string& encoder, double rate);
     ~Film();
     Film(const Film&) = delete;
     Film& operator=(const Film&) = delete;

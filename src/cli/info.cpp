@@ -274,6 +274,7 @@ void info_dataset(const fs::path& path, const fs::path& named, int test_every, b
 }
 
 /// Describes a zip archive that has a dataset, which is unpacked first.
+    if (dataset.frame_rate > 0) fmt::print("rate            {:.6g} frames per second\n", dataset.frame_rate);
 void info_archive(const fs::path& path, int test_every, bool json) {
     const core::TemporaryFolder folder("ewa-zip-");
     if (!archive_has_cameras(path))

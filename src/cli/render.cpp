@@ -103,6 +103,17 @@ class EmptyViews {
     size_t views_ = 0, empty_ = 0, first_ = 0;
 };
 
+/// View i in its appearance. appearances: of each view, or none.
+std::vector<Rendering> eyes_of(const RenderArguments& arguments, PictureTaker& taker, size_t i,
+                               const std::vector<Appearance>& appearances) {
+    std::vector<Rendering> eyes = taker.take(i);
+    if (!appearances.empty() && arguments.mode == "color")
+        for (Rendering& eye : eyes)
+            eye.color = arguments.picture.transparent ? with_appearance_over_black(eye, appearances[i])
+                                                      : with_appearance(std::move(eye.color), appearances[i]);
+    return eyes;
+}
+
 /// Renders the views into the files. appearances: of each, or none. Returns the exit status.
 int write_images(const RenderArguments& arguments, const DrawnScene& scene, Renderer& renderer,
                  ViewPath views, const std::vector<fs::path>& files,
@@ -121,13 +132,8 @@ int write_images(const RenderArguments& arguments, const DrawnScene& scene, Rend
     EmptyViews empty(arguments.mode);
     for (size_t i = 0; i < cameras.size(); ++i) {
         if (interrupted()) return kInterruptedStatus;
-        std::vector<Rendering> eyes = taker.take(i);
+        std::vector<Rendering> eyes = eyes_of(arguments, taker, i, appearances);
         empty.add(std::ranges::all_of(eyes, is_empty));
-        if (!appearances.empty() && arguments.mode == "color")
-            for (Rendering& eye : eyes)
-                eye.color = arguments.picture.transparent
-                                ? with_appearance_over_black(eye, appearances[i])
-                                : with_appearance(std::move(eye.color), appearances[i]);
         const bool panorama = eyes.size() == 1 && scene::shows_all_around(cameras[i]);
         output.add(i, joined_eyes(std::move(eyes), arguments.picture.stereo), panorama);
         if (cameras.size() > 1) progress.update(int(i) + 1);
@@ -152,11 +158,12 @@ int write_images(const RenderArguments& arguments, const DrawnScene& scene, Rend
 std::vector<fs::path> files_of_frames(const RenderArguments& arguments, const Dataset& dataset,
                                       const std::vector<int>& frames) {
     const ViewsOutput output = views_output(arguments.output);
-    if (output == ViewsOutput::film)
-        throw InputError(
-            "--output " + core::one_line(arguments.output.string()) +
-            ": a film goes round the scene or along --views; the cameras of a dataset make images in a "
-            "folder");
+    if (output == ViewsOutput::film && dataset.frame_rate == 0)
+        throw InputError("--output " + core::one_line(arguments.output.string()) +
+                         ": a film goes round the scene, along --views or a path of cameras; those of a "
+                         "dataset's photos make "
+                         "images in a folder");
+    if (output == ViewsOutput::film) return {arguments.output};
     if (output == ViewsOutput::image && frames.size() > 1 && !arguments.contact_sheet)
         throw InputError(
             fmt::format("--output {}: one image, and there are {} frames; choose one with --frames, name a "
@@ -203,6 +210,52 @@ Camera of_frame(const LensArgument& lens, const Camera& frame, const Dataset& da
     return through(lens, camera, scene::mean_up(dataset), scene::framed_box(gaussians).center());
 }
 
+/// The film of these views. appearances: of each, or none. Returns the exit status.
+int write_film(const RenderArguments& arguments, const DrawnScene& scene, Renderer& renderer,
+               const ViewPath& views, const std::vector<Appearance>& appearances, const std::string& encoder,
+               Progress& progress) {
+    const PictureArguments& picture = arguments.picture;
+    const std::vector<Camera>& cameras = views.cameras;
+    make_folder(arguments.output.parent_path());
+    Film film(arguments.output, cameras[0].width * (picture.stereo == "side-by-side" ? 2 : 1),
+              cameras[0].height * (picture.stereo == "top-bottom" ? 2 : 1), encoder, views.rate);
+    PictureTaker taker(picture, renderer, Drawing::color, scene.options.kernel, views);
+    EmptyViews empty(arguments.mode);
+    for (size_t i = 0; i < cameras.size(); ++i) {
+        if (interrupted()) return kInterruptedStatus;
+        if (picture.several() || !appearances.empty()) {
+            std::vector<Rendering> eyes = eyes_of(arguments, taker, i, appearances);
+            empty.add(std::ranges::all_of(eyes, is_empty));
+            film.add(screen_bytes(joined_eyes(std::move(eyes), picture.stereo).color));
+        } else {
+            film.add(renderer.render_bytes(cameras[i], {.render = scene.options}));
+            empty.add(renderer.splats_drawn() == 0);
+        }
+        progress.update(int(i) + 1);
+    }
+    film.finish();
+    note_skipped(progress, renderer.skipped_nonfinite());
+    progress.clear();
+    empty.warn(scene.gaussians, {arguments.output});
+    progress.note(fmt::format("{}: {} frames, {:.1f} s", arguments.output.string(), cameras.size(),
+                              double(cameras.size()) / views.rate));
+    return 0;
+}
+
+/// The encoder of the film that --output names. Empty: there is no film, or ffmpeg chooses.
+std::string encoder_of(const RenderArguments& arguments) {
+    if (views_output(arguments.output) != ViewsOutput::film) return {};
+    if (arguments.mode != "color") throw InputError("a film has --mode color; a folder can have any mode");
+    std::string encoder = find_encoder(arguments.codec, arguments.output);
+    find_ffmpeg();
+    return encoder;
+}
+
+void check_motion(const RenderArguments& arguments, const ViewPath& views) {
+    if (arguments.picture.shutter > 0 && !views.at)
+        throw InputError("--shutter: there is no motion; the film has one frame");
+}
+
 int render_dataset_views(RenderArguments arguments) {
     RenderOptions options = arguments.draw.options();
     const Gaussians gaussians = load_scene(arguments, options);
@@ -213,9 +266,11 @@ int render_dataset_views(RenderArguments arguments) {
     if (!refined.empty()) io::use_refined_cameras(dataset, refined);
     const std::vector<int> frames = select_frames(dataset, arguments.frames, arguments.test_every);
     const std::vector<fs::path> files = files_of_frames(arguments, dataset, frames);
-    check_picture(arguments.picture, arguments.mode, false, core::lower(files[0].extension().string()));
+    const bool path = dataset.frame_rate > 0;
+    check_picture(arguments.picture, arguments.mode, path, core::lower(files[0].extension().string()));
     arguments.format = core::lower(files[0].extension().string()).substr(1);
     check_renders(arguments, files, &dataset);
+    const std::string encoder = encoder_of(arguments);
     const std::vector<Appearance> appearances = appearances_of(
         arguments.appearance, arguments.cameras_of_run ? arguments.run : std::nullopt, dataset, frames);
 
@@ -223,13 +278,19 @@ int render_dataset_views(RenderArguments arguments) {
         for (Frame& frame : dataset.frames)
             frame.camera = of_frame(*arguments.views.lens, frame.camera, dataset, gaussians);
 
-    std::vector<Camera> cameras;
-    for (const int frame : frames) cameras.push_back(dataset.frames[size_t(frame)].camera);
+    ViewPath views;
+    if (path)
+        views = path_of(dataset, frames);
+    else
+        for (const int frame : frames) views.cameras.push_back(dataset.frames[size_t(frame)].camera);
+    check_motion(arguments, views);
     Renderer renderer(open_device(arguments.device), gaussians, options);
     const InterruptWatch watch;
     Progress progress("rendered", static_cast<int>(frames.size()), "frames", arguments.quiet);
-    return write_images(arguments, {gaussians, options}, renderer, {std::move(cameras)}, files, appearances,
-                        progress);
+    const DrawnScene scene{gaussians, options};
+    if (views_output(arguments.output) == ViewsOutput::film)
+        return write_film(arguments, scene, renderer, views, appearances, encoder, progress);
+    return write_images(arguments, scene, renderer, std::move(views), files, appearances, progress);
 }
 
 /// The dataset of the run, if it can be read. Else the scene is framed as one of which nothing is known.
@@ -247,52 +308,17 @@ scene::FramingHints hints_of(const std::optional<Dataset>& dataset) {
     return {.up = scene::mean_up(*dataset), .forward = axes[2]};
 }
 
-/// The film of these views. Returns the exit status.
-int write_film(const RenderArguments& arguments, const DrawnScene& scene, Renderer& renderer,
-               const ViewPath& views, const std::string& encoder, const std::optional<Appearance>& appearance,
-               Progress& progress) {
-    const PictureArguments& picture = arguments.picture;
-    const std::vector<Camera>& cameras = views.cameras;
-    Film film(arguments.output, cameras[0].width * (picture.stereo == "side-by-side" ? 2 : 1),
-              cameras[0].height * (picture.stereo == "top-bottom" ? 2 : 1), encoder);
-    PictureTaker taker(picture, renderer, Drawing::color, scene.options.kernel, views);
-    EmptyViews empty(arguments.mode);
-    for (size_t i = 0; i < cameras.size(); ++i) {
-        if (interrupted()) return kInterruptedStatus;
-        if (picture.several() || appearance) {
-            std::vector<Rendering> eyes = taker.take(i);
-            empty.add(std::ranges::all_of(eyes, is_empty));
-            Image color = joined_eyes(std::move(eyes), picture.stereo).color;
-            film.add(screen_bytes(appearance ? with_appearance(std::move(color), *appearance) : color));
-        } else {
-            film.add(renderer.render_bytes(cameras[i], {.render = scene.options}));
-            empty.add(renderer.splats_drawn() == 0);
-        }
-        progress.update(int(i) + 1);
-    }
-    film.finish();
-    note_skipped(progress, renderer.skipped_nonfinite());
-    progress.clear();
-    empty.warn(scene.gaussians, {arguments.output});
-    progress.note(fmt::format("{}: {} frames, {:.1f} s", arguments.output.string(), cameras.size(),
-                              double(cameras.size()) / kFilmRate));
-    return 0;
-}
-
 /// Without the cameras of a dataset.
 int render_free_views(RenderArguments arguments) {
     const ViewsOutput output = views_output(arguments.output);
     const bool film = output == ViewsOutput::film, one_image = output == ViewsOutput::image;
     RenderOptions options = arguments.draw.options();
     check_views(arguments.views);
-    if (film && arguments.mode != "color")
-        throw InputError("a film has --mode color; a folder can have any mode");
+    const std::string encoder = encoder_of(arguments);
     const bool path = film || arguments.views.orbit > 1 || arguments.views.film_seconds > 0;
     check_picture(arguments.picture, arguments.mode, path,
                   output == ViewsOutput::folder ? "." + arguments.format
                                                 : core::lower(arguments.output.extension().string()));
-    const std::string encoder = film ? find_encoder(arguments.codec, arguments.output) : std::string();
-    if (film) find_ffmpeg();
     if (one_image) arguments.format = core::lower(arguments.output.extension().string()).substr(1);
     const std::optional<Dataset> dataset = dataset_of_run(arguments);
     const Dataset* const known = dataset ? &*dataset : nullptr;
@@ -308,23 +334,21 @@ int render_free_views(RenderArguments arguments) {
     }
     const ViewPath views = views_of(arguments.views, gaussians, hints_of(dataset),
                                     arguments.contact_sheet ? ViewsOutput::folder : output);
-    if (arguments.picture.shutter > 0 && !views.at)
-        throw InputError("--shutter: there is no motion; the film has one frame");
+    check_motion(arguments, views);
     if (output == ViewsOutput::folder) {
         files.clear();
         for (size_t i = 0; i < views.cameras.size(); ++i)
             files.push_back(arguments.output / fmt::format("{:05}.{}", i, arguments.format));
         check_renders(arguments, files, known);
     }
-    if (film) make_folder(arguments.output.parent_path());
 
     Renderer renderer(open_device(arguments.device), gaussians, options);
     const InterruptWatch watch;
     Progress progress("rendered", int(views.cameras.size()), "views", arguments.quiet);
     const DrawnScene scene{gaussians, options};
-    if (film) return write_film(arguments, scene, renderer, views, encoder, appearance, progress);
     const std::vector<Appearance> appearances(appearance ? views.cameras.size() : 0,
                                               appearance.value_or(Appearance()));
+    if (film) return write_film(arguments, scene, renderer, views, appearances, encoder, progress);
     return write_images(arguments, scene, renderer, views, files, appearances, progress);
 }
 
@@ -384,16 +408,16 @@ int run(CLI::App& app, RenderArguments& arguments) {
 Action add_render(CLI::App& app) {
     const auto arguments = std::make_shared<RenderArguments>();
     add_splats(app, arguments->splats);
-    CLI::Option* cameras =
-        app.add_option(
-               "--cameras", arguments->cameras,
-               "Dataset whose cameras to render through [that of a run]. Without, the whole scene is shown "
-               "from the front")
-            ->type_name("DATASET");
+    CLI::Option* cameras = app.add_option("--cameras", arguments->cameras,
+                                          "Dataset whose cameras to render through [that of a run], or a "
+                                          "camera_path.json of nerfstudio. Without, the whole scene is shown "
+                                          "from the front")
+                               ->type_name("DATASET");
     app.add_option("-o,--output", arguments->output,
                    "Folder for the renders, named like the images of the dataset or by number. Or one image "
                    "(.png, .jpg, .exr). "
-                   "Without --cameras also a film (.mp4, .mov, .mkv, .webm) that the program ffmpeg writes")
+                   "Without --cameras, and of a camera_path.json, also a film (.mp4, .mov, .mkv, .webm) that "
+                   "the program ffmpeg writes")
         ->type_name("OUT")
         ->capture_default_str();
     add_views_options(app, arguments->views, cameras);

@@ -69,6 +69,27 @@ ViewPath along_views(const std::vector<Camera>& keys, double seconds) {
         count);
 }
 
+}  // namespace
+
+ViewPath path_of(const Dataset& dataset, const std::vector<int>& frames) {
+    constexpr double kHighestRate = 1000;
+    if (dataset.frame_rate > kHighestRate)
+        throw InputError(fmt::format("{}: {:.6g} frames per second are no film's", dataset.root.string(),
+                                     dataset.frame_rate));
+    ViewPath path;
+    path.rate = dataset.frame_rate;
+    for (const int frame : frames) path.cameras.push_back(dataset.frames[size_t(frame)].camera);
+    const double last = double(frames.size()) - 1;
+    // As in along_views, the last frame has the blur of the motion that led to it.
+    if (last > 0)
+        path.at = [keys = path.cameras, last](double time) {
+            return along_path(keys, time <= last ? time : 2 * last - time);
+        };
+    return path;
+}
+
+namespace {
+
 ViewPath saved_views(const ViewsArguments& arguments, ViewsOutput output) {
     std::vector<Camera> cameras;
     for (const io::NamedView& view : io::read_views(arguments.views)) cameras.push_back(view.camera);

@@ -10,8 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "cli/film.h"
 #include "cli/lens_argument.h"
 #include "ewa/camera.h"
+#include "ewa/dataset.h"
 #include "ewa/gaussians.h"
 #include "scene/framing.h"
 
@@ -53,7 +55,11 @@ struct ViewPath {
     std::vector<Camera> cameras;
     /// Where they are moments of one motion, the camera at a time: cameras[i] at i, for times from 0 to size(). Else empty.
     std::function<Camera(double)> at = {};
+    double rate = kFilmRate;  // frames per second of a film
 };
+
+/// The frames of a dataset that is a path of cameras. Throws InputError if its rate is none of a film.
+ViewPath path_of(const Dataset& dataset, const std::vector<int>& frames);
 
 /// At least one camera, all of one size for a film. hints: what is known of the scene; --up has precedence. Throws
 /// InputError, also if an image should hold several views.

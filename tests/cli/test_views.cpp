@@ -8,9 +8,11 @@
 #include <csignal>
 #include <filesystem>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 #include <glm/trigonometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <nlohmann/json.hpp>
 
 #include "cli/expect.h"
 #include "cli/faulty.h"
@@ -39,6 +41,26 @@ class Views : public testing::Test {
         write_file(folder / "bin/ffmpeg", "#!/bin/sh\nPATH=/usr/bin:/bin\n" + script);
         chmod((folder / "bin/ffmpeg").c_str(), 0755);
         return {.environment = {{"PATH", folder / "bin"}}};
+    }
+    /// The saved views as nerfstudio's viewer writes a path.
+    std::string camera_path(nlohmann::json more = nlohmann::json::object()) {
+        nlohmann::json path{
+            {"camera_type", "perspective"}, {"render_width", 48}, {"render_height", 32}, {"fps", 12.5}};
+        for (const io::NamedView& view : io::read_views(saved_views())) {
+            const glm::dmat3 axes = glm::transpose(view.camera.rotation);
+            const glm::dvec3 eye = view.camera.position();
+            nlohmann::json values;
+            for (int row = 0; row < 3; ++row)
+                for (const double value : {axes[0][row], -axes[1][row], -axes[2][row], eye[row]})
+                    values.push_back(value);
+            for (const int value : {0, 0, 0, 1}) values.push_back(value);
+            path["camera_path"].push_back({{"camera_to_world", values},
+                                           {"fov", glm::degrees(2 * std::atan(16 / view.camera.fy))},
+                                           {"aspect", 1.5}});
+        }
+        path.update(more);
+        write_file(folder / "camera_path.json", path.dump());
+        return folder / "camera_path.json";
     }
     /// Two cameras of 48 x 32 px in a file of saved views.
     std::string saved_views() {
@@ -386,6 +408,46 @@ TEST_F(Views, AFolderOfViewsReplacesNoInput) {
     EXPECT_EQ(files_below(out).size(), 1u);
     expect_success(render({"--orbit", "2", "--size", "8x8", "-o", out}));
     EXPECT_EQ(files_below(out), (Names{"00000.png", "00001.png"}));
+}
+
+TEST_F(Views, APathOfNerfstudiosViewer) {
+    expect_success(render({"--cameras", camera_path(), "-o", folder / "path"}));
+    EXPECT_EQ(files_below(folder / "path"), (Names{"00000.png", "00001.png"}));
+    expect_success(render({"--views", saved_views(), "-o", folder / "saved"}));
+    for (const std::string& name : files_below(folder / "path")) {
+        const Image a = load_image(folder / "path/" + name), b = load_image(folder / "saved/" + name);
+        ASSERT_EQ(a.pixels.size(), b.pixels.size());
+        for (size_t i = 0; i < a.pixels.size(); ++i)
+            ASSERT_NEAR(a.pixels[i], b.pixels[i], 1.001f / 255) << name << i;
+    }
+    expect_success(render({"--cameras", camera_path(), "--frames", "1", "-o", folder / "one.png"}));
+    EXPECT_TRUE(same_pixels(folder / "one.png", folder / "path/00001.png"));
+    // A film has the rate of the path.
+    const Circumstances ffmpeg = with_ffmpeg("printf '%s\\n' \"$@\" > " + (folder / "arguments") +
+                                             "\nfor last; do :; done\ncat > \"$last\"\n");
+    const Outcome film = render({"--cameras", camera_path(), "-o", folder / "film.mp4"}, ffmpeg);
+    expect_success(film);
+    EXPECT_NE(film.out.find("2 frames, 0.2 s"), std::string::npos) << film.out;
+    EXPECT_EQ(read_file(folder / "film.mp4").size(), size_t(2) * 48 * 32 * 4);
+    EXPECT_NE(read_file(folder / "arguments").find("\n12.5\n"), std::string::npos);
+    expect_success(render(
+        {"--cameras", camera_path(), "--shutter", "1", "--blur-samples", "2", "-o", folder / "blurred"}));
+    EXPECT_FALSE(same_pixels(folder / "blurred/00001.png", folder / "path/00001.png"));
+    expect_failure(render({"--cameras", camera_path(), "--mode", "depth", "-o", folder / "film.mp4"}), 2,
+                   "--mode color");
+    // Other lenses than a pinhole.
+    expect_success(
+        render({"--cameras", camera_path({{"camera_type", "equirectangular"}, {"render_height", 24}}), "-o",
+                folder / "round"}));
+    EXPECT_EQ(load_image(folder / "round/00000.png").height, 24);
+    expect_success(
+        render({"--cameras", camera_path({{"camera_type", "fisheye"}}), "-o", folder / "fisheye"}));
+    EXPECT_EQ(load_image(folder / "fisheye/00000.png").width, 48);
+    expect_failure(render({"--cameras", camera_path({{"camera_path", nullptr}}), "-o", folder / "none"}), 2,
+                   "\"camera_path\" is missing");
+    expect_success(run_ewa({"info", camera_path()}));
+    expect_failure(run_ewa({"train", camera_path(), "-o", folder / "run"}), 2,
+                   "is a path of cameras without images");
 }
 
 /// One frame of a dataset, and the photographs beside which nothing is written.

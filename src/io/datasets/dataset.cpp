@@ -395,17 +395,22 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
     dataset.first_dropped_point = std::move(model.dropped.first);
     dataset.format = std::move(model.format);
     dataset.program = std::move(model.program);
+    dataset.frame_rate = model.frame_rate;
     dataset.notes = std::move(model.notes);
     std::stable_sort(model.images.begin(), model.images.end(),
                      [](const io::ImageRecord& a, const io::ImageRecord& b) { return a.name < b.name; });
     note_repeated(model.images, dataset.notes);
-    CameraCache cameras(options.lens);
+    const bool path_of_cameras = model.frame_rate > 0;
+    if (path_of_cameras && options.need_images)
+        throw InputError(name + ": is a path of cameras without images; ewa render --cameras takes it");
+    CameraCache cameras(path_of_cameras && options.lens == LensUse::automatic ? LensUse::native
+                                                                              : options.lens);
     const bool captured = is_file(dataset.root / "capture.json");
     std::vector<const io::ImageRecord*> records;
     for (const io::ImageRecord& image : model.images) {
         ImageFile file = find_image(image, model.folder, options.downscale);
         if (captured) leave_out_damaged(file, image.name, dataset);
-        dataset.missing_images += !file.exists;
+        dataset.missing_images += !file.exists && !path_of_cameras;
         const bool usable = image.camera.width > 0 && (file.exists || !options.need_images);
         if (!usable) continue;
         dataset.frames.push_back(make_frame(image, file, options, cameras, name));

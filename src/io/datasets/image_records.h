@@ -18,7 +18,7 @@ class ImageFinder;
 /// One image of the model. The image file may not exist.
 struct ImageRecord {
     std::string name;            // Frame::name
-    std::filesystem::path path;  // of the image
+    std::filesystem::path path;  // of the image; empty for a camera of a path
     Camera camera;               // OpenCV axes; width and height are 0 if neither model nor image states them
     std::filesystem::path mask;  // the mask that the model names; empty: none
     std::filesystem::path depth;  // the depth map that the model names; empty: none
@@ -48,6 +48,7 @@ struct ImageRecords {
     DroppedPoints dropped;
     bool color_depends_on_view = true;  // Dataset::color_depends_on_view
     std::string format, program;        // Dataset::format, Dataset::program
+    double frame_rate = 0;              // Dataset::frame_rate
     std::vector<std::string> notes;     // Dataset::notes
     UsedOf models;                      // of Dataset::used; none: there is no other
 };

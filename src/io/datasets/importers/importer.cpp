@@ -87,6 +87,12 @@ bool begins_as_numpy(std::string_view head) {
     return head.starts_with("\x93NUMPY");
 }
 
+/// Of many keyframes, the cameras come far behind.
+bool begins_as_camera_path(std::string_view head) {
+    return core::trim(head).starts_with('{') &&
+           (holds(head, "\"camera_path\"") || holds(head, "\"keyframes\""));
+}
+
 bool begins_as_inria(std::string_view head) {
     const std::string_view text = core::trim(head);
     return !text.empty() && text.front() == '[' && holds(text, "\"img_name\"") && holds(text, "\"rotation\"");
@@ -209,7 +215,8 @@ const std::vector<CameraImporter>& camera_importers() {
         {"Record3D", {""}, "metadata", is_record3d_metadata, begins_as_record3d, import_record3d},
         {"INRIA's cameras.json", {""}, "cameras", is_json, begins_as_inria, import_inria},
         {"Bundler", {"", "bundle"}, "", has_extension<kOut>, begins_as_bundler, import_bundler},
-        {"LLFF poses_bounds.npy", {""}, "", is_poses_bounds, begins_as_numpy, import_llff}};
+        {"LLFF poses_bounds.npy", {""}, "", is_poses_bounds, begins_as_numpy, import_llff},
+        {"nerfstudio camera path", {}, "", is_json, begins_as_camera_path, import_camera_path}};
     return importers;
 }
 
@@ -249,7 +256,7 @@ fs::path other_cameras(const fs::path& dataset, const FoundImporter& found,
 bool is_imported(const fs::path& entry, const std::function<std::string()>& head) {
     std::optional<std::string> read;
     return std::ranges::any_of(camera_importers(), [&](const CameraImporter& importer) {
-        if (!is_usual(importer, entry.filename())) return false;
+        if (importer.places.empty() || !is_usual(importer, entry.filename())) return false;
         if (!read) read = head();
         return importer.begins(*read);
     });

@@ -88,5 +88,6 @@ ImageRecords import_record3d(const ImportSource& source);
 ImageRecords import_inria(const ImportSource& source);
 ImageRecords import_bundler(const ImportSource& source);
 ImageRecords import_llff(const ImportSource& source);
+ImageRecords import_camera_path(const ImportSource& source);
 
 }  // namespace ewa::io
