@@ -36,7 +36,7 @@ struct Measures {
 };
 
 struct Evaluation {
-    double psnr = 0, ssim = 0;    // means over `frames`
+    double psnr = 0, ssim = 0;    // means over `frames`; NaN without any
     std::vector<Figure> figures;  // means; NaN if a frame has NaN
     std::vector<EvalFrame> frames;
     double seconds = 0;  // wall time

@@ -91,9 +91,13 @@ int run(const EvalArguments& arguments) {
     if (refined.used)
         fmt::print("cameras as the run refined them, those of test images {}aligned to these\n",
                    refined.aligned ? "" : "not ");
-    fmt::print("mean of {} ({})  PSNR {:.3f} dB  SSIM {:.5f}  in {:.2f} s\n",
-               core::counted(evaluation.frames.size(), "frame"), arguments.split, evaluation.psnr,
-               evaluation.ssim, evaluation.seconds);
+    if (evaluation.frames.empty())
+        fmt::print("no figures: every pixel of {} ({}) is masked\n", core::counted(frames.size(), "frame"),
+                   arguments.split);
+    else
+        fmt::print("mean of {} ({})  PSNR {:.3f} dB  SSIM {:.5f}  in {:.2f} s\n",
+                   core::counted(evaluation.frames.size(), "frame"), arguments.split, evaluation.psnr,
+                   evaluation.ssim, evaluation.seconds);
     print_figures(evaluation, arguments.metrics);
     if (depths) fmt::print("{}", depth_table(*depths));
     if (!arguments.json.empty()) {

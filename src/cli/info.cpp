@@ -33,6 +33,7 @@
 #include "io/gltf/mesh.h"
 #include "io/splats/formats.h"
 #include "report/summary.h"
+#include "run/first_checks.h"
 
 namespace ewa::cli {
 namespace {
@@ -186,7 +187,23 @@ void print_rolling(const Dataset& dataset) {
                    rolling->distance);
 }
 
-Json dataset_json(const Dataset& dataset, const Split& split, double extent) {
+/// What would be wrong with a training on it.
+std::vector<std::string> warnings_of(const Dataset& dataset, const Split& split,
+                                     const std::vector<int>& every) {
+    std::vector<std::string> warnings;
+    if (dataset.frame_rate > 0) return warnings;
+    std::string nothing = train::nothing_to_train_on(dataset, split);
+    if (!nothing.empty()) warnings.push_back(std::move(nothing));
+    const auto& points = dataset.points.positions;
+    for (const auto& findings :
+         {train::check_images(dataset, split, false),
+          train::check_start(dataset, every, {points.size(), [&](size_t i) { return points[i]; }})})
+        for (const train::Finding& finding : findings) warnings.push_back(finding.text);
+    return warnings;
+}
+
+Json dataset_json(const Dataset& dataset, const Split& split, double extent,
+                  const std::vector<std::string>& warnings) {
     Json cameras = Json::array();
     for (const CameraGroup& group : camera_groups(dataset))
         cameras.push_back({{"frames", group.frames},
@@ -209,6 +226,7 @@ Json dataset_json(const Dataset& dataset, const Split& split, double extent) {
               {"program", dataset.program},
               {"notes", dataset.notes},
               {"used", used},
+              {"warnings", warnings},
               {"frames", dataset.frames.size()},
               {"missing_images", dataset.missing_images},
               {"cameras", cameras},
@@ -250,11 +268,14 @@ void info_dataset(const fs::path& path, const fs::path& named, int test_every, b
     std::vector<int> every(dataset.frames.size());
     std::iota(every.begin(), every.end(), 0);
     const double extent = every.empty() ? 0 : scene_extent(dataset, every);
-    if (json) return print_json(dataset_json(dataset, split, extent));
+    const std::vector<std::string> warnings = warnings_of(dataset, split, every);
+    if (json) return print_json(dataset_json(dataset, split, extent, warnings));
     fmt::print("{}\nkind            {}\n", core::one_line(named.string()), dataset.format);
     if (!dataset.program.empty()) fmt::print("program         {}\n", core::one_line(dataset.program));
     for (const std::string& note : dataset.notes) fmt::print("note            {}\n", core::one_line(note));
     fmt::print("used            {}\n", used_text(dataset));
+    for (const std::string& warning : warnings) fmt::print("warning         {}\n", core::one_line(warning));
+    if (dataset.frame_rate > 0) fmt::print("rate            {:.6g} frames per second\n", dataset.frame_rate);
     fmt::print("frames          {} ({} train, {} test with --test-every {})\n", dataset.frames.size(),
                split.train.size(), split.test.size(), test_every);
     if (dataset.missing_images > 0)
@@ -274,7 +295,6 @@ void info_dataset(const fs::path& path, const fs::path& named, int test_every, b
 }
 
 /// Describes a zip archive that has a dataset, which is unpacked first.
-    if (dataset.frame_rate > 0) fmt::print("rate            {:.6g} frames per second\n", dataset.frame_rate);
 void info_archive(const fs::path& path, int test_every, bool json) {
     const core::TemporaryFolder folder("ewa-zip-");
     if (!archive_has_cameras(path))

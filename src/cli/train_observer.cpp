@@ -207,8 +207,9 @@ void TrainObserver::on_step(const StepReport& step) {
 }
 
 void TrainObserver::on_evaluation(int step, const Evaluation& evaluation) {
-    on_note(
-        fmt::format("step {}: held-out PSNR {:.2f} dB, SSIM {:.4f}", step, evaluation.psnr, evaluation.ssim));
+    if (!evaluation.frames.empty())
+        on_note(fmt::format("step {}: held-out PSNR {:.2f} dB, SSIM {:.4f}", step, evaluation.psnr,
+                            evaluation.ssim));
 }
 
 void TrainObserver::on_metrics(const MetricsLine& line) {

@@ -184,6 +184,7 @@ Evaluation evaluate_views(const ViewRenderer& renderer, const Dataset& dataset,
     }
     if (comparison.started()) take(frames.size() - 1);
     const double none = result.frames.empty() ? std::nan("") : 0.0;
+    result.psnr = result.ssim = none;
     if (!psnr_alone)
         for (const std::string& name : measures.meter.names()) result.figures.push_back({name, none});
     for (const EvalFrame& frame : result.frames) {

@@ -2,6 +2,7 @@
 #include "run/final_evaluation.h"
 
 #include <algorithm>
+#include <cmath>
 #include <future>
 #include <span>
 #include <utility>
@@ -79,10 +80,11 @@ bool FinalEvaluation::evaluate(RunCameras& cameras, const RunFolder& folder) {
         observer_.on_note("evaluating");
         if (held_out && cameras.refine()) align();
         if (held_out) evaluate_test_views();
-        report_.summary.train_psnr =
+        const double train_psnr =
             evaluated(spread_out(input_.split.train, kTrainViewsEvaluated),
                       spread_out(scene_.appearances, kTrainViewsEvaluated), !held_out, {})
                 .psnr;
+        if (!std::isnan(train_psnr)) report_.summary.train_psnr = train_psnr;
     });
     for (std::future<void>& saved : saving_) saved.get();
     if (!done) report_.views.clear();
@@ -93,6 +95,7 @@ void FinalEvaluation::evaluate_test_views() {
     of_test_views_ = evaluated(input_.split.test, for_new_views(scene_.appearances, input_.split.test.size()),
                                true, measures_);
     report_.summary.test_figures = of_test_views_->figures;
+    if (of_test_views_->frames.empty()) return;  // no pixel counts
     report_.summary.test_psnr = of_test_views_->psnr;
     report_.summary.test_ssim = of_test_views_->ssim;
 }

@@ -285,7 +285,7 @@ void Run::log(const std::optional<Evaluation>& evaluation) {
     const StepReport& last = progress_.last;
     MetricsLine line{last.step, last.seconds, progress_.wall_seconds(), last.loss, last.splats, {}, {}, {}};
     if (last.step > 0) line.train_psnr = last.psnr;
-    if (evaluation) {
+    if (evaluation && !evaluation->frames.empty()) {
         line.test_psnr = evaluation->psnr;
         line.test_ssim = evaluation->ssim;
         line.test_figures = evaluation->figures;

@@ -21,6 +21,7 @@
 #include "io/datasets/image_records.h"
 #include "run/blurred_images.h"
 #include "run/depth_points.h"
+#include "run/first_checks.h"
 #include "run/pose_options.h"
 #include "run/region_option.h"
 #include "run/stereo_points.h"
@@ -199,6 +200,7 @@ std::string start_without_points(const StartSource& source) {
 
 void add_remarks(RunInput& input, const StartSource& source) {
     const Dataset& dataset = input.dataset;
+    input.notes.insert(input.notes.begin(), dataset.notes.begin(), dataset.notes.end());
     settle_used(input, source);
     if (const auto remark = idle_ranks_remark(input.options.train, input.options.ranks->size()))
         input.remarks.push_back(*remark);
@@ -400,6 +402,22 @@ void check_without_dataset(const RunOptions& options) {
         initial_splats(options, {}, {});
 }
 
+namespace {
+
+void add_findings(const std::vector<Finding>& findings, RunInput& input) {
+    for (const Finding& finding : findings) {
+        if (finding.fatal) throw InputError(finding.text);
+        input.remarks.push_back(finding.text);
+    }
+}
+
+FirstPlaces first_places(const RunInput& input) {
+    return {input.start.size(), [&input](size_t i) { return input.start.world_mean(i); },
+            input.options.init == "sfm" ? std::string() : input.options.init};
+}
+
+}  // namespace
+
 RunInput load_run(const RunOptions& options) {
     RunInput input;
     input.options = options;
@@ -411,10 +429,8 @@ RunInput load_run(const RunOptions& options) {
                                                    .max_width = options.max_width});
     add_unknown_readouts(options, input.dataset);
     input.split = split_frames(input.dataset, options.test_every);
-    if (input.split.train.empty())
-        throw InputError(fmt::format("{}: of {} images ({} missing) none is left to train on",
-                                     options.dataset.string(), input.dataset.frames.size(),
-                                     input.dataset.missing_images));
+    if (const std::string fault = nothing_to_train_on(input.dataset, input.split); !fault.empty())
+        throw InputError(core::one_line(options.dataset.string()) + ": " + fault);
     input.split = chosen_frames(input.dataset, std::move(input.split), options.frames);
     for (const int i : input.split.train) {
         const Frame& frame = input.dataset.frames[size_t(i)];
@@ -424,6 +440,7 @@ RunInput load_run(const RunOptions& options) {
             check_max_width(options.max_width, frame.source.width, frame.source.height,
                             "the image " + frame.name);
     }
+    add_findings(check_images(input.dataset, input.split, true), input);
     if (options.skip_blurred || options.weigh_blurred) {
         const std::string remark = handle_blurred(input.dataset, input.split, options);
         if (!remark.empty()) input.remarks.push_back(remark);
@@ -446,6 +463,8 @@ RunInput load_run(const RunOptions& options) {
     StartSource source;
     input.start = initial_splats(input.options, input.dataset, input.split.train, &source);
     input.from_points = source.from == StartsFrom::points || source.cloud;
+    if (source.from == StartsFrom::points || source.from == StartsFrom::file)
+        add_findings(check_start(input.dataset, input.split.train, first_places(input)), input);
     if (input.options.train.region) check_region(input.options.train, input.start);
     add_remarks(input, source);
     return input;
