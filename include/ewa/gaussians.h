@@ -58,7 +58,8 @@ void set_world_means(Gaussians& gaussians, const std::vector<glm::dvec3>& positi
 /// The same with the scene's own positions. They move by at most float32's rounding.
 void settle_origin(Gaussians& gaussians);
 
-/// Whether all values of splat i < size are finite and its quaternion is not zero. Other splats are never visible.
+/// Whether splat i < size can be visible: its quaternion is not zero, and its values are finite. Only an opacity may be infinite,
+/// which hides all or is never seen, and the logarithm of a scale may be minus infinity, of a flat splat.
 bool drawable(const Gaussians& gaussians, size_t i);
 
 }  // namespace ewa

@@ -16,6 +16,7 @@
 #include "cli/metric_arguments.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
+#include "cli/splat_statistics.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/image.h"
@@ -240,8 +241,8 @@ int run(const CompareArguments& arguments) {
     print_unpaired(*sides.b, pairs.only_b);
     for (const ComparedSide* side : {sides.a.get(), sides.b.get()})
         if (side->skipped_splats > 0)
-            fmt::print("{}: skipped {} with a value that is not finite\n", core::one_line(side->side),
-                       core::counted(side->skipped_splats, "splat"));
+            fmt::print("{}: {}\n", core::one_line(side->side),
+                       skipped_text(side->skipped_splats, side->undrawable));
     // A missing image is the largest difference of all.
     const bool judged = arguments.threshold || arguments.max_error;
     const bool passed = !judged || (totals.passed && unpaired.empty());

@@ -15,6 +15,7 @@
 #include "image/image_files.h"
 #include "io/datasets/refined_cameras.h"
 #include "report/pictures.h"
+#include "scene/splat_arrays.h"
 
 namespace ewa::cli {
 namespace {
@@ -55,7 +56,7 @@ struct SceneSide : ComparedSide {
     SceneSide(const fs::path& splats, const fs::path& refined, const Sides& sides,
               const std::vector<int>& frames, const DrawArguments& draw,
               const std::shared_ptr<gpu::Device>& device)
-        : renderer_(renderer_of(splats, sides.options, draw, device)) {
+        : renderer_(renderer_of(splats, sides.options, draw, device, undrawable)) {
         side = splats.string();
         is_scene = true;
         Dataset cameras = sides.cameras;
@@ -79,8 +80,9 @@ struct SceneSide : ComparedSide {
 
   private:
     static Renderer renderer_of(const fs::path& path, RenderOptions options, const DrawArguments& draw,
-                                const std::shared_ptr<gpu::Device>& device) {
+                                const std::shared_ptr<gpu::Device>& device, std::string& undrawable) {
         const Gaussians gaussians = draw.load(path, options);
+        undrawable = scene::undrawable_text(gaussians);
         return {device, gaussians, options};
     }
 

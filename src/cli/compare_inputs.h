@@ -32,6 +32,7 @@ struct ComparedSide {
     std::vector<std::filesystem::path> asked;  // relative to the side, with extension; empty for one image
     std::vector<std::filesystem::path> other;  // images it has that --frames does not select
     uint32_t skipped_splats = 0;  // the most that a render skipped so far because a value was not finite
+    std::string undrawable;       // why they are skipped
 };
 
 struct CompareInputs {

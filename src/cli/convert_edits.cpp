@@ -12,6 +12,7 @@
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
+#include "scene/splat_arrays.h"
 
 namespace ewa::cli {
 namespace {
@@ -177,13 +178,15 @@ std::vector<std::string> apply_edits(Gaussians& gaussians, const Edits& edits, S
     }
     if (format != SplatFormat::ply) {
         const size_t before = gaussians.size();
+        const std::string why = scene::undrawable_text(gaussians);
         std::vector<uint32_t> kept;
         for (size_t i = 0; i < before; ++i)
             if (drawable(gaussians, i)) kept.push_back(static_cast<uint32_t>(i));
         if (kept.size() < before) keep_splats(gaussians, kept);
         if (gaussians.size() < before)
             remarks.push_back("skipped " + core::counted(before - gaussians.size(), "splat") +
-                              " with a value that is not finite or a zero quaternion");
+                              " with a value that is not finite or a zero quaternion: " + why);
+        if (!scene::is_computable(gaussians)) gaussians = scene::computable(std::move(gaussians));
     }
     // The order in which these formats are written: --check compares splat by splat.
     const bool ordered = format == SplatFormat::compressed_ply || format == SplatFormat::sog ||

@@ -8,6 +8,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "io/splats/tileset.h"
+#include "scene/splat_arrays.h"
 
 namespace ewa::cli {
 
@@ -48,9 +49,11 @@ std::vector<std::string> write_tiles(const std::filesystem::path& path, Gaussian
         if (drawable(gaussians, i)) kept.push_back(uint32_t(i));
     if (kept.size() < gaussians.size()) {
         remarks.push_back(core::counted(gaussians.size() - kept.size(), "splat") +
-                          " with a value that is not finite or a zero quaternion: skipped");
+                          " with a value that is not finite or a zero quaternion: skipped (" +
+                          scene::undrawable_text(gaussians) + ")");
         keep_splats(gaussians, kept);
     }
+    if (!scene::is_computable(gaussians)) gaussians = scene::computable(std::move(gaussians));
     const std::vector<std::string> more =
         io::write_tileset(path, std::move(gaussians), {.save = options, .earth = earth});
     remarks.insert(remarks.end(), more.begin(), more.end());

@@ -10,6 +10,7 @@
 #include "cli/command.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
+#include "cli/splat_statistics.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
@@ -17,6 +18,7 @@
 #include "run/option_table.h"
 #include "scene/dataset_files.h"
 #include "scene/readout.h"
+#include "scene/splat_arrays.h"
 
 namespace ewa::cli {
 namespace {
@@ -79,8 +81,7 @@ int run(const GradArguments& arguments) {
                weights.l2 > 0 ? fmt::format("  L2 {:.7g}", result.l2) : "",
                weights.ssim > 0 ? fmt::format("  SSIM {:.7g}", result.ssim) : "");
     if (result.skipped_nonfinite > 0)
-        fmt::print("skipped {} with a value that is not finite\n",
-                   core::counted(result.skipped_nonfinite, "splat"));
+        fmt::print("{}\n", skipped_text(result.skipped_nonfinite, scene::undrawable_text(gaussians)));
     fmt::print("the gradient of {} is in {}\n", core::counted(result.gradient.size(), "splat"),
                core::one_line(arguments.output.string()));
     return 0;

@@ -35,6 +35,7 @@
 #include "report/summary.h"
 #include "run/first_checks.h"
 
+#include "scene/splat_arrays.h"
 namespace ewa::cli {
 namespace {
 
@@ -161,8 +162,8 @@ void info_splats(const fs::path& path, const live::Run* run, const InfoArguments
     print_spread("opacity", statistics.opacity);
     print_spread("scale", statistics.scale);
     if (statistics.nonfinite > 0)
-        fmt::print("undrawable      {} (a value is not finite, or the quaternion is zero)\n",
-                   core::counted(statistics.nonfinite, "splat"));
+        fmt::print("undrawable      {} (a value is not finite, or the quaternion is zero: {})\n",
+                   core::counted(statistics.nonfinite, "splat"), scene::undrawable_text(gaussians));
     if (!arguments.verbose) return;
     print_plan("rendering", rendering);
     print_plan("training", training);

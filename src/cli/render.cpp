@@ -19,6 +19,7 @@
 #include "cli/render_picture.h"
 #include "cli/render_views.h"
 #include "cli/run_inputs.h"
+#include "cli/splat_statistics.h"
 #include "core/messages.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -32,6 +33,7 @@
 #include "scene/looks.h"
 #include "scene/native_lens.h"
 #include "scene/readout.h"
+#include "scene/splat_arrays.h"
 
 namespace ewa::cli {
 namespace {
@@ -69,9 +71,8 @@ Gaussians load_scene(const RenderArguments& arguments, RenderOptions& options) {
     return gaussians;
 }
 
-void note_skipped(Progress& progress, uint32_t skipped) {
-    if (skipped > 0)
-        progress.note("skipped " + core::counted(skipped, "splat") + " with a value that is not finite");
+void note_skipped(Progress& progress, uint32_t skipped, const Gaussians& gaussians) {
+    if (skipped > 0) progress.note(skipped_text(skipped, scene::undrawable_text(gaussians)));
 }
 
 /// Counts the views that show nothing.
@@ -139,7 +140,7 @@ int write_images(const RenderArguments& arguments, const DrawnScene& scene, Rend
         if (cameras.size() > 1) progress.update(int(i) + 1);
     }
     output.finish();
-    note_skipped(progress, taker.skipped());
+    note_skipped(progress, taker.skipped(), scene.gaussians);
     progress.clear();
     empty.warn(scene.gaussians, files);
     if (arguments.contact_sheet)
@@ -234,7 +235,7 @@ int write_film(const RenderArguments& arguments, const DrawnScene& scene, Render
         progress.update(int(i) + 1);
     }
     film.finish();
-    note_skipped(progress, renderer.skipped_nonfinite());
+    note_skipped(progress, renderer.skipped_nonfinite(), scene.gaussians);
     progress.clear();
     empty.warn(scene.gaussians, {arguments.output});
     progress.note(fmt::format("{}: {} frames, {:.1f} s", arguments.output.string(), cameras.size(),

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "shared/constants.h"
 
@@ -97,6 +98,12 @@ SplatStatistics splat_statistics(const Gaussians& g) {
     statistics.scale = make_spread(std::vector<double>(g.log_scales.begin(), g.log_scales.end()),
                                    [](double v) { return std::exp(v); });
     return statistics;
+}
+
+std::string skipped_text(uint64_t skipped, const std::string& why) {
+    const std::string text = "skipped " + core::counted(skipped, "splat");
+    if (why.empty()) return text + " with a value beyond the range of float32";
+    return text + " with a value that is not finite: " + why;
 }
 
 std::string histogram_text(const Spread& spread) {

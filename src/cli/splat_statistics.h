@@ -3,6 +3,7 @@
 #pragma once
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <string>
 
 #include "ewa/gaussians.h"
@@ -26,6 +27,9 @@ struct SplatStatistics {
 };
 
 SplatStatistics splat_statistics(const Gaussians& gaussians);
+
+/// What a command says of splats that it could not draw. why: undrawable_text of the scene.
+std::string skipped_text(uint64_t skipped, const std::string& why);
 
 /// One character per bin, from " " (empty) to "@" (fullest).
 std::string histogram_text(const Spread& spread);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "cli/metric_arguments.h"
+#include "cli/splat_statistics.h"
 #include "core/messages.h"
 #include "core/text.h"
 #include "core/typing.h"
@@ -16,6 +17,7 @@
 #include "live/server.h"
 #include "live/watcher.h"
 #include "report/summary.h"
+#include "scene/splat_arrays.h"
 
 namespace ewa::cli {
 
@@ -235,6 +237,7 @@ void TrainObserver::on_view(size_t done, size_t views) {
 void TrainObserver::on_evaluated(const StepReport& step, const Gaussians& gaussians) {
     if (progress_) progress_->clear();
     progress_.reset();
+    undrawable_ = scene::undrawable_text(gaussians);
     if (served_) served_->finish(step, gaussians);
 }
 
@@ -252,9 +255,7 @@ void TrainObserver::print(const RunResult& result) {
     if (const std::string text = figures_text(s.test_figures); !text.empty()) on_note("held-out " + text);
     if (s.train_psnr) on_note(fmt::format("training PSNR {:.2f} dB", *s.train_psnr));
     if (s.cameras) on_note(report::cameras_text(*s.cameras));
-    if (s.skipped_nonfinite > 0)
-        on_note("skipped " + core::counted(s.skipped_nonfinite, "splat") +
-                " with a value that is not finite");
+    if (s.skipped_nonfinite > 0) on_note(skipped_text(s.skipped_nonfinite, undrawable_));
     if (s.dropped_updates > 0)
         on_note("dropped " + core::counted(s.dropped_updates, "update") + " that were not finite");
     if (report::shortens_many(s))

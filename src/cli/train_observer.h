@@ -52,6 +52,7 @@ class TrainObserver : public RunObserver {
     int steps_;
     std::optional<InterruptWatch> watch_;
     std::unique_ptr<Served> served_;  // null without --serve
+    std::string undrawable_;          // why splats are skipped
     std::unique_ptr<Progress> progress_;
     std::optional<train::Forecast> forecast_;
     int first_step_ = 0;         // of this process; 0 before it

@@ -94,6 +94,8 @@ Gaussians slice_of(const Gaussians& all, size_t first, size_t count) {
 }
 
 Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments, bool statistics) {
+    if (!scene::is_computable(gaussians))
+        return upload_model(device, scene::computable(gaussians), moments, statistics);
     Model model;
     model.splats = model.capacity = model.all = uint32_t(gaussians.size());
     model.sh_degree = gaussians.sh_degree;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cassert>
 
+#include "scene/splat_arrays.h"
+
 namespace ewa::reference {
 
 void Values::resize(size_t n) {
@@ -22,6 +24,8 @@ Values::Values(const Gaussians& g)
       opacity_logits(g.opacity_logits.begin(), g.opacity_logits.end()),
       sh(g.sh.begin(), g.sh.end()) {
     for (size_t i = 0; i < means.size(); ++i) means[i] += g.origin[int(i % 3)];
+    for (double& value : log_scales) value = scene::computable_log_scale(float(value));
+    for (double& value : opacity_logits) value = scene::computable_logit(float(value));
 }
 
 Values zeros_like(const Values& values) {
@@ -52,6 +56,8 @@ Splat read(const Scene& scene, size_t i) {
 Splat read_splat(const Gaussians& gaussians, size_t i) {
     Splat splat = read(gaussians, i);
     splat.mean += gaussians.origin;
+    for (int k = 0; k < 3; ++k) splat.log_scale[k] = scene::computable_log_scale(float(splat.log_scale[k]));
+    splat.opacity_logit = scene::computable_logit(float(splat.opacity_logit));
     return splat;
 }
 Splat read_splat(const Values& values, size_t i) {

@@ -368,6 +368,7 @@ void decimate_splats(Gaussians& gaussians, size_t target, const std::function<vo
     for (size_t i = 0; i < gaussians.size(); ++i)
         if (drawable(gaussians, i)) kept.push_back(uint32_t(i));
     keep_splats(gaussians, kept);
+    if (!scene::is_computable(gaussians)) gaussians = scene::computable(std::move(gaussians));
     const bool density = gaussians.density;
     fit_opacities(gaussians, false);
     scene::put_neighbors_together(gaussians);

@@ -24,6 +24,7 @@ constexpr double kFieldOfView = 50 * std::numbers::pi / 180;     // of the short
 constexpr double kElevation = 0.25;                              // how far the view goes down for its length
 constexpr double kMargin = 1.07;                                 // of the image around the scene
 constexpr double kFence = 0.6, kMostFloaters = 0.03;             // of framed_box
+constexpr double kVeil = 100;                                    // of the scene's size
 constexpr double kTail = 0.002;                                  // share of splats that the box may cut
 constexpr double kSlab = 0.08, kCovered = 0.5, kClearer = 0.25;  // of guessed_up
 constexpr double kBroader = 1.2;  // of towards_broad_side, in standard deviations
@@ -68,9 +69,28 @@ std::vector<Extent> sampled(const Gaussians& gaussians, float least_logit) {
     return extents;
 }
 
+double largest(const glm::dvec3& v) {
+    return std::max({v.x, v.y, v.z});
+}
+
+/// Removes splats that are far larger than the scene: the camera would be so far away that nothing else shows.
+void remove_veils(std::vector<Extent>& extents) {
+    if (extents.empty()) return;
+    std::vector<double> sizes, places;
+    for (const Extent& extent : extents) sizes.push_back(largest(extent.deviation));
+    double most = quantile(sizes, 0.5);
+    for (int axis = 0; axis < 3; ++axis) {
+        places.clear();
+        for (const Extent& extent : extents) places.push_back(extent.mean[axis]);
+        most = std::max(most, quantile(places, 0.95) - quantile(places, 0.05));
+    }
+    std::erase_if(extents, [&](const Extent& extent) { return largest(extent.deviation) > kVeil * most; });
+}
+
 std::vector<Extent> sampled(const Gaussians& gaussians) {
     std::vector<Extent> extents = sampled(gaussians, kFaintLogit);
     if (extents.empty()) extents = sampled(gaussians, -std::numeric_limits<float>::infinity());
+    remove_veils(extents);
     return extents;
 }
 

@@ -96,22 +96,6 @@ int sh_degree_present(const Gaussians& gaussians) {
     return 0;
 }
 
-bool drawable(const Gaussians& gaussians, size_t i) {
-    if (!fit(gaussians)) check(gaussians);
-    if (i >= gaussians.size())
-        throw InputError("there is no splat " + std::to_string(i) + " in a scene of " +
-                         std::to_string(gaussians.size()));
-    const auto finite = [](const float* values, size_t count) {
-        return std::all_of(values, values + count, [](float v) { return std::isfinite(v); });
-    };
-    const float* q = &gaussians.quaternions[4 * i];
-    const bool rotated = q[0] != 0 || q[1] != 0 || q[2] != 0 || q[3] != 0;
-    const size_t stride = gaussians.sh_stride();
-    return rotated && finite(q, 4) && finite(&gaussians.means[3 * i], 3) &&
-           finite(&gaussians.log_scales[3 * i], 3) && std::isfinite(gaussians.opacity_logits[i]) &&
-           finite(&gaussians.sh[stride * i], stride);
-}
-
 void set_world_means(Gaussians& gaussians, const std::vector<glm::dvec3>& positions) {
     check(gaussians);
     if (positions.size() != gaussians.size())

@@ -3,11 +3,14 @@
 #pragma once
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <string>
 #include <type_traits>
 #include <vector>
 
 #include "ewa/gaussians.h"
+#include "shared/constants.h"
 
 namespace ewa::scene {
 
@@ -37,6 +40,37 @@ inline void copy_splats(const Gaussians& from, size_t i, size_t count, Gaussians
         const size_t each = sources[a].each;
         std::copy_n(sources[a].values->data() + each * i, each * count, targets[a].values->data() + each * k);
     }
+}
+
+/// How many splats are not drawable by which values, such as "means of 2, zero quaternions of 1". Empty if all are drawable.
+std::string undrawable_text(const Gaussians& gaussians);
+
+/// The logit of the largest opacity below 1 in float32, and the logarithm of 1e12: a splat of that size covers any view alike,
+/// and its footprint stays below FOOTPRINT_MAX.
+inline constexpr float kOpaqueLogit = 17.328680f, kLargestLogScale = 27.631f;
+
+/// The value that is computed with in place of a stored one: an infinite opacity, a flat scale, and one that is larger than
+/// any view would become finite and look the same.
+inline float computable_logit(float logit) {
+    return std::isinf(logit) ? std::copysign(kOpaqueLogit, logit) : logit;
+}
+inline float computable_log_scale(float log_scale) {
+    if (std::isinf(log_scale)) return log_scale < 0 ? float(shared::LOG_SCALE_MIN) : log_scale;
+    return log_scale > kLargestLogScale ? kLargestLogScale : log_scale;
+}
+
+/// Whether all values are computable as they are.
+inline bool is_computable(const Gaussians& g) {
+    return std::ranges::none_of(g.opacity_logits, [](float v) { return std::isinf(v); }) &&
+           std::ranges::all_of(g.log_scales,
+                               [](float v) { return computable_log_scale(v) == v || std::isnan(v); });
+}
+
+/// The scene with values that are computable.
+inline Gaussians computable(Gaussians g) {
+    std::ranges::transform(g.opacity_logits, g.opacity_logits.begin(), computable_logit);
+    std::ranges::transform(g.log_scales, g.log_scales.begin(), computable_log_scale);
+    return g;
 }
 
 }  // namespace ewa::scene

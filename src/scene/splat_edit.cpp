@@ -150,7 +150,9 @@ void turn_general(Gaussians& gaussians, const glm::dmat3& linear) {
         float* log_scale = &gaussians.log_scales[3 * i];
         if (!drawable(gaussians, i)) continue;
         const glm::dmat3 rotation = glm::mat3_cast(glm::normalize(glm::dquat(q[0], q[1], q[2], q[3])));
-        const double largest = std::max({log_scale[0], log_scale[1], log_scale[2]});
+        // Of a splat that is flat along all axes, too.
+        const double largest =
+            std::max({log_scale[0], log_scale[1], log_scale[2], std::numeric_limits<float>::lowest()});
         glm::dmat3 factor = linear * rotation;
         for (int axis = 0; axis < 3; ++axis) factor[axis] *= std::exp(log_scale[axis] - largest);
         const Decomposition parts = decompose(factor);

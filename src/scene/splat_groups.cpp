@@ -12,6 +12,7 @@
 
 #include "core/parallel.h"
 #include "scene/native_lens.h"
+#include "scene/splat_arrays.h"
 #include "scene/splat_shape.h"
 
 namespace ewa::scene {
@@ -39,7 +40,8 @@ using OctaveTree =
     nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Octave>, Octave, 3, uint32_t>;
 
 double largest_log_scale(const Gaussians& g, size_t i) {
-    return std::max({g.log_scales[3 * i], g.log_scales[3 * i + 1], g.log_scales[3 * i + 2]});
+    return computable_log_scale(
+        std::max({g.log_scales[3 * i], g.log_scales[3 * i + 1], g.log_scales[3 * i + 2]}));
 }
 
 bool touch(const Gaussians& g, size_t a, size_t b) {

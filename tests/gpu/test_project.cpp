@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "gpu/guarded.h"
@@ -242,7 +243,8 @@ TEST(ProjectEdges, GeoreferencedSceneKeepsItsSharpness) {
     EXPECT_LT(worst, 1e-7);  // float32 positions alone would be off by 1e-1
 }
 
-/// Up to 1e18 px; beyond that, and beyond VIEW_MAX along any axis, a splat is skipped.
+/// Up to 1e18 px; beyond that, and beyond VIEW_MAX along any axis, a splat is skipped. Scales beyond 1e12, minus
+/// infinity and infinite opacities count as finite ones.
 TEST(ProjectEdges, SplatsOfAllSizesAndDistances) {
     Scene scene = random_scene(6, 12, SplatKind::ordinary, 64, 48, 0, Footprint::antialias);
     scene.camera.rotation = glm::dmat3(1.0);
@@ -258,16 +260,31 @@ TEST(ProjectEdges, SplatsOfAllSizesAndDistances) {
     }
     for (size_t k = 0; k < 3; ++k) g.means[3 * (6 + k) + k] = 1e19f;
     for (size_t k = 0; k < 4; ++k) g.quaternions[4 * 9 + k] = 1e-39f;  // some devices take it for zero
-    const Output out = run_project(scene);
-    uint32_t skipped = 0;
-    for (size_t i = 0; i < 12; ++i) {
-        const auto p = reference::project(g, i, scene.camera, scene.options);
-        EXPECT_EQ(out.counts[i] > 0, p.visible) << i;
-        EXPECT_EQ(p.visible, i < 5 || i == 10) << i;
-        skipped += p.skipped_nonfinite;
-    }
-    EXPECT_EQ(out.totals.skipped_nonfinite, skipped);
-    EXPECT_EQ(skipped, 6u);
+    const auto check = [&](uint32_t expected, const std::function<bool(size_t)>& visible) {
+        const Output out = run_project(scene);
+        uint32_t skipped = 0;
+        for (size_t i = 0; i < 12; ++i) {
+            const auto p = reference::project(g, i, scene.camera, scene.options);
+            EXPECT_EQ(out.counts[i] > 0, p.visible) << i;
+            EXPECT_EQ(p.visible, visible(i)) << i;
+            skipped += p.skipped_nonfinite;
+        }
+        EXPECT_EQ(out.totals.skipped_nonfinite, skipped);
+        EXPECT_EQ(skipped, expected);
+    };
+    check(4, [](size_t i) { return i < 6 || i >= 10; });
+    const Camera usual = scene.camera;
+    scene.camera.fx = scene.camera.fy = 1e8;
+    check(9, [](size_t i) { return i < 3; });
+    scene.camera = usual;
+    constexpr float inf = std::numeric_limits<float>::infinity();
+    for (const float huge : {60.0f, 88.0f, 3e38f})
+        for (size_t k = 0; k < 3; ++k) g.log_scales[3 * 1 + k] = huge;
+    g.log_scales[3 * 2 + 1] = -inf;
+    g.opacity_logits[3] = inf;
+    g.opacity_logits[4] = -inf;
+    g.log_scales[3 * 5] = inf;
+    check(5, [](size_t i) { return i < 4 || i >= 10; });
 }
 
 }  // namespace

@@ -136,6 +136,9 @@ TEST(Decimate, ManyAtOnePlaceAndExtremes) {
     for (size_t i = 10; i < 20; ++i) odd.log_scales[3 * i] = -200;
     for (size_t i = 20; i < 30; ++i) odd.log_scales[3 * i + 1] = 80;
     odd.means[90] = std::numeric_limits<float>::quiet_NaN();
+    odd.opacity_logits[40] = std::numeric_limits<float>::infinity();
+    odd.opacity_logits[41] = odd.log_scales[3 * 42] = -std::numeric_limits<float>::infinity();
+    odd.log_scales[3 * 43] = 3e38f;
     decimate_splats(odd, 8);
     EXPECT_EQ(odd.size(), 8u);
     for (size_t i = 0; i < odd.size(); ++i) EXPECT_TRUE(drawable(odd, i)) << i;

@@ -242,5 +242,26 @@ TEST(Orbited, KeepsTheTargetsPixelAndTheDistance) {
     EXPECT_NEAR(glm::length(whole.position() - start.position()), 0, 1e-9);
 }
 
+TEST(FrameScene, SplatsFarLargerThanTheSceneDoNotMatter) {
+    test::Random random(3);
+    for (const size_t count : {24u, 3000u}) {
+        std::vector<glm::dvec3> points;
+        for (size_t i = 0; i < count; ++i)
+            points.emplace_back(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
+        Gaussians splats = splats_at(points, 0.1);
+        const Framing usual = frame_scene(splats, 64, 48, {});
+        for (const float huge : {8.f, 60.f, 88.f, 3e38f}) {
+            for (size_t k = 0; k < 3; ++k) splats.log_scales[k] = huge;
+            const Framing framing = frame_scene(splats, 64, 48, {});
+            EXPECT_LT(glm::length(framing.camera.position() - usual.camera.position()), 1.5)
+                << count << " " << huge;
+        }
+        splats.log_scales[0] = -std::numeric_limits<float>::infinity();
+        splats.opacity_logits[1] = std::numeric_limits<float>::infinity();
+        EXPECT_LT(glm::length(frame_scene(splats, 64, 48, {}).camera.position() - usual.camera.position()),
+                  1.5);
+    }
+}
+
 }  // namespace
 }  // namespace ewa::scene

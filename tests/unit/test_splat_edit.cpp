@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <limits>
 #include <numeric>
 
 #include "ewa/error.h"
@@ -109,6 +110,21 @@ TEST(Transform, NeedlesAndFlatSplatsStayFinite) {
     for (size_t i = 0; i < 3; ++i) EXPECT_TRUE(drawable(g, i)) << i;
     EXPECT_FALSE(drawable(g, 3));
     EXPECT_NEAR(*std::max_element(g.log_scales.begin(), g.log_scales.begin() + 3), 80.5, 1);
+}
+
+TEST(Transform, InfiniteValuesKeepTheirMeaning) {
+    constexpr float inf = std::numeric_limits<float>::infinity();
+    for (const glm::dvec3 size : {glm::dvec3(2), glm::dvec3(1, 2, 3)}) {
+        Gaussians g = storable_splats(3, 4, 1);
+        g.log_scales = {-inf, -inf, -inf, 1, -inf, 2, 3e38f, 1, 2, 88, 88, 88};
+        g.opacity_logits = {inf, -inf, 0, 0};
+        transform_splats(g, some_rotation() * glm::scale(glm::dmat4(1.0), size));
+        for (size_t i = 0; i < 4; ++i) EXPECT_TRUE(drawable(g, i)) << i;
+        EXPECT_EQ(g.opacity_logits, (std::vector<float>{inf, -inf, 0, 0}));
+        EXPECT_LT(*std::max_element(g.log_scales.begin(), g.log_scales.begin() + 3), -80);
+        EXPECT_LT(*std::min_element(g.log_scales.begin() + 3, g.log_scales.begin() + 6), -80);
+        EXPECT_GT(*std::max_element(g.log_scales.begin() + 6, g.log_scales.begin() + 9), 1e38f);
+    }
 }
 
 TEST(Transform, RefusesWhatIsNone) {

@@ -104,6 +104,17 @@ TEST(SplatGroups, ManyAtOnePlaceTakeNoSquareOfTheirNumber) {
     EXPECT_EQ(groups.sizes[0], 100'000u);
 }
 
+TEST(SplatGroups, InfiniteAndHugeScalesAreGroupsOfTheirOwn) {
+    Gaussians g = balls({{0, 0, 0, 1}, {0.5f, 0, 0, 1}, {1, 0, 0, 1}, {1.5f, 0, 0, 1}});
+    for (size_t k = 0; k < 3; ++k) {
+        g.log_scales[k] = -std::numeric_limits<float>::infinity();
+        g.log_scales[3 + k] = 3e38f;
+    }
+    const scene::SplatGroups groups = scene::touching_groups(g);
+    EXPECT_EQ(groups.sizes, (std::vector<uint32_t>{2, 1, 1}));
+    EXPECT_EQ(groups.of[2], groups.of[3]);
+}
+
 TEST(SplatGroups, ViewsThatHaveAMeanInTheirImage) {
     Camera camera;
     camera.width = camera.height = 100;

@@ -164,11 +164,20 @@ class RadWriter {
                 }).high;
         // From the smallest size that an image can show to the largest one.
         Range range = {std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+        std::vector<float> sizes;
         for (const Gaussians* level : levels_)
             for (const float scale : level->log_scales)
-                if (scale > kRadNoSize)
+                if (scale > kRadNoSize) {
                     range = {std::min(range.low, double(scale)), std::max(range.high, double(scale))};
+                    sizes.push_back(scale);
+                }
         if (!(range.low <= range.high)) range = {-12, 9};
+        // A single splat far larger than the scene must not leave the others without steps.
+        if (!sizes.empty() && range.high - range.low > kMostScales) {
+            const auto middle = sizes.begin() + std::ptrdiff_t(sizes.size() / 2);
+            std::nth_element(sizes.begin(), middle, sizes.end());
+            if (*middle < range.high - kMostScales) range.high = double(*middle + float(kMostScales / 2));
+        }
         range.low = double(float(std::max(range.low, range.high - kMostScales)));
         scales_ = {range.low, std::max(range.high, double(float(range.low + 1e-3)))};
     }

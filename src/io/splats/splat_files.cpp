@@ -146,18 +146,27 @@ void warn_of(const std::filesystem::path& path, const std::vector<std::string>& 
         core::warn(core::one_line(path.string()) + ": " + core::one_line(remark));
 }
 
-/// The scene without the splats that are never visible.
-Gaussians drawable_only(const Gaussians& gaussians, std::vector<std::string>& remarks) {
+/// Makes the scene one that every format can hold: without the splats that are never visible, and with finite values. PLY
+/// alone stores all values.
+void make_storable(Gaussians& gaussians, std::vector<std::string>& remarks) {
     std::vector<uint32_t> kept;
     for (size_t i = 0; i < gaussians.size(); ++i)
         if (drawable(gaussians, i)) kept.push_back(uint32_t(i));
-    const uint64_t skipped = gaussians.size() - kept.size();
-    remarks.push_back(core::counted(skipped, "splat") + (skipped == 1 ? " has" : " have") +
-                      " a value that is not finite or a zero quaternion and " +
-                      std::string(core::is_or_are(skipped)) + " skipped");
-    Gaussians selected = gaussians;
-    select_splats(selected, kept);
-    return selected;
+    if (const uint64_t skipped = gaussians.size() - kept.size(); skipped > 0) {
+        remarks.push_back(core::counted(skipped, "splat") + (skipped == 1 ? " has" : " have") +
+                          " a value that is not finite or a zero quaternion and " +
+                          std::string(core::is_or_are(skipped)) +
+                          " skipped: " + scene::undrawable_text(gaussians));
+        select_splats(gaussians, kept);
+    }
+    if (!scene::is_computable(gaussians)) gaussians = scene::computable(std::move(gaussians));
+}
+
+/// Whether make_storable would change the scene.
+bool is_storable(const Gaussians& gaussians) {
+    for (size_t i = 0; i < gaussians.size(); ++i)
+        if (!drawable(gaussians, i)) return false;
+    return scene::is_computable(gaussians);
 }
 
 /// The scene with world positions as its means, rounded to float32.
@@ -287,13 +296,14 @@ std::vector<std::string> save_splats(const std::filesystem::path& path, const Ga
             "opacities of --kernel density are fitted to 3DGS's kernel; a .ply keeps the kernel");
         return remarks;
     }
-    bool whole = true;
-    for (size_t i = 0; i < gaussians.size() && whole && !ply; ++i) whole = drawable(gaussians, i);
     const auto write = kind_of(format).write;
-    if (whole)
+    if (ply || is_storable(gaussians)) {
         more = write(path, gaussians, options);
-    else
-        more = write(path, drawable_only(gaussians, remarks), options);
+    } else {
+        Gaussians storable = gaussians;
+        make_storable(storable, remarks);
+        more = write(path, storable, options);
+    }
     remarks.insert(remarks.end(), more.begin(), more.end());
     const bool comments = ply || format == SplatFormat::compressed_ply || format == SplatFormat::rad;
     const bool unmarked = !comments && format != SplatFormat::spz && format != SplatFormat::sog &&
@@ -316,9 +326,7 @@ std::vector<std::string> save_levels(const std::filesystem::path& path, Gaussian
         fit_opacities(gaussians, false);
         remarks.emplace_back("opacities of --kernel density are fitted to 3DGS's kernel");
     }
-    bool whole = true;
-    for (size_t i = 0; i < gaussians.size() && whole; ++i) whole = drawable(gaussians, i);
-    if (!whole) gaussians = drawable_only(gaussians, remarks);
+    make_storable(gaussians, remarks);
     const std::vector<std::string> more = io::write_levels(path, std::move(gaussians), options);
     remarks.insert(remarks.end(), more.begin(), more.end());
     if (!options.comments.empty()) remarks.emplace_back("comments are dropped");
@@ -337,11 +345,7 @@ std::string sog_bytes(const std::filesystem::path& path, const Gaussians& gaussi
         fit_opacities(plain, false);
         remarks.push_back("opacities of --kernel density are fitted to 3DGS's kernel");
     }
-    for (size_t i = 0; i < plain.size(); ++i)
-        if (!drawable(plain, i)) {
-            plain = drawable_only(plain, remarks);
-            break;
-        }
+    make_storable(plain, remarks);
     std::vector<std::string> more;
     std::string bytes = io::pack_sog(path, plain, options, more);
     remarks.insert(remarks.end(), more.begin(), more.end());
