@@ -24,7 +24,7 @@
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/image_records.h"
 #include "io/datasets/importers/importer.h"
-#include "io/datasets/zip_files.h"
+#include "io/splats/zip_files.h"
 
 namespace ewa {
 namespace {

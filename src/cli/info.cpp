@@ -29,13 +29,14 @@
 #include "ewa/trainer.h"
 #include "image/image_files.h"
 #include "io/datasets/importers/importer.h"
-#include "io/datasets/zip_files.h"
 #include "io/gltf/mesh.h"
 #include "io/splats/formats.h"
+#include "io/splats/zip_files.h"
+#include "io/splats/zipped_splats.h"
 #include "report/summary.h"
 #include "run/first_checks.h"
-
 #include "scene/splat_arrays.h"
+
 namespace ewa::cli {
 namespace {
 
@@ -175,12 +176,6 @@ bool is_sog(const fs::path& path) {
     return name == "meta.json" || name == "lod-meta.json" || io::is_sog_meta(path);
 }
 
-/// Whether a zip archive has the list of a SOG.
-bool is_sog_archive(const fs::path& path) {
-    const io::ZipFiles zip(path);
-    return std::ranges::any_of(zip.entries(), [](const auto& entry) { return entry.name == "meta.json"; });
-}
-
 void print_rolling(const Dataset& dataset) {
     if (const auto rolling = rolling_of(dataset))
         fmt::print("rolling shutter {}, {}; a camera turns by {:.3g} degrees and moves by {:.3g} (medians)\n",
@@ -304,16 +299,8 @@ void info_archive(const fs::path& path, int test_every, bool json) {
     try {
         info_dataset(unpack_archive(path, folder.path()), path, test_every, json);
     } catch (const InputError& error) {
-        // Names the archive and the entry in place of the folder, which is no more when the user reads it.
-        std::string text = error.what();
-        const std::string unpacked = folder.path().string();
-        for (size_t at = 0; (at = text.find(unpacked, at)) != text.npos;) {
-            const bool entry = text.compare(at + unpacked.size(), 1, "/") == 0;
-            const std::string name = core::one_line(path.string()) + (entry ? ": " : "");
-            text.replace(at, unpacked.size() + (entry ? 1 : 0), name);
-            at += name.size();
-        }
-        throw InputError(text);
+        // The folder is no more when the user reads it.
+        throw InputError(io::named_in_archive(error.what(), folder.path(), path));
     }
 }
 
@@ -405,7 +392,7 @@ int run(const InfoArguments& arguments) {
     else if (fs::is_directory(path) || (path.extension() == ".json" && !is_sog(path)) ||
              io::find_importer(path))
         info_dataset(path, path, arguments.test_every, arguments.json);
-    else if (is_archive(path) && !is_sog_archive(path))
+    else if (is_archive(path) && (archive_has_cameras(path) || !io::has_splats(io::ZipFiles(path))))
         info_archive(path, arguments.test_every, arguments.json);
     else if (const std::string_view format = image_format(path); !format.empty())
         info_image(path, format, arguments.json);

@@ -3,7 +3,6 @@
 // tests that read are made here, not by ewa's writer.
 #include <webp/decode.h>
 #include <webp/encode.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <map>
@@ -14,6 +13,7 @@
 #include "io/splats/clusters.h"
 #include "support/splat_scenes.h"
 #include "support/temp_folder.h"
+#include "support/zip_bytes.h"
 
 namespace {
 
@@ -22,6 +22,7 @@ using nlohmann::json;
 using test::bytes_of;
 using test::expect_error;
 using test::TempFolder;
+using test::ZipEntry;
 
 using Files = std::map<std::string, std::string>;
 
@@ -44,50 +45,10 @@ std::string two_pixels(const std::array<uint8_t, 4>& a, const std::array<uint8_t
     return webp(4, 1, rgba);
 }
 
-struct Entry {
-    std::string name, content;
-    uint16_t method = 0, flags = 0;
-    uint32_t claimed = 0;  // size; 0: the true one
-    uint32_t sum = 0;      // added to the checksum
-};
-
-/// A zip archive by the format's specification (APPNOTE.TXT).
-std::string zipped(const std::vector<Entry>& entries) {
-    std::string bytes, directory;
-    for (const Entry& e : entries) {
-        std::string packed = e.content;
-        if (e.method == 8) {
-            z_stream stream{};
-            EXPECT_EQ(deflateInit2(&stream, 9, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY), Z_OK);
-            packed.resize(e.content.size() + 1000);
-            stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(e.content.data()));
-            stream.avail_in = uInt(e.content.size());
-            stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-            stream.avail_out = uInt(packed.size());
-            EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
-            packed.resize(stream.total_out);
-            deflateEnd(&stream);
-        }
-        const auto sum =
-            uint32_t(crc32_z(0, reinterpret_cast<const Bytef*>(e.content.data()), e.content.size()));
-        const std::string shared = bytes_of(uint16_t(20)) + bytes_of(e.flags) + bytes_of(e.method) +
-                                   bytes_of(uint32_t(0)) + bytes_of(sum + e.sum) +
-                                   bytes_of(uint32_t(packed.size())) +
-                                   bytes_of(e.claimed ? e.claimed : uint32_t(e.content.size())) +
-                                   bytes_of(uint16_t(e.name.size())) + bytes_of(uint16_t(0));
-        directory += "PK\1\2" + bytes_of(uint16_t(20)) + shared + std::string(10, '\0') +
-                     bytes_of(uint32_t(bytes.size())) + e.name;
-        bytes += "PK\3\4" + shared + e.name + packed;
-    }
-    const auto count = uint16_t(entries.size());
-    return bytes + directory + "PK\5\6" + std::string(4, '\0') + bytes_of(count) + bytes_of(count) +
-           bytes_of(uint32_t(directory.size())) + bytes_of(uint32_t(bytes.size())) + bytes_of(uint16_t(0));
-}
-
 std::string zipped(const Files& files, uint16_t method = 0) {
-    std::vector<Entry> entries;
+    std::vector<ZipEntry> entries;
     for (const auto& [name, content] : files) entries.push_back({name, content, method});
-    return zipped(entries);
+    return test::zipped(entries);
 }
 
 /// 256 values in a table: `first`, then zeros.
@@ -315,8 +276,8 @@ TEST(Sog, RefusesWithTheReason) {
         files[name] = content;
         return files;
     };
-    refuse({}, {"a.sog", "not"});
-    refuse({{"x", "y"}}, {"a.sog: \"meta.json\" is not in the archive"});
+    refuse({}, {"a.sog", "not a zip archive"});
+    refuse({{"x", "y"}}, {"a.sog: an archive without splats"});
     refuse(with("meta.json", "{"), {"a.sog", "byte", "ends too early"});
     refuse(with("meta.json", "[]"), {"the JSON is not an object"});
     refuse(changed([](json& meta) { meta["version"] = 3; }), {"SOG version 3"});
@@ -333,6 +294,8 @@ TEST(Sog, RefusesWithTheReason) {
            {"splat 1", "row 1", "\"shN\", which has 1"});
     refuse(changed([](json& meta) { meta["sh0"]["files"][0] = "../sh0.webp"; }),
            {"\"../sh0.webp\" is not in"});
+    refuse(changed([](json& meta) { meta["sh0"]["files"][0] = "none.webp"; }),
+           {"\"none.webp\" is not in the archive"});
     refuse(with("sh0.webp", "no image"), {"\"sh0.webp\": not a WebP"});
     refuse(with("sh0.webp", webp(2, 2, std::vector<uint8_t>(16, 255))), {"sh0.webp", "2×2", "4×1"});
     refuse(with("sh0.webp", two_splats()["sh0.webp"].substr(0, 40)), {"sh0.webp", "damaged or truncated"});
@@ -350,24 +313,23 @@ TEST(Sog, RefusesWithTheReason) {
 
 TEST(Sog, RefusesHostileArchives) {
     TempFolder folder;
-    const auto refuse = [&](const Entry& entry, std::initializer_list<std::string> parts) {
-        std::vector<Entry> entries;
+    const auto refuse = [&](const ZipEntry& entry, std::initializer_list<std::string> parts) {
+        std::vector<ZipEntry> entries;
         for (const auto& [name, content] : two_splats())
             if (name != entry.name) entries.push_back({name, content});
         entries.push_back(entry);
-        expect_error<InputError>([&] { load_splats(folder.write("a.sog", zipped(entries))); }, parts);
+        expect_error<InputError>([&] { load_splats(folder.write("a.sog", test::zipped(entries))); }, parts);
     };
     const std::string meta = two_splats()["meta.json"], image = two_splats()["sh0.webp"];
     refuse({.name = "meta.json", .content = meta, .flags = 1}, {"\"meta.json\" is encrypted"});
     refuse({.name = "meta.json", .content = meta, .method = 12}, {"\"meta.json\" is packed with method 12"});
-    refuse({.name = "meta.json", .content = meta, .sum = 1}, {"\"meta.json\": its data is damaged"});
+    refuse({.name = "meta.json", .content = meta, .sum = 1}, {"\"meta.json\" is damaged or cut off"});
     refuse({.name = "sh0.webp", .content = image, .claimed = 4000000000u},
-           {"\"sh0.webp\" claims to unpack from", "4000000000 bytes"});
+           {"a.sog: claims to unpack from", "4 GB"});
     // Zeros that pack a thousand times.
     refuse({.name = "sh0.webp", .content = image + std::string(100 << 20, '\0'), .method = 8},
-           {"\"sh0.webp\" claims to unpack"});
-    refuse({.name = "meta.json", .content = meta + std::string(2 << 20, ' ')},
-           {"\"meta.json\" claims to unpack"});
+           {"a.sog: claims to unpack"});
+    refuse({.name = "meta.json", .content = meta + std::string(2 << 20, ' ')}, {"\"meta.json\"", "1048576"});
     // An image of a gigabyte in a few hundred bytes.
     refuse({.name = "l.webp", .content = webp(16000, 2000, std::vector<uint8_t>(128000000, 255))},
            {"l.webp", "16000×2000", "2 splats"});

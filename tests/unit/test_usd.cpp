@@ -7,6 +7,7 @@
 #include "ewa/splat_files.h"
 #include "support/splat_scenes.h"
 #include "support/temp_folder.h"
+#include "support/zip_bytes.h"
 
 namespace {
 
@@ -201,6 +202,59 @@ TEST(Usd, RefusesWithTheReason) {
         } catch (const InputError&) {
         }
     }
+}
+
+TEST(Usd, ListsThatAreEmptyAreErrors) {
+    const TempFolder folder;
+    const auto refuse = [&](const std::string& text, std::initializer_list<std::string> parts) {
+        const auto path = folder.write("a.usda", "#usda 1.0\n" + text);
+        expect_error<InputError>([&] { load_splats(path); }, parts);
+    };
+    for (const char* list : {"[]", "[\"inherited\", \"invisible\"]"})
+        refuse(field("[(1, 2, 3)]", std::string("\n    token visibility = ") + list + kField),
+               {"a.usda: line 4", "visibility is one text"});
+    refuse(field("[(1, 2, 3)]", "\n    uniform token colorSpace:name = []" + kField),
+           {"line 4", "colorSpace:name"});
+    EXPECT_EQ(read(folder, field("[(1, 2, 3)]", "\n    token visibility = [\"inherited\"]" + kField)).size(),
+              1u);
+    std::string ops;
+    for (int i = 0; i < 300; ++i) ops += "\"xformOp:translate:a\", ";
+    refuse("def \"P\" { float3 xformOp:translate:a = (0, 0, 0)\n uniform token[] xformOpOrder = [" + ops +
+               "]\n" + field("[(1, 2, 3)]") + "}",
+           {"line 3", "more than 256 transforms"});
+}
+
+TEST(Usd, PackagesThatPeopleMake) {
+    const TempFolder folder;
+    const std::string layer = "#usda 1.0\n" + field("[(1, 2, 3)]");
+    const auto package = [&](const std::vector<test::ZipEntry>& entries) {
+        return folder.write("a.usdz", test::zipped(entries));
+    };
+    const SplatScene scene = read_splats(package(
+        {{.name = "scene/", .content = ""}, {.name = "scene/a.usda", .content = layer, .method = 8}}));
+    EXPECT_EQ(scene.format, SplatFormat::usdz);
+    EXPECT_EQ(mean_of(scene.gaussians), glm::dvec3(1, -2, -3));
+    const std::string volume = "#usda 1.0\ndef Volume \"g\" { def OmniNuRecFieldAsset \"d\" {} }";
+    const std::string over = "#usda 1.0\n( subLayers = [@./gauss.usda@] )\n";
+    for (const auto& path : {package({{"default.usda", over}, {"gauss.usda", volume}, {"x.nurec", "x"}}),
+                             folder.write("b.usda", volume)})
+        expect_error<InputError>([&] { load_splats(path); },
+                                 {"NuRec", "ParticleField3DGaussianSplat", "PLY"});
+    expect_error<InputError>(
+        [&] {
+            load_splats(package({{"a.usdc", "PXR-USDC\1"}}));
+        },
+        {"a.usdz: \"a.usdc\"", "usdcat --flatten"});
+    expect_error<InputError>([&] { load_splats(package({{"a/", ""}})); }, {"a.usdz", "empty"});
+}
+
+TEST(Usd, OpacitiesBeyondOneAreNoted) {
+    const TempFolder folder;
+    std::string text = field("[(1, 2, 3)]");
+    text.replace(text.find("0.75"), 4, "-7.5");
+    const SplatScene scene = read_splats(folder.write("a.usda", "#usda 1.0\n" + text));
+    ASSERT_EQ(scene.remarks.size(), 1u);
+    EXPECT_NE(scene.remarks[0].find("1 opacities outside of 0..1 are clamped"), std::string::npos);
 }
 
 }  // namespace

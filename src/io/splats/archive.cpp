@@ -1,17 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/splats/archive.h"
 
-#include <unzip.h>
 #include <zip.h>
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <new>
-
-#include "core/file_reader.h"
-#include "core/text.h"
-#include "ewa/error.h"
 
 namespace ewa::io {
 
@@ -77,74 +71,7 @@ void require_added(int result) {
     if (result != ZIP_OK) throw std::bad_alloc();
 }
 
-constexpr uint16_t kEncrypted = 1;  // a flag
-
 }  // namespace
-
-struct ArchiveReader::State {
-    std::string name;
-    MemoryFile file;
-    unzFile zip = nullptr;
-};
-
-ArchiveReader::ArchiveReader(const std::filesystem::path& path) : state_(std::make_unique<State>()) {
-    state_->name = core::one_line(path.string());
-    state_->file.bytes = core::read_text_file(path);
-    zlib_filefunc64_def functions = functions_of(state_->file);
-    state_->zip = unzOpen2_64(state_->name.c_str(), &functions);
-    if (!state_->zip)
-        throw InputError(state_->name + ": not a zip archive, or its directory at byte " +
-                         std::to_string(state_->file.bytes.size()) + " is damaged or cut off");
-}
-
-ArchiveReader::~ArchiveReader() {
-    if (state_->zip) unzClose(state_->zip);
-}
-
-uint64_t ArchiveReader::bytes() const {
-    return state_->file.bytes.size();
-}
-
-std::string ArchiveReader::first_entry() const {
-    std::array<char, 256> name{};
-    if (unzGoToFirstFile(state_->zip) != UNZ_OK ||
-        unzGetCurrentFileInfo64(state_->zip, nullptr, name.data(), name.size() - 1, nullptr, 0, nullptr, 0) !=
-            UNZ_OK)
-        throw InputError(state_->name + ": the archive has no entries");
-    return name.data();
-}
-
-std::string ArchiveReader::read(const std::string& entry, uint64_t most) const {
-    const unzFile zip = state_->zip;
-    const std::string where = state_->name + ": \"" + core::one_line(entry) + "\"";
-    constexpr int kSameCase = 1;
-    if (unzLocateFile(zip, entry.c_str(), kSameCase) != UNZ_OK)
-        throw InputError(where + " is not in the archive");
-    unz_file_info64 info{};
-    if (unzGetCurrentFileInfo64(zip, &info, nullptr, 0, nullptr, 0, nullptr, 0) != UNZ_OK)
-        throw InputError(where + ": its entry is damaged");
-    if (info.flag & kEncrypted) throw InputError(where + " is encrypted");
-    if (info.compression_method != 0 && info.compression_method != Z_DEFLATED)
-        throw InputError(where + " is packed with method " + std::to_string(info.compression_method) +
-                         "; stored and deflated entries are supported");
-    const uint64_t size = info.uncompressed_size, packed = std::min<uint64_t>(info.compressed_size, bytes());
-    if (size > most)
-        throw InputError(where + " claims to unpack from " + std::to_string(packed) + " to " +
-                         std::to_string(size) + " bytes; it is damaged");
-    std::string content(size_t(size), '\0');
-    const unsigned piece = 1u << 30;  // minizip counts in 32 bits
-    bool whole = unzOpenCurrentFile(zip) == UNZ_OK;
-    for (size_t at = 0; whole && at < content.size();) {
-        const int got =
-            unzReadCurrentFile(zip, &content[at], unsigned(std::min<size_t>(piece, content.size() - at)));
-        whole = got > 0;
-        at += size_t(std::max(got, 0));
-    }
-    // Closing compares the checksum.
-    whole = unzCloseCurrentFile(zip) == UNZ_OK && whole;
-    if (!whole) throw InputError(where + ": its data is damaged or cut off");
-    return content;
-}
 
 struct ArchiveWriter::State {
     MemoryFile file;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads SOG, whose layout sog.h describes.
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -9,12 +10,12 @@
 #include "core/json.h"
 #include "core/sandboxed_path.h"
 #include "core/text.h"
-#include "io/splats/archive.h"
 #include "io/splats/formats.h"
 #include "io/splats/render_mark.h"
 #include "io/splats/sog.h"
 #include "io/splats/splat_values.h"
 #include "io/splats/webp.h"
+#include "io/splats/zip_files.h"
 
 namespace ewa::io {
 
@@ -45,16 +46,21 @@ class SogFiles {
 
 class ArchivedFiles final : public SogFiles {
   public:
-    explicit ArchivedFiles(const std::filesystem::path& path) : archive_(path) {}
-    std::string meta() const { return archive_.read(kSogMeta, kMetaLimits.bytes); }
+    explicit ArchivedFiles(const std::filesystem::path& path)
+        : archive_(path), name_(core::one_line(path.string())), bytes_(std::filesystem::file_size(path)) {}
     std::string read(const std::string& name) override {
-        // WebP is packed already: zip adds little to it.
-        return archive_.read(name, 2 * archive_.bytes() + kMetaLimits.bytes);
+        const auto found =
+            std::ranges::find_if(archive_.entries(), [&](const auto& entry) { return entry.name == name; });
+        if (found == archive_.entries().end())
+            throw InputError(name_ + ": \"" + core::one_line(name) + "\" is not in the archive");
+        return archive_.text(*found);
     }
-    uint64_t bytes(const json&) const override { return archive_.bytes(); }
+    uint64_t bytes(const json&) const override { return bytes_; }
 
   private:
-    ArchiveReader archive_;
+    ZipFiles archive_;
+    std::string name_;
+    uint64_t bytes_;
 };
 
 class FolderFiles final : public SogFiles {
@@ -392,7 +398,7 @@ SplatScene read_sog(const std::filesystem::path& path) {
     ArchivedFiles files(path);
     const std::string name = core::one_line(path.string()) + ": \"" + kSogMeta + "\"";
     SplatScene scene =
-        SogReader(Meta(core::parse_json<json>(files.meta(), name, kMetaLimits), name), files).read();
+        SogReader(Meta(core::parse_json<json>(files.read(kSogMeta), name, kMetaLimits), name), files).read();
     scene.format = SplatFormat::sog;
     return scene;
 }

@@ -13,7 +13,10 @@
 #include "ewa/splat_edit.h"
 #include "io/splats/formats.h"
 #include "io/splats/ply_table.h"
+#include "io/splats/sog.h"
 #include "io/splats/splat_values.h"
+#include "io/splats/zipped_splats.h"
+#include "scene/splat_arrays.h"
 
 namespace ewa {
 
@@ -128,6 +131,16 @@ std::string all_kinds() {
                                     ": ewa reads this format and does not write it; it writes " + kWritten));
 }
 
+/// Whether the file is a zip archive of splats in another format, or in a folder.
+bool is_zipped(const std::filesystem::path& path) {
+    const Kind* kind = kind_of_name(path);
+    // A .splat has no header, and a .usdz is a zip archive of another kind.
+    if (kind && (kind->format == SplatFormat::splat || kind->format == SplatFormat::usdz)) return false;
+    if (!io::is_zip(path)) return false;
+    const io::ZipFiles zip(path);
+    return std::ranges::none_of(zip.entries(), [](const auto& entry) { return entry.name == io::kSogMeta; });
+}
+
 /// The kind that the first bytes identify, or null.
 const Kind* kind_of_head(std::string_view head) {
     for (const Kind& kind : kKinds)
@@ -230,6 +243,7 @@ SplatFormat format_to_write(const std::filesystem::path& path) {
 }
 
 SplatFormat format_of_file(const std::filesystem::path& path) {
+    if (is_zipped(path)) return format_of_name(io::zipped_splats(path, io::ZipFiles(path)).name);
     const Kind* kind = kind_of_name(path);
     std::error_code error;
     if (!kind && !std::filesystem::is_regular_file(path, error)) refuse(path, all_kinds());
@@ -255,6 +269,7 @@ SplatFormat format_of_file(const std::filesystem::path& path) {
 }
 
 SplatScene read_splats(const std::filesystem::path& path) {
+    if (is_zipped(path)) return io::read_zipped(path, read_splats);
     return kind_of(format_of_file(path)).read(path);
 }
 

@@ -29,6 +29,11 @@ inline double logit_of_opacity(double opacity) {
     return logit(opacity, 1e-30, 1 - 0x1p-25);
 }
 
+inline std::string clamped_opacities_remark(uint64_t count) {
+    return std::to_string(count) + " opacities outside of 0..1 are clamped; if most are, they are logits, " +
+           "and the program that wrote them is wrong";
+}
+
 /// The logit of an opacity of 0..1 that is stored in `levels` + 1 steps. The ends move inwards by a quarter
 /// of a step, so they round back to themselves.
 inline double logit_of_steps(double p, uint32_t levels) {

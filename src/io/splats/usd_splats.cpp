@@ -8,10 +8,11 @@
 //   opacities                                  linear, 0..1
 //   radiance:sphericalHarmonicsCoefficients    (degree + 1)^2 RGB values a splat, in INRIA's order
 // or the same in half precision under names that end in h. A package is a zip archive of stored entries, whose first one
-// is the scene. Entries begin at multiples of 64 bytes.
+// is the scene. Entries begin at multiples of 64 bytes. Deflated ones are read too, as people make them with zip.
 //
 // The stage has y up, z towards the viewer. Values are turned by 180 degrees about x from PLY's frame, SH too: whether a
 // renderer turns SH by the transform of a parent is not settled.
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <glm/gtc/matrix_transform.hpp>
@@ -27,6 +28,7 @@
 #include "io/splats/linear_colors.h"
 #include "io/splats/splat_values.h"
 #include "io/splats/usd_text.h"
+#include "io/splats/zip_files.h"
 
 namespace ewa::io {
 
@@ -36,6 +38,8 @@ constexpr const char* kType = "ParticleField3DGaussianSplat";
 constexpr const char* kSh = "radiance:sphericalHarmonicsCoefficients";
 constexpr const char* kShDegree = "radiance:sphericalHarmonicsDegree";
 
+constexpr size_t kMostOps = 256;  // each is searched among the properties
+
 /// Y up and z towards the viewer from PLY's frame, and back.
 glm::dmat4 half_turn() {
     return glm::scale(glm::dmat4(1.0), glm::dvec3(1, -1, -1));
@@ -43,22 +47,31 @@ glm::dmat4 half_turn() {
 
 class UsdReader {
   public:
-    explicit UsdReader(const UsdText& layer) : layer_(layer) {}
+    /// nurec: the package of the layer has a file of NuRec.
+    explicit UsdReader(const UsdText& layer, bool nurec = false) : layer_(layer), nurec_(nurec) {}
 
     SplatScene read() {
         glm::dmat4 to_ply = half_turn();
         if (usd_metadata(layer_.metadata(), "upAxis") == "Z")
             to_ply = glm::dmat4({1, 0, 0, 0}, {0, 0, 1, 0}, {0, -1, 0, 0}, {0, 0, 0, 1});
         for (const UsdPrim& prim : layer_.prims()) visit(prim, to_ply);
-        if (fields_ == 0)
-            layer_.fail(0, std::string("no prim has the type ") + kType +
-                               "; a scene of several layers becomes one with usdcat --flatten");
+        if (fields_ == 0) fail_without_fields();
+        if (clamped_ > 0) remark(clamped_opacities_remark(clamped_));
         scene_.format = SplatFormat::usda;
         scene_.variant = std::to_string(fields_) + (fields_ == 1 ? " particle field" : " particle fields");
         return std::move(scene_);
     }
 
   private:
+    [[noreturn]] void fail_without_fields() const {
+        if (nurec_ || layer_.contains("OmniNuRec"))
+            throw InputError(layer_.name() + ": holds a NuRec volume, which Omniverse alone draws; " +
+                             "export the splats from the program that trained them as " + kType +
+                             " or as a PLY, since usdcat does not convert it");
+        layer_.fail(0, std::string("no prim has the type ") + kType +
+                           "; a scene of several layers becomes one with usdcat --flatten");
+    }
+
     void visit(const UsdPrim& prim, const glm::dmat4& parent) {
         if (prim.specifier != "def" || usd_metadata(prim.metadata, "active") == "false") return;
         for (const char* outside : {"references", "payload", "inherits", "specializes"})
@@ -66,7 +79,7 @@ class UsdReader {
                 remark("references to other prims and files are skipped");
         if (prim.variants) remark("variants are skipped");
         if (const UsdProperty* visibility = prim.property("visibility"))
-            if (layer_.words(*visibility).front() == "invisible") {
+            if (layer_.word(*visibility) == "invisible") {
                 remark("invisible prims are skipped");
                 return;
             }
@@ -79,7 +92,10 @@ class UsdReader {
     glm::dmat4 placed(const UsdPrim& prim, glm::dmat4 parent) {
         const UsdProperty* order = prim.property("xformOpOrder");
         if (!order) return parent;
-        for (const std::string& op : layer_.words(*order)) {
+        const std::vector<std::string> ops = layer_.words(*order);
+        if (ops.size() > kMostOps)
+            layer_.fail(order->value, "more than " + std::to_string(kMostOps) + " transforms of a prim");
+        for (const std::string& op : ops) {
             if (op == "!resetXformStack!") layer_.fail(order->value, "!resetXformStack! is not supported");
             const UsdProperty* value = prim.property(op);
             if (!value) layer_.fail(order->value, core::one_line(op) + " has no value");
@@ -158,7 +174,10 @@ class UsdReader {
         g.log_scales.reserve(scales.size());
         for (const float scale : scales) g.log_scales.push_back(log_of_scale(scale));
         g.opacity_logits.reserve(count);
-        for (const float opacity : opacities) g.opacity_logits.push_back(float(logit_of_opacity(opacity)));
+        for (const float opacity : opacities) {
+            clamped_ += opacity < 0 || opacity > 1;
+            g.opacity_logits.push_back(float(logit_of_opacity(opacity)));
+        }
         read_sh(prim, g);
         return g;
     }
@@ -182,7 +201,7 @@ class UsdReader {
             g.sh.insert(g.sh.end(), first, first + std::ptrdiff_t(g.sh_stride()));
         }
         const UsdProperty* space = prim.property("colorSpace:name");
-        if (space && layer_.words(*space).front().starts_with("lin_")) remark(linear_colors_to_srgb(g));
+        if (space && layer_.word(*space).starts_with("lin_")) remark(linear_colors_to_srgb(g));
     }
 
     /// The array of this name, or of its half precision.
@@ -201,18 +220,22 @@ class UsdReader {
     }
 
     const UsdText& layer_;
+    bool nurec_;
     SplatScene scene_;
-    int fields_ = 0;  // read so far
+    int fields_ = 0;        // read so far
+    uint64_t clamped_ = 0;  // opacities
 };
 
-SplatScene read_layer(const std::filesystem::path& path, const std::string& entry, std::string text) {
+SplatScene read_layer(const std::filesystem::path& path, const std::string& entry, std::string text,
+                      bool nurec = false) {
     const std::string name =
         core::one_line(path.string()) + (entry.empty() ? "" : ": \"" + core::one_line(entry) + "\"");
     if (text.starts_with("PXR-USDC"))
-        throw InputError(
-            name +
-            ": is OpenUSD's binary format; usdcat IN.usdc -o OUT.usda makes text of it, which ewa reads");
-    return UsdReader(UsdText(name, std::move(text))).read();
+        throw InputError(name +
+                         ": is OpenUSD's binary format; usdcat --flatten IN -o OUT.usda makes text of it, "
+                         "which ewa reads");
+    const UsdText layer(name, std::move(text));
+    return UsdReader(layer, nurec).read();
 }
 
 // Writing.
@@ -304,9 +327,12 @@ SplatScene read_usda(const std::filesystem::path& path) {
 }
 
 SplatScene read_usdz(const std::filesystem::path& path) {
-    const ArchiveReader archive(path);
-    const std::string entry = archive.first_entry();
-    SplatScene scene = read_layer(path, entry, archive.read(entry, archive.bytes()));
+    const ZipFiles archive(path);
+    const auto& entries = archive.entries();
+    if (entries.empty()) throw InputError(core::one_line(path.string()) + ": the package is empty");
+    const bool nurec = std::ranges::any_of(
+        entries, [](const auto& entry) { return core::lower(entry.name.extension().string()) == ".nurec"; });
+    SplatScene scene = read_layer(path, entries.front().name.string(), archive.text(entries.front()), nurec);
     scene.format = SplatFormat::usdz;
     return scene;
 }

@@ -296,6 +296,13 @@ std::vector<std::string> UsdText::words(const UsdProperty& property) const {
     return words;
 }
 
+std::string UsdText::word(const UsdProperty& property) const {
+    std::vector<std::string> all = words(property);
+    if (all.size() != 1)
+        fail(property.value, property.name + " is one text, not a list of " + std::to_string(all.size()));
+    return std::move(all.front());
+}
+
 void UsdText::fail(size_t byte, const std::string& message) const {
     const size_t end = std::min(byte, text_.size());
     const auto line = 1 + std::count(text_.begin(), text_.begin() + std::ptrdiff_t(end), '\n');

@@ -43,6 +43,9 @@ class UsdText {
     std::vector<double> doubles(const UsdProperty& property, size_t count) const;
     /// A token or string, or an array of them. Throws InputError.
     std::vector<std::string> words(const UsdProperty& property) const;
+    /// The one token or string. Throws InputError for more, and for an empty array.
+    std::string word(const UsdProperty& property) const;
+    bool contains(std::string_view text) const { return text_.find(text) != std::string::npos; }
 
     /// Throws InputError with the line of a byte.
     [[noreturn]] void fail(size_t byte, const std::string& message) const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/datasets/zip_files.h"
+#include "io/splats/zip_files.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -27,6 +27,8 @@ namespace fs = std::filesystem;
 constexpr size_t kMostEntries = 100'000;
 constexpr uint64_t kMostTimes = 200, kAlwaysAllowed = uint64_t(16) << 20;
 constexpr size_t kLongestEntry = 1024, kLongestPart = 255;
+constexpr std::ptrdiff_t kMostFolders = 64;  // folders in folders
+constexpr size_t kShownName = 200;           // of a wrong one
 constexpr size_t kZipPiece = size_t(1) << 18;
 constexpr uint64_t kEncryptedFlag = 1, kDeflated = 8;
 
@@ -37,6 +39,8 @@ bool is_left_out(const fs::path& name) {
 
 /// Why the name cannot be written; empty if it can.
 std::string wrong_name(const std::string& name) {
+    if (std::ranges::count_if(name, [](char c) { return c == '/' || c == '\\'; }) > kMostFolders)
+        return "is more than " + std::to_string(kMostFolders) + " folders deep";
     const std::optional<fs::path> inside = core::name_inside(name);
     if (!inside) return "leads out of the folder";
     if (std::ranges::any_of(name, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }))
@@ -102,7 +106,7 @@ struct ZipFiles::State {
 void ZipFiles::State::add(const std::string& entry, const unz_file_info64& info) {
     const bool folder = entry.ends_with('/') || entry.ends_with('\\');
     const std::string plain = entry.substr(0, entry.size() - (folder ? 1 : 0));
-    if (const std::string wrong = wrong_name(plain); !wrong.empty()) fail(entry, wrong);
+    if (const std::string wrong = wrong_name(plain); !wrong.empty()) fail(entry.substr(0, kShownName), wrong);
     const auto kind = mode_t(info.external_fa >> 16) & S_IFMT;
     if (kind != 0 && kind != S_IFREG && kind != S_IFDIR) fail(entry, "is a link or a device, not a file");
     const fs::path inside = *core::name_inside(plain);
@@ -149,14 +153,13 @@ void ZipFiles::State::list(uint64_t file_bytes) {
 
 /// Throws if two entries would be written to one place.
 void ZipFiles::State::check_conflicts() const {
-    std::set<fs::path> files, folders;
-    for (const Entry& entry : entries) {
-        if (!files.insert(entry.name).second) fail(entry.name.string(), "is there twice");
-        for (fs::path above = entry.name.parent_path(); !above.empty(); above = above.parent_path())
-            folders.insert(above);
+    std::set<std::string> files;
+    for (const Entry& entry : entries)
+        if (!files.insert(entry.name.string()).second) fail(entry.name.string(), "is there twice");
+    for (const std::string& file : files) {
+        const auto below = files.lower_bound(file + '/');
+        if (below != files.end() && below->starts_with(file + '/')) fail(file, "is both a file and a folder");
     }
-    for (const fs::path& file : files)
-        if (folders.contains(file)) fail(file.string(), "is both a file and a folder");
 }
 
 bool is_zip(const fs::path& path) try {
@@ -207,6 +210,12 @@ void ZipFiles::read(const Entry& entry, const std::function<void(std::string_vie
     if (!whole) state_->fail(entry.name.string(), "is damaged or cut off");
 }
 
+std::string ZipFiles::text(const Entry& entry) const {
+    std::string whole;
+    read(entry, [&](std::string_view piece) { whole += piece; });
+    return whole;
+}
+
 std::string ZipFiles::head(const Entry& entry, size_t bytes) const {
     const unzFile zip = state_->zip;
     std::string text(size_t(std::min<uint64_t>(bytes, entry.bytes)), '\0');
@@ -222,23 +231,37 @@ std::string ZipFiles::head(const Entry& entry, size_t bytes) const {
     return text;
 }
 
-bool ZipFiles::unpack(const fs::path& folder, const std::function<bool(int)>& progress) const {
+bool ZipFiles::unpack(const fs::path& folder, const std::function<bool(int)>& progress,
+                      const std::function<bool(const Entry&)>& wanted) const {
     core::make_folder(folder);
+    uint64_t needed = 0;
+    for (const Entry& entry : entries()) needed += !wanted || wanted(entry) ? entry.bytes : 0;
     std::error_code unknown;
     const fs::space_info space = fs::space(folder, unknown);
-    if (!unknown && space.available < bytes())
+    if (!unknown && space.available < needed)
         throw RunError(core::one_line(folder.string()) + ": unpacking " + state_->name + " takes " +
-                       core::bytes_text(bytes()) + ", and " + core::bytes_text(space.available) +
-                       " are free");
+                       core::bytes_text(needed) + ", and " + core::bytes_text(space.available) + " are free");
     for (size_t i = 0; i < entries().size(); ++i) {
         const Entry& entry = entries()[i];
+        if (wanted && !wanted(entry)) continue;
         core::make_folder((folder / entry.name).parent_path());
         NewFile file(folder / entry.name);
-        read(entry, [&](std::string_view text) { file.write(text); });
+        read(entry, [&](std::string_view piece) { file.write(piece); });
         file.close();
         if (!progress(int(i + 1))) return false;
     }
     return true;
+}
+
+std::string named_in_archive(std::string text, const fs::path& unpacked, const fs::path& archive) {
+    const std::string folder = unpacked.string();
+    for (size_t at = 0; (at = text.find(folder, at)) != text.npos;) {
+        const bool entry = text.compare(at + folder.size(), 1, "/") == 0;
+        const std::string name = core::one_line(archive.string()) + (entry ? ": " : "");
+        text.replace(at, folder.size() + (entry ? 1 : 0), name);
+        at += name.size();
+    }
+    return text;
 }
 
 uint64_t check_zip(const fs::path& path) {

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Splats in a zip archive, as sites and browsers give them: one file, or the folder of a SOG, among files that do not matter.
+#pragma once
+#include <filesystem>
+
+#include "ewa/splat_scene.h"
+#include "io/splats/zip_files.h"
+
+namespace ewa::io {
+
+/// Whether an archive has splats that read_splats reads, be it a SOG itself. Those of several files count too.
+bool has_splats(const ZipFiles& zip);
+
+/// The entry of the splats. Throws InputError that says what to do if there is none or more than one.
+ZipFiles::Entry zipped_splats(const std::filesystem::path& path, const ZipFiles& zip);
+
+/// Unpacks the splats into a temporary folder, where `read` reads them. Throws as zipped_splats and `read` do, and RunError (disk).
+SplatScene read_zipped(const std::filesystem::path& path, SplatScene (*read)(const std::filesystem::path&));
+
+}  // namespace ewa::io
