@@ -8,6 +8,7 @@
 
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
+#include "scene/splat_arrays.h"
 #include "support/splat_scenes.h"
 #include "support/temp_folder.h"
 
@@ -287,7 +288,7 @@ TEST(GltfSplats, NamesWhatIsWrong) {
     refuse(erase(kPrefix + "SH_DEGREE_1_COEF_1"), {"SH degree 1", "missing"});
     refuse(erase(kPrefix + "SH_DEGREE_2_COEF_4"), {"SH degree 2", "missing"});
     refuse([](GltfFile& f) { f.extension()["kernel"] = "box"; }, {"kernel", "box"});
-    refuse([](GltfFile& f) { f.extension().erase("colorSpace"); }, {"colorSpace"});
+    refuse([](GltfFile& f) { f.extension()["colorSpace"] = 1; }, {"colorSpace"});
     refuse([](GltfFile& f) { f.extension()["colorSpace"] = "xyz"; }, {"xyz"});
     refuse([](GltfFile& f) { f.primitive().erase("extensions"); }, {"no primitive with the extension"});
     refuse([](GltfFile& f) { f.accessor("POSITION")["count"] = 6; }, {"POSITION", "6 elements do not fit"});
@@ -480,6 +481,121 @@ TEST(GltfSplats, GlbChunks) {
     refuse(20 + json_bytes, 0x7fffffff, {"byte", "second chunk claims"});
     refuse(24 + json_bytes, 7, {"byte", "not BIN"});
     refuse(20, 0x20202020, {"byte", "not valid JSON"});
+}
+
+/// Gives attributes the names of the drafts of 2025.
+void use_draft_names(GltfFile& f) {
+    json renamed = json::object();
+    for (const auto& [name, index] : f.primitive()["attributes"].items())
+        renamed[name.starts_with(kPrefix) ? "_" + name.substr(kPrefix.size()) : name] = index;
+    f.primitive()["attributes"] = renamed;
+}
+
+/// The remarks of a scene as one text.
+std::string remarks_of(const SplatScene& scene) {
+    std::string text;
+    for (const std::string& line : scene.remarks) text += line + "\n";
+    return text;
+}
+
+TEST(GltfSplats, EarlierDrafts) {
+    const Gaussians g = storable_splats(1, 50, 2);
+    {
+        GltfFile f(g);
+        use_draft_names(f);
+        f.extension() = json::object();
+        expect_near(f.read().gaussians, g);
+        f.extension()["colorSpace"] = "BT.709-sRGB";
+        expect_near(f.read().gaussians, g);
+        f.extension()["colorSpace"] = "BT.709-linear";
+        EXPECT_NE(remarks_of(f.read()).find("linear light"), std::string::npos);
+    }
+    // COLOR_0 alone: sRGB values and opacities.
+    std::string colors;
+    for (size_t i = 0; i < g.size(); ++i)
+        for (const float v : {0.25f, 0.5f, 1.0f, 0.75f}) colors += test::bytes_of(v);
+    for (const bool names : {true, false}) {
+        GltfFile f(g);
+        f.replace("COLOR_0", 5126, false, colors);
+        for (const char* name : {"OPACITY", "SH_DEGREE_0_COEF_0"})
+            f.primitive()["attributes"].erase(kPrefix + name);
+        if (names) use_draft_names(f);
+        const Gaussians back = f.read().gaussians;
+        for (size_t i = 0; i < g.size(); ++i) {
+            EXPECT_NEAR(back.sh[27 * i] * 0.28209479177387814 + 0.5, 0.25, 1e-6);
+            EXPECT_NEAR(back.opacity_logits[i], std::log(3.0), 1e-5);
+            EXPECT_EQ(back.sh[27 * i + 5], g.sh[27 * i + 5]);
+        }
+    }
+}
+
+TEST(GltfSplats, ScalesOfADraftAreLogarithms) {
+    const Gaussians g = storable_splats(1, 50, 0);
+    GltfFile f(g);
+    std::string bytes;
+    for (const float v : g.log_scales) bytes += test::bytes_of(v);
+    f.replace(kPrefix + "SCALE", 5126, false, bytes);
+    const SplatScene scene = f.read();
+    EXPECT_EQ(scene.gaussians.log_scales, g.log_scales);
+    EXPECT_NE(remarks_of(scene).find("logarithms"), std::string::npos);
+    // One wrong value does not change what the others mean.
+    bytes.clear();
+    for (size_t i = 0; i < g.log_scales.size(); ++i)
+        bytes += test::bytes_of(i == 4 ? -1.0f : std::exp(g.log_scales[i]));
+    GltfFile one(g);
+    one.replace(kPrefix + "SCALE", 5126, false, bytes);
+    const Gaussians back = one.read().gaussians;
+    EXPECT_EQ(scene::undrawable_text(back), "scales of 1");
+    EXPECT_NEAR(back.log_scales[7], g.log_scales[7], 1e-5);
+}
+
+TEST(GltfSplats, OpacitiesThatMayBeLogitsAreNoted) {
+    const Gaussians g = storable_splats(1, 50, 0);
+    GltfFile f(g);
+    EXPECT_EQ(remarks_of(f.read()), "");
+    std::string bytes;
+    for (size_t i = 0; i < g.size(); ++i) bytes += test::bytes_of(i % 2 == 0 ? -3.0f : 5.0f);
+    f.replace(kPrefix + "OPACITY", 5126, false, bytes);
+    const SplatScene scene = f.read();
+    EXPECT_NE(remarks_of(scene).find("50 opacities outside of 0..1 are clamped"), std::string::npos);
+    EXPECT_NE(remarks_of(scene).find("logits"), std::string::npos);
+}
+
+TEST(GltfSplats, RequiredExtensionsThatAreNotReadAreRefusedByName) {
+    const Gaussians g = storable_splats(1, 20, 0);
+    for (const char* name : {"EXT_meshopt_compression", "KHR_meshopt_compression",
+                             "KHR_draco_mesh_compression", "KHR_gaussian_splatting_compression_other"}) {
+        GltfFile f(g);
+        f.top["extensionsRequired"] = {"KHR_gaussian_splatting", name};
+        f.top["buffers"].push_back({{"byteLength", 16}});  // a fallback without content
+        f.refused({"a.gltf: \"extensionsRequired\"", name, "uncompressed"});
+    }
+    GltfFile f(g);
+    f.top["extensionsRequired"] = {"KHR_gaussian_splatting", "KHR_mesh_quantization", "KHR_materials_unlit"};
+    expect_near(f.read().gaussians, g);
+}
+
+TEST(GltfSplats, SpzOfEarlierDrafts) {
+    const Gaussians g = storable_splats(2, 30, 0);
+    const TempFolder folder;
+    save_splats(folder / "a.gltf", g, SaveOptions{.gltf_spz = true});
+    const Gaussians expected = load_splats(folder / "a.gltf");
+    const json whole = json::parse(test::file_bytes(folder / "a.gltf"));
+    for (const char* name : {"KHR_spz_gaussian_splats_compression", "KHR_gaussian_splatting_compression_spz"})
+        for (const bool beside : {true, false}) {
+            json top = whole;
+            json& extensions = top["meshes"][0]["primitives"][0]["extensions"];
+            json& base = extensions["KHR_gaussian_splatting"];
+            const json view = base["extensions"]["KHR_gaussian_splatting_compression_spz_2"];
+            base.erase("extensions");
+            if (beside)
+                extensions[name] = view;
+            else
+                base["extensions"][name] = view;
+            top["extensionsRequired"] = {"KHR_gaussian_splatting", name};
+            EXPECT_EQ(load_splats(folder.write("b.gltf", top.dump())).means, expected.means)
+                << name << beside;
+        }
 }
 
 }  // namespace

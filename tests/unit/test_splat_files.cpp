@@ -7,6 +7,7 @@
 
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
+#include "scene/splat_arrays.h"
 #include "support/splat_scenes.h"
 #include "support/temp_folder.h"
 
@@ -287,6 +288,24 @@ TEST(Spz, VersionsOneToThree) {
     }
 }
 
+TEST(Spz, UnpackedFilesAreRead) {
+    const TempFolder folder;
+    std::string blocks(20, '\0');
+    for (size_t i = 0; i < blocks.size(); ++i) blocks[i] = char(7 * i + 1);
+    for (const uint32_t version : {2u, 3u}) {
+        const std::string bytes = spz(version, 0, blocks.substr(0, version == 2 ? 19 : 20));
+        const Gaussians plain = load_splats(folder.write("a.spz", bytes));
+        const Gaussians packed = load_splats(folder.write("b.spz", gzipped(bytes)));
+        EXPECT_EQ(plain.means, packed.means);
+        EXPECT_EQ(plain.quaternions, packed.quaternions);
+    }
+    // The flag of extensions, which are skipped.
+    std::string extended = spz(3, 0, blocks + "more");
+    extended[14] = 2;
+    const SplatScene scene = read_splats(folder.write("c.spz", gzipped(extended)));
+    EXPECT_EQ(scene.remarks, std::vector<std::string>{"bytes after the splats (extensions) are skipped"});
+}
+
 // Coefficients of zero take next to nothing in the file, and as much as any others in memory.
 TEST(Spz, LargeScenesThatPackWell) {
     TempFolder folder;
@@ -324,7 +343,9 @@ TEST(Spz, RefusesWithTheReason) {
     const std::string blocks(20, '\0');
     refuse(gzipped(spz(9, 0, blocks)), {"a.spz", "byte", "version 9"});
     refuse(gzipped(spz(4, 0, blocks)), {"version 4 is not packed with gzip"});
-    refuse(spz(3, 0, blocks), {"version 3 is packed with gzip"});
+    refuse(gzipped(spz(3, 0, blocks + std::string(20, '\0'))), {"a.spz", "after the 1 splats", "wrong"});
+    refuse(spz(2, 0, blocks), {"a.spz", "after the 1 splats"});  // version 2 has one byte less
+    refuse(spz(3, 0, blocks.substr(1)), {"ends inside"});
     refuse(gzipped(spz(3, 7, blocks)), {"SH degree 7"});
     refuse(gzipped(spz(3, 0, blocks, 2)), {"the packed data ends inside the colours"});
     refuse(gzipped(spz(3, 0, blocks, 4000000000u)), {"byte", "claims 4000000000 splats"});
@@ -505,6 +526,79 @@ TEST(Ksplat, RefusesWithTheReason) {
               0u);
     expect_error<InputError>([&] { save_splats(folder / "b.ksplat", Gaussians()); },
                              {"b.ksplat", "does not write"});
+}
+
+/// Opacities that hide all or are never seen, flat splats, and one that is larger than any scene.
+Gaussians unusual_splats() {
+    Gaussians g = storable_splats(4, 400, 1);
+    g.opacity_logits[0] = INFINITY;
+    g.opacity_logits[1] = -INFINITY;
+    g.log_scales[3 * 2] = -INFINITY;
+    for (const size_t k : {9u, 10u, 11u}) g.log_scales[k] = 60;
+    for (const size_t k : {12u, 13u, 14u}) g.log_scales[k] = 1e30f;
+    return g;
+}
+
+TEST(SplatFormats, UnusualValuesMeanWhatTheyMean) {
+    const TempFolder folder;
+    const Gaussians g = unusual_splats();
+    for (size_t i = 0; i < 5; ++i) EXPECT_TRUE(drawable(g, i)) << i;
+    for (const char* name : {"a.ply", "a.splat", "a.spz", "a.compressed.ply", "a.sog", "meta.json", "a.rad",
+                             "a.glb", "a.gltf", "a.usda", "a.usdz"}) {
+        SCOPED_TRACE(name);
+        save_splats(folder / name, g);
+        const Gaussians back = load_splats(folder / name);
+        ASSERT_EQ(back.size(), g.size());
+        std::vector<uint32_t> order(g.size());
+        for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+        const std::string text = name;
+        if (text.find("compressed") != text.npos || text == "a.sog" || text == "meta.json" || text == "a.rad")
+            order = morton_order(g);
+        double farthest = 0;
+        for (size_t at = 0; at < order.size(); ++at) {
+            const uint32_t i = order[at];
+            EXPECT_TRUE(drawable(back, at));
+            if (i == 0) {
+                EXPECT_GT(back.opacity_logits[at], 6);
+            }
+            if (i == 1) {
+                EXPECT_LT(back.opacity_logits[at], -6);
+            }
+            if (i == 2) {
+                EXPECT_LT(back.log_scales[3 * at], -9.9);
+            }
+            if (i == 3 || i == 4) {
+                EXPECT_GT(back.log_scales[3 * at + 1], 5.8);
+            }
+            if (i < 5) continue;
+            for (size_t k = 0; k < 3; ++k)
+                farthest = std::max(farthest,
+                                    std::abs(double(g.log_scales[3 * i + k]) - back.log_scales[3 * at + k]));
+        }
+        EXPECT_LT(farthest, 0.2);  // the others do not suffer
+    }
+    const Gaussians exact = load_splats(folder / "a.ply");
+    EXPECT_EQ(exact.opacity_logits, g.opacity_logits);
+    EXPECT_EQ(exact.log_scales, g.log_scales);
+}
+
+TEST(SplatFormats, SkippedSplatsAreNamedByTheirValues) {
+    const TempFolder folder;
+    Gaussians g = storable_splats(4, 20, 1);
+    EXPECT_EQ(scene::undrawable_text(g), "");
+    g.means[0] = g.means[3] = NAN;
+    g.quaternions[4 * 2] = INFINITY;
+    std::fill_n(&g.quaternions[4 * 3], 4, 0.0f);
+    g.log_scales[3 * 4] = INFINITY;
+    g.opacity_logits[5] = NAN;
+    g.sh[g.sh_stride() * 6 + 5] = -INFINITY;
+    const std::string text =
+        "means of 2, quaternions of 1, zero quaternions of 1, scales of 1, opacities of 1, "
+        "SH coefficients of 1";
+    EXPECT_EQ(scene::undrawable_text(g), text);
+    EXPECT_NE(save_splats(folder / "a.splat", g, SaveOptions{})[0].find(
+                  "7 splats have a value that is not finite or a zero quaternion and are skipped: " + text),
+              std::string::npos);
 }
 
 }  // namespace

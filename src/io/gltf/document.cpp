@@ -223,7 +223,32 @@ glm::dmat4 local(const GltfDocument& document, const tinygltf::Node& node, int i
     return matrix;
 }
 
+/// Throws for an extension without which the file cannot be read: its buffers may hold nothing that is.
+void check_required(const GltfDocument& document, const json& top, GltfContent content) {
+    const auto list = top.find("extensionsRequired");
+    if (list == top.end() || !list->is_array()) return;
+    for (const json& entry : *list) {
+        if (!entry.is_string() || reads_extension(entry.get<std::string>(), content)) continue;
+        const std::string name = entry.get<std::string>().substr(0, 100);
+        document.fail("\"extensionsRequired\" names " + name + ", which is not supported" +
+                      (name.find("compression") == std::string::npos ? "" : "; export it uncompressed"));
+    }
+}
+
 }  // namespace
+
+bool reads_extension(std::string_view name, GltfContent content) {
+    constexpr std::string_view kMeshes[] = {"KHR_lights_punctual",   "KHR_materials_specular",
+                                            "KHR_materials_ior",     "KHR_materials_unlit",
+                                            "KHR_mesh_quantization", "KHR_materials_emissive_strength"};
+    constexpr std::string_view kOfSurfaces[] = {"KHR_lights_", "KHR_materials_", "KHR_texture_",
+                                                "EXT_lights_", "EXT_materials_", "EXT_texture_"};
+    if (std::ranges::find(kMeshes, name) != std::end(kMeshes)) return true;
+    if (content == GltfContent::meshes) return false;
+    if (name == kSplatExtension || std::ranges::find(kSpzExtensions, name) != kSpzExtensions.end())
+        return true;
+    return std::ranges::any_of(kOfSurfaces, [&](std::string_view start) { return name.starts_with(start); });
+}
 
 void GltfDocument::fail(const std::string& text) const {
     throw InputError(name_ + ": " + core::one_line(text));
@@ -245,6 +270,7 @@ GltfDocument::GltfDocument(const std::filesystem::path& path, GltfContent conten
     }
     if (!top.is_object()) fail("the JSON is not an object");
     if (!top.contains("asset")) fail("the JSON has no \"asset\", which every glTF has");
+    check_required(*this, top, content);
     if (const auto list = top.find("buffers"); list != top.end()) add_buffers(&*list, bin_begin, bin_size);
     if (const auto list = top.find("images"); list != top.end() && content == GltfContent::meshes)
         add_images(&*list);

@@ -3,10 +3,12 @@
 #pragma once
 #include <tiny_gltf.h>
 
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <glm/mat4x4.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace ewa::io {
@@ -14,6 +16,11 @@ namespace ewa::io {
 /// The numbers of a .glb: its beginning, and the types of its chunks.
 constexpr uint32_t kGlbMagic = 0x46546c67, kGlbJson = 0x4e4f534a, kGlbBin = 0x004e4942;
 inline const std::string kSplatExtension = "KHR_gaussian_splatting";
+/// By which the values of a primitive are an SPZ in a buffer view: the draft of 2026, and the names of earlier ones. They are
+/// nested in kSplatExtension, or beside it.
+inline const std::array<std::string, 4> kSpzExtensions = {
+    kSplatExtension + "_compression_spz_2", kSplatExtension + "_compression_spz",
+    "KHR_spz_gaussian_splats_compression", "KHR_spz_compression"};
 
 /// The sections of the file that a reader needs.
 enum class GltfContent {
@@ -21,11 +28,16 @@ enum class GltfContent {
     meshes   // also materials, textures, samplers, cameras, lights, "extras"; images stay encoded
 };
 
+/// Whether the reader of this content does what the extension says, or may leave it out: how surfaces look does not matter to
+/// splats.
+bool reads_extension(std::string_view name, GltfContent content);
+
 /// Parses only the sections that the content needs. A file that is nested or branched beyond any real scene
 /// is refused before memory is allocated.
 class GltfDocument {
   public:
-    /// Throws InputError that names the file and the byte or the property.
+    /// Throws InputError that names the file and the byte or the property, or an extension that the file requires and that is
+    /// not read.
     explicit GltfDocument(const std::filesystem::path& path, GltfContent content = GltfContent::splats);
 
     const std::string& name() const { return name_; }

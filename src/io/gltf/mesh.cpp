@@ -55,19 +55,10 @@ class MeshReader {
 
   private:
     void check_extensions() {
-        static const char* const kKnown[] = {
-            "KHR_lights_punctual", "KHR_materials_specular",          "KHR_materials_ior",
-            "KHR_materials_unlit", "KHR_materials_emissive_strength", "KHR_mesh_quantization"};
-        const auto known = [](const std::string& name) {
-            return std::find(std::begin(kKnown), std::end(kKnown), name) != std::end(kKnown);
-        };
-        for (const std::string& name : model_.extensionsRequired)
-            if (!known(name))
-                document_.fail("\"extensionsRequired\" names " + name.substr(0, 100) +
-                               ", which is not supported");
         size_t named = 0;
         for (const std::string& name : model_.extensionsUsed)
-            if (!known(name) && name != kSplatExtension && ++named <= kMostNamed)
+            if (!reads_extension(name, GltfContent::meshes) && name != kSplatExtension &&
+                ++named <= kMostNamed)
                 remark(scene_, name.substr(0, 100) + " is skipped");
         if (document_.animated())
             remark(scene_, "animations are skipped: the pose is the one the file stores");

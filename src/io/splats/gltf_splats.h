@@ -13,8 +13,7 @@ namespace ewa::io {
 
 inline const std::string kSplatPrefix = kSplatExtension + ":";
 
-/// Nested in kSplatExtension: the values of the primitive are an SPZ in a buffer view (Khronos, draft of 2026).
-inline const std::string kSpzExtension = kSplatExtension + "_compression_spz_2";
+inline const std::string& kSpzExtension = kSpzExtensions[0];  // which is written
 
 /// The attribute of an SH coefficient; both count from 0.
 inline std::string sh_name(int degree, int coefficient) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // SPZ (nianticlabs/spz): one block per attribute, as a structure of arrays, quantised, then compressed.
-//   versions 1 to 3   one gzip stream: a header of 16 bytes, then the blocks
+//   versions 1 to 3   one gzip stream: a header of 16 bytes, then the blocks, then extensions where a flag says so; some
+//                     programs leave it unpacked
 //   version 4         a header of 32 bytes, extension records, a table of (compressed, decompressed) sizes,
 //                     then one Zstandard frame per block
 // The blocks, in this order, per splat:
@@ -30,7 +31,7 @@ namespace {
 
 constexpr uint32_t kSpzMagic = 0x5053474e;                    // "NGSP"
 constexpr size_t kHeaderBytes = 16, kPackedHeaderBytes = 32;  // versions 1 to 3; version 4
-constexpr uint8_t kAntialiased = 1;                           // a flag
+constexpr uint8_t kAntialiased = 1, kExtended = 2;            // flags
 constexpr int kMaxSpzDegree = 4;
 constexpr unsigned kMaxFractionalBits = 24;
 constexpr double kColorScale = 0.15 * 255, kColorOffset = 0.5 * 255;
@@ -186,20 +187,26 @@ void require_packed(const core::FileReader& reader, uint64_t count, uint64_t byt
                     " packed bytes cannot hold");
 }
 
-SplatScene read_gzipped(core::FileReader& reader) {
-    const std::unique_ptr<Unpacker> unpacker = open_gzip(reader);
+/// Versions 1 to 3. gzipped: false where they lie in the file as they are.
+SplatScene read_one_stream(core::FileReader& reader, bool gzipped) {
+    const std::unique_ptr<Unpacker> unpacker = gzipped ? open_gzip(reader) : open_plain(reader);
     std::byte bytes[kHeaderBytes];
     unpacker->read(bytes, sizeof(bytes), "the header");
     const Header header = parse_header(bytes, reader);
     if (header.version > 3) reader.fail("SPZ version 4 is not packed with gzip; the file is damaged");
     const auto sizes = block_bytes(header.version, header.file_degree);
     require_packed(reader, header.count, std::accumulate(sizes.begin(), sizes.end(), size_t(0)),
-                   kMostGzipExpansion);
+                   gzipped ? kMostGzipExpansion : 1);
     SplatScene scene;
     take_header(header, reader, scene);
     for (int block = 0; block < kBlocks; ++block)
         read_block(header, Block(block), *unpacker, scene.gaussians);
-    if (!unpacker->at_end()) scene.remarks.push_back("bytes after the splats (extensions) are skipped");
+    if (unpacker->at_end()) return scene;
+    // All blocks begin at other places if the number of splats is wrong.
+    if (!(header.flags & kExtended))
+        reader.fail("the data goes on after the " + std::to_string(header.count) +
+                    " splats that the header counts; the count or the SH degree is wrong");
+    scene.remarks.push_back("bytes after the splats (extensions) are skipped");
     return scene;
 }
 
@@ -207,9 +214,10 @@ SplatScene read_streams(core::FileReader& reader) {
     std::byte bytes[kHeaderBytes];
     std::memcpy(bytes, reader.take(kHeaderBytes, "the header"), kHeaderBytes);
     const Header header = parse_header(bytes, reader);
-    if (header.version != 4)
-        reader.fail("SPZ version " + std::to_string(header.version) +
-                    " is packed with gzip; the file is damaged");
+    if (header.version != 4) {
+        reader.go_to(0, "the header");
+        return read_one_stream(reader, false);
+    }
     const auto streams = uint8_t(bytes[15]);
     const auto table = reader.read<uint32_t>("the header");
     reader.skip(12, "the header");
@@ -461,7 +469,7 @@ SplatScene read_spz(core::FileReader& reader) {
     if (reader.size() < 2) reader.fail("this is not an SPZ file: it has less than 2 bytes");
     const bool gzipped = reader.read<uint16_t>("the header") == 0x8b1f;
     reader.go_to(0, "the header");
-    return gzipped ? read_gzipped(reader) : read_streams(reader);
+    return gzipped ? read_one_stream(reader, true) : read_streams(reader);
 }
 
 SplatScene read_spz(const std::filesystem::path& path) {

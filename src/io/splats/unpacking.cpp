@@ -55,6 +55,21 @@ class DeflateUnpacker final : public Unpacker {
     z_stream stream_{};
 };
 
+class PlainUnpacker final : public Unpacker {
+  public:
+    explicit PlainUnpacker(core::FileReader& reader) : Unpacker(reader) {}
+
+  private:
+    size_t advance(std::byte* to, size_t n) override {
+        n = size_t(std::min<uint64_t>(n, std::min<uint64_t>(reader_.remaining(), kPieceBytes)));
+        if (n == 0) reader_.fail("the file ends inside its data; it is truncated");
+        const std::byte* bytes = reader_.take(n, "data");
+        std::copy_n(bytes, n, to);
+        ended_ = reader_.remaining() == 0;
+        return n;
+    }
+};
+
 class DeflatePacker final : public Packer {
   public:
     DeflatePacker(Sink sink, int window_bits) : sink_(std::move(sink)), output_(kPieceBytes) {
@@ -171,6 +186,10 @@ bool Unpacker::at_end() {
     while (!ended_)
         if (advance(&rest, 1) > 0) return false;
     return true;
+}
+
+std::unique_ptr<Unpacker> open_plain(core::FileReader& reader) {
+    return std::make_unique<PlainUnpacker>(reader);
 }
 
 std::unique_ptr<Unpacker> open_gzip(core::FileReader& reader) {

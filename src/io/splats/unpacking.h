@@ -33,6 +33,9 @@ class Unpacker {
     bool ended_ = false;
 };
 
+/// Bytes that are not compressed, from the reader's position to the end of the file.
+std::unique_ptr<Unpacker> open_plain(core::FileReader& reader);
+
 /// gzip (RFC 1952) from the reader's position to the end of the member.
 std::unique_ptr<Unpacker> open_gzip(core::FileReader& reader);
 
