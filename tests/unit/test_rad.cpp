@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Spark's .rad: what stays when it is written again, its ranges and trees, and damaged files. tests/cli/test_rad.py compares values with
 // another reader and writer.
+#include <zlib.h>
+
 #include <cmath>
 #include <fstream>
 #include <glm/common.hpp>
@@ -198,6 +200,69 @@ TEST(Rad, ChunksThatNameOneFileCountItOnce) {
     for (json& chunk : head["chunks"]) chunk["bytes"] = 9;
     folder.write("a.rad", with_head("RAD0", head));
     expect_error<InputError>([&] { read_splats(folder / "a.rad"); }, {"claims 10000000 splats"});
+}
+
+/// Chunks of one splat each, whose properties are all in the same bytes at the end: a deflated table of codes is one of them.
+std::string rad_of_shared_bytes(size_t chunks, size_t codes) {
+    const std::string zeros(9 * codes, '\0');
+    std::string table(zeros.size() / 100 + 100, '\0');
+    z_stream stream{};
+    EXPECT_EQ(deflateInit2(&stream, 9, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY), Z_OK);
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(zeros.data()));
+    stream.avail_in = uInt(zeros.size());
+    stream.next_out = reinterpret_cast<Bytef*>(table.data());
+    stream.avail_out = uInt(table.size());
+    EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+    table.resize(stream.total_out);
+    deflateEnd(&stream);
+    const std::string numbers(16, '\0'), shared = numbers + table;
+    constexpr size_t kHead = 1200;  // of each chunk, with its length of the payload
+    json head = {{"version", 1}, {"type", "gsplat"},     {"count", chunks},        {"chunkSize", 1},
+                 {"maxSh", 1},   {"shCodeCount", codes}, {"chunks", json::array()}};
+    std::string bytes;
+    for (size_t i = 0; i < chunks; ++i) {
+        head["chunks"].push_back({{"offset", i * kHead}, {"bytes", kHead}});
+        const size_t at = (chunks - i - 1) * kHead;  // of the shared bytes in the payload
+        json properties = json::array();
+        const auto add = [&](const char* name, const char* encoding, size_t offset, size_t size) {
+            properties.push_back({{"property", name},
+                                  {"encoding", encoding},
+                                  {"offset", at + offset},
+                                  {"bytes", size},
+                                  {"max", 1.0},
+                                  {"min", 0.0}});
+        };
+        for (const char* name : {"center", "rgb", "scales", "orientation"}) add(name, "f32", 0, 12);
+        add("alpha", "f32", 0, 4);
+        add("sh_label", "u16", 0, 2);
+        add("sh1_code", "s8", numbers.size(), table.size());
+        properties.back()["compression"] = "gz";
+        json chunk = {{"version", 1}, {"base", i}, {"count", 1}, {"properties", properties}, {"pad", ""}};
+        chunk["pad"] = std::string(kHead - 16 - chunk.dump().size(), 'x');
+        bytes += with_head("RADC", chunk) + test::bytes_of(uint64_t(at + shared.size()));
+        EXPECT_EQ(bytes.size(), (i + 1) * kHead);
+    }
+    return with_head("RAD0", head) + bytes + shared;
+}
+
+TEST(Rad, ChunksThatShareBytesDoNotUnpackToAnySize) {
+    const TempFolder folder;
+    EXPECT_EQ(load_splats(folder.write("a.rad", rad_of_shared_bytes(20, 1000))).size(), 20u);
+    expect_error<InputError>([&] { load_splats(folder.write("b.rad", rad_of_shared_bytes(3000, 100'000))); },
+                             {"b.rad", "sh1_code", "all properties together unpack to more than 64 times"});
+}
+
+TEST(Rad, OneHugeSplatLeavesTheOthersTheirSteps) {
+    const TempFolder folder;
+    Gaussians g = test::storable_splats(3, 500, 0);
+    for (size_t k = 0; k < 3; ++k) g.log_scales[3 * 7 + k] = 25;
+    save_splats(folder / "a.rad", g);
+    select_splats(g, morton_order(g));
+    const Gaussians back = load_splats(folder / "a.rad");
+    for (size_t i = 0; i < g.log_scales.size(); ++i)
+        if (g.log_scales[i] < 20) {
+            EXPECT_NEAR(back.log_scales[i], g.log_scales[i], 0.05);
+        }
 }
 
 TEST(Rad, DamagedFilesAreErrorsOfOneLine) {

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/folders.h"
+#include "core/messages.h"
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/splat_edit.h"
@@ -107,12 +108,19 @@ class RadReader {
     }
 
     /// The unpacked bytes of so many splats or codes.
-    static std::vector<std::byte> bytes_of(core::FileReader& reader, const RadProperties::value_type& named,
-                                           uint64_t count) {
+    std::vector<std::byte> bytes_of(core::FileReader& reader, const RadProperties::value_type& named,
+                                    uint64_t count) {
         const auto& [name, property] = named;
         const std::string what = "the property \"" + name + "\"";
         const uint64_t size = rad_bytes(property.encoding, count, property.numbers);
         reader.go_to(property.offset, what);
+        // Chunks may share their bytes, so that a small file could unpack to any size.
+        constexpr uint64_t kMostAlways = uint64_t(100) << 20;
+        unpacked_ += size;
+        if (unpacked_ > 2 * kPackedExpansion * all_bytes_ + kMostAlways)
+            reader.fail(what + ": all properties together unpack to more than " +
+                        std::to_string(2 * kPackedExpansion) + " times the file and " +
+                        core::bytes_text(kMostAlways));
         if (property.deflated ? size > kMostDeflated * property.bytes : size != property.bytes)
             reader.fail(what + " has " + std::to_string(property.bytes) + " bytes, which are not those of " +
                         std::to_string(count) + " splats or codes");
@@ -128,8 +136,8 @@ class RadReader {
         return bytes;
     }
 
-    static std::vector<float> values_of(core::FileReader& reader, const RadProperties::value_type& named,
-                                        uint64_t count) {
+    std::vector<float> values_of(core::FileReader& reader, const RadProperties::value_type& named,
+                                 uint64_t count) {
         const RadProperty& property = named.second;
         return decode_rad(property.encoding, bytes_of(reader, named, count), size_t(count), property.numbers,
                           property.min, property.max);
@@ -137,7 +145,7 @@ class RadReader {
 
     /// Calls set(i, k, value) for number k of splat i.
     template <class Set>
-    void decode(core::FileReader& reader, const RadProperties::value_type& named, const Set& set) const {
+    void decode(core::FileReader& reader, const RadProperties::value_type& named, const Set& set) {
         const std::vector<float> values = values_of(reader, named, in_chunk_);
         for (size_t at = 0; at < values.size(); ++at) set(base_ + at % in_chunk_, at / in_chunk_, values[at]);
     }
@@ -272,7 +280,7 @@ class RadReader {
     std::filesystem::path folder_;
     core::FileReader reader_;
     RadHead head_;
-    uint64_t all_bytes_ = 0;
+    uint64_t all_bytes_ = 0, unpacked_ = 0;  // of the files; of the properties so far
     SplatScene scene_;
     std::vector<uint32_t> brighter_;           // splats with an opacity above 1
     size_t base_ = 0, in_chunk_ = 0;           // splats of the chunk that is read
