@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <random>
@@ -8,6 +9,7 @@
 #include "ewa/splat_files.h"
 #include "io/datasets/image_records.h"
 #include "io/splats/formats.h"
+#include "scene/splat_arrays.h"
 #include "support/temp_folder.h"
 
 namespace {
@@ -325,6 +327,7 @@ TEST(Ply, NamesWhatIsWrong) {
     };
     const std::string vertex = "element vertex 0\n", all = vertex + properties(kNames);
     for (size_t i = 0; i < kNames.size(); ++i) {
+        if (kNames[i] == "scale_2") continue;  // of flat splats
         std::vector<std::string> names = kNames;
         names.erase(names.begin() + std::ptrdiff_t(i));
         refuse(header("ascii", vertex + properties(names)), {"a.ply", "\"" + kNames[i] + "\""});
@@ -382,6 +385,125 @@ TEST(PointsPly, FloatColoursAndNone) {
     const auto flat =
         folder.write("h.ply", header("ascii", "element vertex 1\n" + properties({"x", "y"})) + "1 2");
     expect_error<InputError>([&] { io::read_points_ply(flat); }, {"\"z\""});
+}
+
+/// A PLY of these columns, with their values in the rows.
+template <class Color>
+std::string ply_with_colors(const std::array<const char*, 3>& names, const char* type, bool splats,
+                            const std::vector<std::array<Color, 3>>& colors) {
+    std::vector<std::string> before = {"x", "y", "z"};
+    if (splats) before.insert(before.end(), kNames.begin() + 6, kNames.end());
+    std::string bytes = header("binary_little_endian", "element vertex " + std::to_string(colors.size()) +
+                                                           "\n" + properties(before) +
+                                                           properties({names[0], names[1], names[2]}, type));
+    for (size_t i = 0; i < colors.size(); ++i) {
+        for (size_t k = 0; k < before.size(); ++k) bytes += bytes_of(float(k == 10 || k == 0 ? i + 1 : 0.5));
+        for (const Color v : colors[i]) bytes += bytes_of(v);
+    }
+    return bytes;
+}
+
+constexpr std::array<std::array<const char*, 3>, 4> kColorNames = {
+    {{"red", "green", "blue"},
+     {"diffuse_red", "diffuse_green", "diffuse_blue"},
+     {"r", "g", "b"},
+     {"R", "G", "B"}}};
+
+TEST(Ply, ColorsOfPointsHaveTheirScale) {
+    const TempFolder folder;
+    const std::vector<std::array<uint8_t, 3>> expected = {{0, 51, 255}, {102, 1, 200}};
+    const auto check = [&](const std::string& bytes) {
+        EXPECT_EQ(io::read_points_ply(folder.write("a.ply", bytes)).points.colors, expected);
+    };
+    for (const auto& names : kColorNames) {
+        check(ply_with_colors<uint8_t>(names, "uchar", false, {{0, 51, 255}, {102, 1, 200}}));
+        check(ply_with_colors<uint16_t>(names, "ushort", false, {{0, 13107, 65535}, {26214, 257, 51400}}));
+        check(ply_with_colors<uint16_t>(names, "uint16", false, {{0, 51, 255}, {102, 1, 200}}));
+        check(ply_with_colors<uint32_t>(names, "uint", false, {{0, 51, 255}, {102, 1, 200}}));
+        check(ply_with_colors<float>(names, "float", false, {{0, 51, 255}, {102, 1, 200}}));
+        check(ply_with_colors<float>(names, "float", false, {{0, 0.2f, 1}, {0.4f, 1 / 255.f, 200 / 255.f}}));
+        check(ply_with_colors<double>(names, "double", false, {{0, 0.2, 1}, {0.4, 1 / 255.0, 200 / 255.0}}));
+        check(ply_with_colors<double>(names, "double", false, {{0, 13107, 65535}, {26214, 257, 51400}}));
+    }
+    // Two of three are no colours.
+    EXPECT_EQ(
+        io::read_points_ply(folder.write("b.ply", ply_with_colors<uint8_t>({"red", "green", "x2"}, "uchar",
+                                                                           false, {{1, 2, 3}})))
+            .points.colors[0],
+        (std::array<uint8_t, 3>{128, 128, 128}));
+}
+
+TEST(Ply, ColorsStandForTheFirstCoefficients) {
+    const TempFolder folder;
+    for (const auto& names : kColorNames) {
+        const SplatScene scene = read_splats(folder.write(
+            "a.ply", ply_with_colors<uint8_t>(names, "uchar", true, {{0, 51, 255}, {102, 1, 200}})));
+        EXPECT_EQ(scene.remarks, std::vector<std::string>());
+        const Gaussians& g = scene.gaussians;
+        ASSERT_EQ(g.size(), 2u);
+        EXPECT_NEAR(g.sh[1] * 0.28209479177387814 + 0.5, 0.2, 1e-6);
+        EXPECT_NEAR(g.sh[2] * 0.28209479177387814 + 0.5, 1, 1e-6);
+        EXPECT_NEAR(g.sh[3] * 0.28209479177387814 + 0.5, 0.4, 1e-6);
+        const Gaussians wide = load_splats(folder.write(
+            "b.ply",
+            ply_with_colors<uint16_t>(names, "ushort", true, {{0, 13107, 65535}, {26214, 257, 51400}})));
+        for (size_t k = 0; k < 6; ++k) EXPECT_NEAR(wide.sh[k], g.sh[k], 1e-6);
+    }
+    // A cloud with colours is still none.
+    expect_error<InputError>(
+        [&] {
+            load_splats(
+                folder.write("c.ply", ply_with_colors<uint8_t>(kColorNames[0], "uchar", false, {{1, 2, 3}})));
+        },
+        {"f_dc_0", "point cloud"});
+}
+
+TEST(Ply, TheFilterOfMipSplattingIsFolded) {
+    const TempFolder folder;
+    const auto written = [&](const std::vector<float>& filters) {
+        std::vector<std::string> names = kNames;
+        names.push_back("filter_3D");
+        std::string bytes =
+            header("binary_little_endian",
+                   "element vertex " + std::to_string(filters.size()) + "\n" + properties(names));
+        for (const float filter : filters) {
+            for (const float v :
+                 {1.f, 2.f, 3.f, .1f, .2f, .3f, .4f, -1.f, -2.f, -3.f, 1.f, 0.f, 0.f, 0.f, filter})
+                bytes += bytes_of(v);
+        }
+        return folder.write("a.ply", bytes);
+    };
+    const SplatScene scene = read_splats(written({0.15f, 0, NAN}));
+    ASSERT_EQ(scene.remarks.size(), 1u);
+    EXPECT_NE(scene.remarks[0].find("filter_3D"), std::string::npos);
+    const Gaussians& g = scene.gaussians;
+    double opacity = 1 / (1 + std::exp(-0.4));
+    for (int k = 0; k < 3; ++k) {
+        const double variance = std::exp(-2.0 * (k + 1)), wide = variance + 0.15 * 0.15;
+        EXPECT_NEAR(g.log_scales[size_t(k)], std::log(wide) / 2, 1e-6);
+        opacity *= std::sqrt(variance / wide);
+    }
+    EXPECT_NEAR(g.opacity_logits[0], std::log(opacity / (1 - opacity)), 1e-6);
+    EXPECT_EQ(g.log_scales[3], -1);
+    EXPECT_EQ(g.opacity_logits[1], 0.4f);
+    EXPECT_EQ(scene::undrawable_text(g), "scales of 1");
+}
+
+TEST(Ply, SurfelsAreFlatEllipsoids) {
+    const TempFolder folder;
+    std::vector<std::string> names = kNames;
+    std::erase(names, "scale_2");
+    std::string bytes = header("binary_big_endian", "element vertex 1\n" + properties(names));
+    for (size_t i = 0; i < names.size(); ++i) {
+        std::string value = bytes_of(float(i) / 2);
+        bytes += std::string(value.rbegin(), value.rend());
+    }
+    const SplatScene scene = read_splats(folder.write("a.ply", bytes));
+    ASSERT_EQ(scene.remarks.size(), 1u);
+    EXPECT_NE(scene.remarks[0].find("2DGS"), std::string::npos);
+    EXPECT_EQ(scene.gaussians.log_scales[1], 4);
+    EXPECT_NEAR(scene.gaussians.log_scales[2], 4 - std::log(1e6), 1e-4);
+    EXPECT_EQ(scene.gaussians.quaternions[0], 4.5f);
 }
 
 }  // namespace

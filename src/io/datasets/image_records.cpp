@@ -94,15 +94,9 @@ PlyPoints read_points_ply(const std::filesystem::path& path, size_t most) {
         if (!found) throw InputError(table.name() + ": the vertices have no number \"" + name + "\"");
         columns.push_back(*found);
     }
-    double color_scale = 1;
-    for (const char* name : {"red", "green", "blue"}) {
-        const std::optional<size_t> found = vertex.find_number(name);
-        if (!found) break;
-        const PlyType type = vertex.properties[*found].type;
-        if (type == PlyType::float32 || type == PlyType::float64) color_scale = 255;
-        columns.push_back(*found);
-    }
-    const bool colored = columns.size() == 6;
+    const std::optional<PlyColors> colors = find_colors(path, vertex);
+    if (colors) columns.insert(columns.end(), colors->columns.begin(), colors->columns.end());
+    const double color_scale = colors ? 255 / colors->full : 1;
 
     PlyPoints result;
     scene::PointThinner thinner(most);
@@ -111,7 +105,7 @@ PlyPoints read_points_ply(const std::filesystem::path& path, size_t most) {
             return v > 0 ? static_cast<uint8_t>(std::lround(std::min(v * color_scale, 255.0))) : uint8_t(0);
         };
         std::array<uint8_t, 3> color{128, 128, 128};
-        if (colored) color = {byte(row[3]), byte(row[4]), byte(row[5])};
+        if (colors) color = {byte(row[3]), byte(row[4]), byte(row[5])};
         const glm::dvec3 position(row[0], row[1], row[2]);
         const auto where = [&] {
             return core::one_line(path.string()) + ": vertex " + std::to_string(index);

@@ -4,15 +4,17 @@
 // The element "vertex" has one row per splat. Properties are found by name:
 //   x y z            means
 //   nx ny nz         written as zero, ignored when read
-//   f_dc_0..2        SH coefficient 0 of R, G, B
+//   f_dc_0..2        SH coefficient 0 of R, G, B; or else red green blue, as point clouds have them
 //   f_rest_0..3K-1   SH coefficients 1..K of R, then of G, then of B; K = 0, 3, 8, 15 for degree 0..3
 //   opacity          logit; of Footprint::density, fitted so that 3DGS's viewers show about the same
-//   scale_0..2       natural logarithm
+//   scale_0..2       natural logarithm; the flat splats of 2DGS have no scale_2
 //   rot_0..3         w x y z
+//   filter_3D        Mip-Splatting's 3D filter, a standard deviation that is added to the scales
 // In memory, SH is coefficient after coefficient with RGB inner. So f_rest is transposed here.
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <cmath>
 #include <cstring>
 
 #include "core/atomic_file.h"
@@ -31,6 +33,7 @@ namespace {
 
 constexpr size_t kBeforeSh = 11;  // columns before f_rest: x y z opacity scale_0..2 rot_0..3
 constexpr int kMaxFileDegree = 4;
+constexpr float kFlat = -13.8155f;  // the logarithm of a millionth
 // Says that the opacities are fitted to those of Footprint::density.
 constexpr char kDensityComment[] = "ewa kernel density";
 
@@ -55,30 +58,63 @@ size_t column(const PlyTable& table, const PlyElement& vertex, const std::string
     if (found && !vertex.properties[*found].list_count) return *found;
     std::string text = table.name() + ": the vertices have no property \"" + name + "\"";
     if (found) text = table.name() + ": the property \"" + name + "\" is a list, not a number";
-    if (name == "scale_2")
-        text += "; 2D Gaussian splats are not supported";
-    else if (name.starts_with("f_dc_") && !vertex.find("opacity"))
+    if (name.starts_with("f_dc_") && !vertex.find("opacity"))
         text +=
             std::string("; this is a ") + (has_faces(table) ? "mesh" : "point cloud") + ", not a splat file";
     throw InputError(text);
 }
 
-/// Columns in the order of read_ply's rows: the eleven, then SH in the order of memory.
+/// What a file has besides INRIA's layout.
+struct Extras {
+    std::optional<PlyColors> colors;  // in place of f_dc
+    bool flat = false;                // no scale_2
+    std::optional<size_t> filter;     // the column of filter_3D, the last of read_ply's rows
+};
+
+Extras extras_of(const std::filesystem::path& path, const PlyElement& vertex) {
+    Extras extras;
+    if (vertex.find("opacity") && !vertex.find("f_dc_0")) extras.colors = find_colors(path, vertex);
+    extras.flat = vertex.find("scale_1") && !vertex.find("scale_2");
+    extras.filter = vertex.find_number("filter_3D");
+    return extras;
+}
+
+/// Columns in the order of read_ply's rows: the eleven, then SH in the order of memory, then the filter.
 std::vector<size_t> splat_columns(const PlyTable& table, const PlyElement& vertex, int degree,
-                                  int file_degree) {
+                                  int file_degree, const Extras& extras) {
     std::vector<size_t> columns;
     const auto add = [&](const std::string& name) { columns.push_back(column(table, vertex, name)); };
     for (const char* name : {"x", "y", "z"}) add(name);
-    for (int i = 0; i < 3; ++i) column(table, vertex, "f_dc_" + std::to_string(i));
+    for (int i = 0; i < 3 && !extras.colors; ++i) column(table, vertex, "f_dc_" + std::to_string(i));
     add("opacity");
-    for (int i = 0; i < 3; ++i) add("scale_" + std::to_string(i));
+    for (const char* name : {"scale_0", "scale_1", extras.flat ? "scale_1" : "scale_2"}) add(name);
     for (int i = 0; i < 4; ++i) add("rot_" + std::to_string(i));
-    for (int channel = 0; channel < 3; ++channel) add("f_dc_" + std::to_string(channel));
+    for (size_t channel = 0; channel < 3; ++channel)
+        if (extras.colors)
+            columns.push_back(extras.colors->columns[channel]);
+        else
+            add("f_dc_" + std::to_string(channel));
     const int per_channel = sh_coefficients(file_degree) - 1;
     for (int k = 0; k < sh_coefficients(degree) - 1; ++k)
         for (int channel = 0; channel < 3; ++channel)
             add("f_rest_" + std::to_string(channel * per_channel + k));
+    if (extras.filter) columns.push_back(*extras.filter);
     return columns;
+}
+
+/// Adds the variance of Mip-Splatting's 3D filter to the splat's. Its opacity falls as its density does.
+void add_filter(double filter, float* log_scales, float& logit) {
+    if (filter == 0) return;
+    constexpr double kFarLarger = 100;
+    double log_opacity = -std::log1p(std::exp(-double(logit)));
+    for (size_t k = 0; k < 3; ++k) {
+        const double before = log_scales[k];
+        if (before > kFarLarger) continue;
+        const double after = std::log(std::hypot(std::exp(before), filter));
+        log_opacity += before - after;
+        log_scales[k] = float(after);
+    }
+    logit = float(log_opacity - std::log(-std::expm1(log_opacity)));
 }
 
 /// Adds a remark on the contents that are skipped.
@@ -165,8 +201,12 @@ SplatScene read_ply(const std::filesystem::path& path) {
     scene.file_sh_degree = degree_of(table, vertex);
     Gaussians& gaussians = scene.gaussians;
     gaussians.sh_degree = std::min(scene.file_sh_degree, kMaxShDegree);
+    const Extras extras = extras_of(path, vertex);
     const std::vector<size_t> columns =
-        splat_columns(table, vertex, gaussians.sh_degree, scene.file_sh_degree);
+        splat_columns(table, vertex, gaussians.sh_degree, scene.file_sh_degree, extras);
+    if (extras.flat) remark_surfels(scene);
+    if (extras.filter)
+        scene.remarks.emplace_back("Mip-Splatting's filter_3D is added to the scales and opacities");
     remark_ignored(vertex, columns, scene);
     require_memory(table.name(), table.file_bytes(), vertex.count, gaussians.sh_degree);
     gaussians.resize(static_cast<size_t>(vertex.count));
@@ -185,6 +225,12 @@ SplatScene read_ply(const std::filesystem::path& path) {
         copy(row + 4, &gaussians.log_scales[3 * i], 3);
         copy(row + 7, &gaussians.quaternions[4 * i], 4);
         copy(row + kBeforeSh, &gaussians.sh[stride * i], stride);
+        float* log_scales = &gaussians.log_scales[3 * i];
+        if (extras.flat) log_scales[2] = std::max(log_scales[0], log_scales[1]) + kFlat;
+        if (extras.colors)
+            for (size_t k = 0; k < 3; ++k)
+                gaussians.sh[stride * i + k] = float(sh0_of_color(row[kBeforeSh + k] / extras.colors->full));
+        if (extras.filter) add_filter(row[kBeforeSh + stride], log_scales, gaussians.opacity_logits[i]);
     });
     if (wide) set_world_means(gaussians, positions);
     if (density) fit_opacities(gaussians, true);

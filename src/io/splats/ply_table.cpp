@@ -74,6 +74,37 @@ std::optional<size_t> PlyElement::find_number(std::string_view property) const {
     return found && !properties[*found].list_count ? found : std::nullopt;
 }
 
+std::optional<PlyColors> find_colors(const std::filesystem::path& path, const PlyElement& element) {
+    constexpr std::array<std::array<std::string_view, 3>, 3> kNames = {
+        {{"red", "green", "blue"}, {"diffuse_red", "diffuse_green", "diffuse_blue"}, {"r", "g", "b"}}};
+    for (const auto& names : kNames) {
+        PlyColors colors;
+        size_t found = 0;
+        for (size_t k = 0; k < 3; ++k)
+            for (size_t p = 0; p < element.properties.size(); ++p)
+                if (!element.properties[p].list_count &&
+                    core::lower(element.properties[p].name) == names[k]) {
+                    colors.columns[k] = p;
+                    ++found;
+                    break;
+                }
+        if (found < 3) continue;
+        const PlyType type = element.properties[colors.columns[0]].type;
+        if (type == PlyType::int8 || type == PlyType::uint8) return colors;
+        double largest = 0;
+        PlyTable table(path);
+        table.go_to(element.name);
+        table.read({colors.columns.begin(), colors.columns.end()}, [&](size_t, const double* row) {
+            for (size_t k = 0; k < 3; ++k)
+                if (std::isfinite(row[k])) largest = std::max(largest, row[k]);
+        });
+        const bool real = type == PlyType::float32 || type == PlyType::float64;
+        colors.full = real && largest <= 1 ? 1 : largest <= 255 ? 255 : 65535;
+        return colors;
+    }
+    return std::nullopt;
+}
+
 PlyTable::PlyTable(const std::filesystem::path& path) : reader_(path) {
     parse_header();
 }

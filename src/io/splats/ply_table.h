@@ -2,6 +2,7 @@
 // The PLY container (Turk 1994): a text header declares elements and their properties, and their rows follow.
 // ply.cpp, compressed_ply.cpp, datasets/image_records.cpp and meshes/ply_mesh.cpp interpret the properties.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -34,6 +35,17 @@ struct PlyElement {
     std::optional<size_t> find(std::string_view property) const;
     std::optional<size_t> find_number(std::string_view property) const;  // not a list
 };
+
+/// Where an element has colours.
+struct PlyColors {
+    std::array<size_t, 3> columns{};
+    double full = 255;  // the value of full brightness
+};
+
+/// The colours under one of the names that programs give them, such as red and diffuse_red. Empty unless all three are numbers.
+/// Unless they have 8 bits, the whole file is read for the largest value, which tells floats to 1 from those to 255, and
+/// 16 bits from 8 in a wider type.
+std::optional<PlyColors> find_colors(const std::filesystem::path& path, const PlyElement& element);
 
 /// Reads ascii, binary_little_endian and binary_big_endian. Throws InputError that names the byte.
 class PlyTable {

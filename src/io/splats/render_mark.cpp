@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/splats/render_mark.h"
 
+#include <algorithm>
 #include <optional>
 
 #include "core/text.h"
@@ -44,7 +45,8 @@ void take_marks(SplatScene& scene) {
 }
 
 void remark_surfels(SplatScene& scene) {
-    scene.remarks.emplace_back("the splats were trained as flat ones (2DGS); ewa draws them as ellipsoids");
+    const std::string text = "the splats were trained as flat ones (2DGS); ewa draws them as ellipsoids";
+    if (std::ranges::find(scene.remarks, text) == scene.remarks.end()) scene.remarks.push_back(text);
 }
 
 std::vector<std::string> marked_comments(const SaveOptions& options) {
