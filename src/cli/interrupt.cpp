@@ -52,14 +52,6 @@ struct sigaction handle(int signal, void (*handler)(int)) {
     return before;
 }
 
-/// Signals that are ignored stay so.
-void handle_all(void (*handler)(int)) {
-    for (const int signal : kSignals) {
-        const struct sigaction before = handle(signal, handler);
-        if (before.sa_handler == SIG_IGN) sigaction(signal, &before, nullptr);
-    }
-}
-
 }  // namespace
 
 InterruptWatch::InterruptWatch() {
@@ -82,12 +74,18 @@ bool interrupted() {
 void remove_temporary_files_on_signals() {
     // A write beyond ulimit -f then fails, and says so.
     std::signal(SIGXFSZ, SIG_IGN);
-    handle_all(remove_files_and_end);
+    for (const int signal : kSignals) {
+        const struct sigaction before = handle(signal, remove_files_and_end);
+        if (before.sa_handler == SIG_IGN) sigaction(signal, &before, nullptr);
+    }
 }
 
 void end_on_signals() {
     at_terminal = isatty(STDERR_FILENO) != 0;
-    handle_all(remove_files_and_exit);
+    for (const int signal : kSignals) {
+        const struct sigaction before = handle(signal, remove_files_and_exit);
+        if (signal == SIGHUP && before.sa_handler == SIG_IGN) sigaction(signal, &before, nullptr);
+    }
 }
 
 }  // namespace ewa::cli

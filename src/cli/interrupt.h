@@ -32,7 +32,8 @@ struct Interrupted {};
 /// ignored. A file size limit becomes an error of the write, as a full disk is.
 void remove_temporary_files_on_signals();
 
-/// The same for work that saves nothing, with kInterruptedStatus: in the middle of a long step, too.
+/// For work that saves nothing: the signals of a watch delete the temporary files and end the program at once, with
+/// kInterruptedStatus.
 void end_on_signals();
 
 /// The exit status after Ctrl-C.
