@@ -152,7 +152,7 @@ TEST(ValueFiles, UnpacksASogAndLeavesOtherImagesAlone) {
 /// Several programs write one file. Each result is that of one of them, and nothing else is left.
 TEST(ValueFiles, SeveralWritersAtOnce) {
     const Folder folder;
-    for (int i = 0; i < 4; ++i) make_splats(folder / std::to_string(i), 1000 + 500 * i);
+    for (int i = 0; i < 4; ++i) make_splats(folder / (std::to_string(i) + ".ply"), 1000 + 500 * i);
     for (const std::string name : {"g.gltf", "meta.json", "lod-meta.json", "tileset.json"})
         for (int round = 0; round < 3; ++round) {
             SCOPED_TRACE(name);
@@ -160,7 +160,7 @@ TEST(ValueFiles, SeveralWritersAtOnce) {
             std::vector<std::future<Outcome>> writers;
             for (int i = 0; i < 4; ++i)
                 writers.push_back(std::async(std::launch::async, [&, i] {
-                    return run_ewa({"convert", folder / std::to_string(i), out, "--quiet"});
+                    return run_ewa({"convert", folder / (std::to_string(i) + ".ply"), out, "--quiet"});
                 }));
             for (auto& writer : writers) expect_success(writer.get());
             if (name == "tileset.json") continue;

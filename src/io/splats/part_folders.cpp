@@ -96,17 +96,22 @@ void PartFolders::replace(std::string_view text) {
     Paths before;
     if (written_by_ewa(naming_)) before = kind_.named_by(naming_);
     core::write_text_file(naming_, text);
-    std::error_code ignored;
-    for (const std::string& name : names_) fs::remove(above_ / name / kUnfinished, ignored);
-    const std::set<std::string> own(names_.begin(), names_.end());
-    names_.clear();
     std::erase_if(before, [&](const fs::path& part) {
         const fs::path folder = part.parent_path();
         const std::string name = folder.filename().string();
-        return !kind_.is_folder(name) || own.contains(name) || !kind_.is_part(part) || !is_own(part) ||
+        return !kind_.is_folder(name) || is_new(name) || !kind_.is_part(part) || !is_own(part) ||
                folder.lexically_normal().parent_path() != naming_.lexically_normal().parent_path();
     });
     remove_others(before);
+    // Where another process has replaced the naming file since, nobody needs the new folders.
+    if (!names_folder(naming_, names_.front())) return;
+    std::error_code ignored;
+    for (const std::string& name : names_) fs::remove(above_ / name / kUnfinished, ignored);
+    names_.clear();
+}
+
+bool PartFolders::is_new(const std::string& name) const {
+    return std::ranges::count(names_, name) > 0;
 }
 
 void PartFolders::remove_others(const Paths& before) const {
@@ -118,7 +123,7 @@ void PartFolders::remove_others(const Paths& before) const {
     for (const auto& entry : fs::directory_iterator(above_, ignored)) {
         const fs::path mark = entry.path() / kUnfinished;
         const std::string name = entry.path().filename().string();
-        if (!kind_.is_folder(name) || !is_real(entry.path(), fs::file_type::directory) ||
+        if (!kind_.is_folder(name) || is_new(name) || !is_real(entry.path(), fs::file_type::directory) ||
             !is_real(mark, fs::file_type::regular))
             continue;
         std::string first;

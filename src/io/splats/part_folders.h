@@ -43,6 +43,7 @@ class PartFolders {
     void replace(std::string_view text);
 
   private:
+    bool is_new(const std::string& name) const;
     void clear(const std::filesystem::path& folder) const;
     void remove_others(const Paths& before) const;
 
