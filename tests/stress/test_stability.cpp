@@ -11,6 +11,7 @@
 
 #include "bench/stability/stability.h"
 #include "gpu/test_device.h"
+#include "support/splat_scenes.h"
 
 namespace ewa::test {
 namespace {
@@ -79,6 +80,21 @@ TEST(StabilityNeedles, KeepTheirDigitsWhereAPlainDeterminantLosesThem) {
         const bench::StabilityResult result = bench::compare_with_reference(device(), named(name));
         for (const bench::Comparison& c : result.comparisons) EXPECT_LE(c.error, 1e-3) << name << ' ' << c.of;
         EXPECT_GT(result.plain_determinant, 20 * result.comparisons.front().error) << name;
+    }
+}
+
+/// In such a cloud, decisions at 1/255 differ from the reference's, and many pixels are close to one.
+TEST(SlowStability, OfFaintCloudsIsWithinItsBounds) {
+    for (const auto& [count, scale] : {std::pair{6000u, -2.5f}, {20000u, -3.5f}}) {
+        SCOPED_TRACE(count);
+        Gaussians cloud = test::storable_splats(3, count, 0);
+        for (size_t i = 0; i < cloud.size(); ++i) {
+            cloud.opacity_logits[i] = std::log(0.02f / 0.98f);
+            for (size_t k = 0; k < 3; ++k) cloud.log_scales[3 * i + k] = scale;
+        }
+        const bench::StabilityResult result =
+            bench::compare_with_reference(device(), bench::stability_case_of("cloud", cloud));
+        EXPECT_TRUE(result.good()) << result.verdict();
     }
 }
 

@@ -9,6 +9,7 @@
 #include <functional>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "bench/device_runs.h"
 #include "core/json.h"
@@ -93,6 +94,17 @@ std::vector<uint8_t> pixels_at_threshold(const Rendered& rendered) {
             at[size_t(y) * size_t(width) + size_t(x)] = hangs;
         }
     return at;
+}
+
+/// How many contributions are within kAtThreshold of 1/255: the area of a ring of each footprint, at most that of the image.
+double expected_at_threshold(const Rendered& rendered) {
+    const auto& grid = rendered.instances.grid;
+    const double pixels = double(grid.image_width) * double(grid.image_height);
+    double sum = 0;
+    for (const reference::Projected& p : rendered.projected)
+        if (p.visible && p.det > 0)
+            sum += 2 * kAtThreshold * std::min(2 * std::numbers::pi * std::sqrt(p.det), pixels);
+    return sum;
 }
 
 /// A norm for each part of a gradient by the camera.
@@ -382,7 +394,8 @@ void to_json(Json& json, const StabilityTraining& t) {
 }
 
 bool StabilityResult::too_many_at_threshold() const {
-    return pixels_at_threshold > std::max(kFewPixels, pixels / kPixelsEach);
+    const auto expected = uint64_t(2 * expected_at_threshold);
+    return pixels_at_threshold > std::max({kFewPixels, pixels / kPixelsEach, expected});
 }
 
 std::string StabilityResult::verdict() const {
@@ -422,6 +435,7 @@ StabilityResult compare_with_reference(const std::shared_ptr<gpu::Device>& devic
     result.skipped_by_reference = expected.reference.rendered.skipped_nonfinite;
     result.pixels = excluded.size();
     result.pixels_at_threshold = uint64_t(std::count(excluded.begin(), excluded.end(), 1));
+    result.expected_at_threshold = expected_at_threshold(expected.reference.rendered);
     result.plain_determinant = plain_determinant_error(expected, one.options);
 
     if (!drawn) drawn = &one.gaussians;

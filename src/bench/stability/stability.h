@@ -47,11 +47,12 @@ struct StabilityResult {
     uint32_t skipped = 0, skipped_by_reference = 0;  // splats that cannot be drawn
     uint64_t pixels = 0;
     uint64_t pixels_at_threshold = 0;     // where a contribution is close to a threshold of the model
+    double expected_at_threshold = 0;     // such contributions, by the areas of the footprints
     bool finite = true;                   // image, loss and gradient
     std::vector<Comparison> comparisons;  // image, loss, each group of the gradient, the camera's gradient
     double plain_determinant = 0;         // image error of the reference if det = a c - b^2 in float32
     double loss = 0;
-    /// More than 4 pixels and than one in 200 are excluded for being close to a threshold.
+    /// More than 4 pixels, than one in 200 and than twice those expected are excluded for being close to a threshold.
     bool too_many_at_threshold() const;
     bool good() const;
     std::string verdict() const;  // "ok", or all that is not
