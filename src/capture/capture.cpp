@@ -21,8 +21,8 @@
 #include "ewa/splat_files.h"
 #include "image/image_files.h"
 #include "io/datasets/dataset_folders.h"
-#include "io/datasets/importers/image_finder.h"
 #include "io/datasets/image_records.h"
+#include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/importer.h"
 #include "io/splats/zip_files.h"
 

@@ -371,26 +371,26 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
 
 namespace {
 
-constexpr int kLeastSide = 16;  // px; SSIM's window has 11
+constexpr int kSsimSide = 16;  // px; SSIM's window has 11
 
 }  // namespace
 
 void check_max_width(int most, int width, int height, const std::string& image) {
     const double shape = double(height) / width;
     const auto high = [&](int wide) { return int(std::lround(wide * shape)); };
-    if (std::min(most, high(most)) >= kLeastSide) return;
-    const int enough = int(std::ceil(kLeastSide / std::min(1.0, shape)));
+    if (std::min(most, high(most)) >= kSsimSide) return;
+    const int enough = int(std::ceil(kSsimSide / std::min(1.0, shape)));
     throw InputError(fmt::format(
         "--max-width {} leaves {}x{} pixels of {}; a side needs {} or more, as with --max-width {}", most,
-        most, std::max(1, high(most)), image, kLeastSide, enough));
+        most, std::max(1, high(most)), image, kSsimSide, enough));
 }
 
 void check_downscale(int factor, int left, int width, int height, const std::string& image) {
     const int across = std::max(1, width / left), down = std::max(1, height / left);
-    if (factor == 1 || std::min(across, down) >= kLeastSide) return;
+    if (factor == 1 || std::min(across, down) >= kSsimSide) return;
     throw InputError(fmt::format(
         "--downscale {} leaves {}x{} pixels of {}; a side needs {} or more, as with --downscale {}", factor,
-        across, down, image, kLeastSide, std::max(1, std::min(width, height) / kLeastSide)));
+        across, down, image, kSsimSide, std::max(1, std::min(width, height) / kSsimSide)));
 }
 
 void check_without_dataset(const RunOptions& options) {

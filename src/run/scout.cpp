@@ -33,7 +33,7 @@ namespace {
 // The scout sees each image so often: all else is then in place, and what one image shows alone is still faint.
 constexpr int kVisits = 12, kLeastSteps = 300;
 // px; images are halved until no side is longer than the first, unless one gets shorter than the second: SSIM's window has 11.
-constexpr int kScoutSide = 320, kLeastSide = 16;
+constexpr int kScoutSide = 320, kLeastScoutSide = 16;
 constexpr size_t kReportedMasks = 12;
 
 /// The training frames with small images.
@@ -46,7 +46,7 @@ Dataset small_dataset(const RunInput& input) {
         shortest = std::min({shortest, camera.width, camera.height});
     }
     int reduction = 1;
-    while (longest / reduction > kScoutSide && shortest / (2 * reduction) >= kLeastSide) reduction *= 2;
+    while (longest / reduction > kScoutSide && shortest / (2 * reduction) >= kLeastScoutSide) reduction *= 2;
     for (const int i : input.split.train) {
         Frame& frame = dataset.frames[size_t(i)];
         frame.downscale *= reduction;

@@ -75,7 +75,8 @@ TEST(Process, LogsAndAnswersAreBounded) {
     const std::string log = test::file_bytes(program.log);
     EXPECT_LT(log.size(), core::kMostLog + 100);
     EXPECT_TRUE(log.ends_with("[the rest is left out]\n"));
-    const core::Answer flood = core::ask_program(shell("yes")), end = core::ask_program(shell("echo yes; exit 3"));
+    const core::Answer flood = core::ask_program(shell("yes")),
+                       end = core::ask_program(shell("echo yes; exit 3"));
     EXPECT_TRUE(flood.cut);
     EXPECT_EQ(flood.ended, Ended::failed);
     EXPECT_EQ(flood.text.size(), size_t(1) << 20);
@@ -90,7 +91,8 @@ TEST(Process, ErrorsMayBePartOfTheOutput) {
     program.joined = true;
     EXPECT_EQ(run(program).second, "out\nerr\n");
     // A program that closes its output goes on, and can be stopped.
-    EXPECT_EQ(core::run_program(shell("exec >&- 2>&-; sleep 1000"), [n = 0](std::string_view) mutable { return ++n < 5; }),
+    EXPECT_EQ(core::run_program(shell("exec >&- 2>&-; sleep 1000"),
+                                [n = 0](std::string_view) mutable { return ++n < 5; }),
               Ended::stopped);
 }
 

@@ -58,7 +58,6 @@ bool is_imported(const std::filesystem::path& entry, const std::function<std::st
 std::filesystem::path other_cameras(const std::filesystem::path& dataset, const FoundImporter& found,
                                     const std::vector<std::filesystem::path>& read);
 
-
 /// What to export, for a folder or file with the cameras of a program in a form that is not read, such as its own project. Or why
 /// a file is not the one that its name promises. Empty if there is nothing to say.
 std::string export_advice(const std::filesystem::path& path);
