@@ -354,7 +354,7 @@ int render_free_views(RenderArguments arguments) {
 }
 
 /// of_frames: an option that only a dataset's views have.
-[[noreturn]] void refuse_frames(const CLI::App& app, const std::string& of_frames, bool run) {
+[[noreturn]] void refuse_dataset_options(const CLI::App& app, const std::string& of_frames, bool run) {
     if (!run) throw InputError(of_frames + " needs --cameras DATASET");
     std::string other = "a film";
     for (const char* option : {"--size", "--look-at", "--up", "--orbit", "--views"})
@@ -398,7 +398,7 @@ int run(CLI::App& app, RenderArguments& arguments) {
         arguments.cameras_of_run = true;
         return render_dataset_views(arguments);
     }
-    if (!of_frames.empty()) refuse_frames(app, of_frames, input.run.has_value());
+    if (!of_frames.empty()) refuse_dataset_options(app, of_frames, input.run.has_value());
     arguments.run_is_folder = input.run.has_value();
     arguments.run = arguments.appearance.run;
     return render_free_views(arguments);
