@@ -398,7 +398,8 @@ int run(const InfoArguments& arguments) {
         info_image(path, format, arguments.json);
     else if (is_mesh_scene(path))
         info_mesh(path, arguments.test_every, arguments.json);
-    else if (const std::string advice = io::export_advice(path); !advice.empty())
+    else if (const std::string advice = is_archive(path) ? std::string() : io::export_advice(path);
+             !advice.empty())
         throw InputError(core::one_line(path.string()) + ": not a dataset: " + advice);
     else
         info_splats(path, nullptr, arguments);
