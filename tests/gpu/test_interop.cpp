@@ -211,10 +211,10 @@ int byte_of(float value) {
     return int(std::clamp(value, 0.0f, 1.0f) * 255 + 0.5f);
 }
 
-constexpr uint32_t kWidth = 61, kHeight = 47;  // neither a multiple of a tile nor of a texel
+constexpr uint32_t kDrawnWidth = 61, kDrawnHeight = 47;  // neither a multiple of a tile nor of a texel
 
 struct Drawn {
-    Scene scene = random_scene(46, 200, SplatKind::ordinary, int(kWidth), int(kHeight));
+    Scene scene = random_scene(46, 200, SplatKind::ordinary, int(kDrawnWidth), int(kDrawnHeight));
     DrawOptions options{};
 
     Drawn() {
@@ -233,10 +233,11 @@ TEST(Interop, ImagesAndBuffersHoldTheRender) {
     const Drawn drawn;
     {
         Renderer renderer(engine.borrowed(), drawn.scene.gaussians, drawn.scene.options);
-        const Picture floats(engine, vk::Format::eR32G32B32A32Sfloat, kWidth + 5, kHeight + 7),
-            bytes(engine, vk::Format::eR8G8B8A8Srgb, kWidth, kHeight);
-        constexpr uint64_t kBegin = 12, kRow = 4 * kWidth + 20;
-        const HostBytes rows(engine, kBegin + kRow * kHeight), depth(engine, 4 * kWidth * kHeight);
+        const Picture floats(engine, vk::Format::eR32G32B32A32Sfloat, kDrawnWidth + 5, kDrawnHeight + 7),
+            bytes(engine, vk::Format::eR8G8B8A8Srgb, kDrawnWidth, kDrawnHeight);
+        constexpr uint64_t kBegin = 12, kRow = 4 * kDrawnWidth + 20;
+        const HostBytes rows(engine, kBegin + kRow * kDrawnHeight),
+            depth(engine, 4 * kDrawnWidth * kDrawnHeight);
         const std::vector<DeviceTarget> targets{floats.target(3, 2), bytes.target(0, 0),
                                                 rows.target(VK_FORMAT_R8G8B8A8_UNORM, kBegin, kRow),
                                                 depth.target(VK_FORMAT_R32_SFLOAT)};
@@ -244,14 +245,14 @@ TEST(Interop, ImagesAndBuffersHoldTheRender) {
         render_to(renderer, drawn.scene.camera, drawn.options, targets);  // again, over what is there
 
         const HostBytes all_floats(engine, 16ull * floats.size.width * floats.size.height),
-            all_bytes(engine, 4 * kWidth * kHeight);
+            all_bytes(engine, 4 * kDrawnWidth * kDrawnHeight);
         floats.read(engine, all_floats);
         bytes.read(engine, all_bytes);
         const Rendering host = renderer.render(drawn.scene.camera, drawn.options);
         size_t transparent = 0;
-        for (size_t y = 0; y < kHeight; ++y)
-            for (size_t x = 0; x < kWidth; ++x) {
-                const size_t i = y * kWidth + x;
+        for (size_t y = 0; y < kDrawnHeight; ++y)
+            for (size_t x = 0; x < kDrawnWidth; ++x) {
+                const size_t i = y * kDrawnWidth + x;
                 for (size_t c = 0; c < 4; ++c) {
                     const float value = value_of(host, i, c);
                     const size_t at = 4 * (((y + 2) * floats.size.width + x + 3) * 4 + c);
@@ -266,8 +267,8 @@ TEST(Interop, ImagesAndBuffersHoldTheRender) {
             }
         EXPECT_GT(transparent, 10u);
         // Around the rows nothing is written.
-        for (uint64_t y = 0; y + 1 < kHeight; ++y)
-            for (uint64_t at = kBegin + y * kRow + 4 * kWidth; at < kBegin + (y + 1) * kRow; ++at)
+        for (uint64_t y = 0; y + 1 < kDrawnHeight; ++y)
+            for (uint64_t at = kBegin + y * kRow + 4 * kDrawnWidth; at < kBegin + (y + 1) * kRow; ++at)
                 ASSERT_EQ(rows.at<uint8_t>(at), 0xa5);
         EXPECT_EQ(rows.at<uint8_t>(kBegin - 1), 0xa5);
     }
@@ -305,7 +306,7 @@ TEST(Interop, SemaphoresOrderTheWork) {
     const Engine engine;
     const Drawn drawn;
     Renderer renderer(engine.borrowed(), drawn.scene.gaussians, drawn.scene.options);
-    const HostBytes bytes(engine, 4 * kWidth * kHeight);
+    const HostBytes bytes(engine, 4 * kDrawnWidth * kDrawnHeight);
     const std::vector<DeviceTarget> targets{bytes.target(VK_FORMAT_R8G8B8A8_UNORM)};
     const vk::SemaphoreTypeCreateInfo timeline(vk::SemaphoreType::eTimeline, 4);
     const auto counter = engine.handle().createSemaphoreUnique({{}, &timeline}),
@@ -357,7 +358,8 @@ TEST(Interop, WhatADeviceLacksIsNamed) {
     VulkanDevice own = engine.handles();
     own.api_version = VK_API_VERSION_1_1;
     own.queue_family = 99;
-    const VkDeviceCreateInfo nothing{VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO};
+    VkDeviceCreateInfo nothing{};
+    nothing.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
     own.created_with = &nothing;
     refused(own, {"Vulkan before 1.2", "queue family 99 has no compute",
                   "scalarBlockLayout, which is not enabled"});
@@ -369,7 +371,8 @@ TEST(Interop, WhatADeviceLacksIsNamed) {
     own = engine.handles();
     VkPhysicalDeviceScalarBlockLayoutFeatures scalar{
         VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES, nullptr, VK_TRUE};
-    VkDeviceCreateInfo alone{VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, &scalar};
+    VkDeviceCreateInfo alone = nothing;
+    alone.pNext = &scalar;
     own.created_with = &alone;
     EXPECT_NO_THROW(borrow_device(own));
     scalar.scalarBlockLayout = VK_FALSE;
@@ -382,8 +385,8 @@ TEST(Interop, TargetsThatDoNotFitAreRefused) {
     const Engine engine;
     const Drawn drawn;
     Renderer renderer(engine.borrowed(), drawn.scene.gaussians, drawn.scene.options);
-    const Picture picture(engine, vk::Format::eR8G8B8A8Unorm, kWidth, kHeight);
-    const HostBytes bytes(engine, 4 * kWidth * kHeight);
+    const Picture picture(engine, vk::Format::eR8G8B8A8Unorm, kDrawnWidth, kDrawnHeight);
+    const HostBytes bytes(engine, 4 * kDrawnWidth * kDrawnHeight);
     const auto refused = [&](const DeviceTarget& target, const char* part, Drawing drawing = Drawing::color) {
         DrawOptions options = drawn.options;
         options.drawing = drawing;
@@ -405,7 +408,7 @@ TEST(Interop, TargetsThatDoNotFitAreRefused) {
     refused({VK_FORMAT_R8G8B8A8_UNORM, DeviceBuffer{}}, "without a buffer");
     refused(bytes.target(VK_FORMAT_R8G8B8A8_UNORM, 4), "does not fit in 11468 bytes from byte 4");
     refused(bytes.target(VK_FORMAT_R8G8B8A8_UNORM, 2), "multiples of 4");
-    refused(bytes.target(VK_FORMAT_R8G8B8A8_UNORM, 0, 4 * kWidth - 4), "a row has 244");
+    refused(bytes.target(VK_FORMAT_R8G8B8A8_UNORM, 0, 4 * kDrawnWidth - 4), "a row has 244");
     refused(bytes.target(VK_FORMAT_R8G8B8A8_UNORM, 0, ~uint64_t(3)), "does not fit");
     refused(bytes.target(VK_FORMAT_R8G8B8A8_UNORM, ~uint64_t(3)), "does not fit");
     refused(bytes.target(VK_FORMAT_R32G32B32A32_SFLOAT), "does not fit");

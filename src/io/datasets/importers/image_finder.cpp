@@ -24,8 +24,7 @@ constexpr size_t kShownName = 200;
 bool is_of_others(const fs::path& folder) {
     constexpr std::string_view kOthers[] = {"mask", "depth", "confidence", "."}, kCopies = "images_";
     const std::string name = core::lower(folder.filename().string());
-    if (name.starts_with(kCopies) &&
-        core::parse_integer<int>(std::string_view(name).substr(kCopies.size())))
+    if (name.starts_with(kCopies) && core::parse_integer<int>(std::string_view(name).substr(kCopies.size())))
         return true;
     return std::ranges::any_of(kOthers, [&](std::string_view other) { return name.starts_with(other); }) ||
            name == "dense" || name == "undistorted" || is_made_by_ewa(folder);
