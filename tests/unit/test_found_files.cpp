@@ -59,7 +59,7 @@ struct Colmap {
     std::string used() const { return used_text(load()); }
 };
 
-std::vector<std::string> names_of(const Dataset& dataset) {
+std::vector<std::string> image_names(const Dataset& dataset) {
     std::vector<std::string> names;
     for (const Frame& frame : dataset.frames) names.push_back(frame.name);
     return names;
@@ -74,7 +74,7 @@ TEST(FoundFiles, ImagesWithAndWithoutLinesOfObservations) {
         const Colmap data;
         data.model("sparse/0", names, observations);
         for (const std::string& name : names) save(data.folder / "images" / name);
-        EXPECT_EQ(names_of(data.load()), names);
+        EXPECT_EQ(image_names(data.load()), names);
         EXPECT_EQ(data.used(), "4 of 4 photos, 2 points");
     }
     const Colmap data;
@@ -106,7 +106,7 @@ TEST(FoundFiles, TheModelWithTheMostImagesIsUsed) {
         records.images.push_back(records.images[0]);
         records.images.back().name = "2.png";
         io::write_colmap(data.folder / place, records.images, records.points);
-        EXPECT_EQ(names_of(data.load()), (std::vector<std::string>{"0.png", "1.png", "2.png"}));
+        EXPECT_EQ(image_names(data.load()), (std::vector<std::string>{"0.png", "1.png", "2.png"}));
         fs::remove(data.folder / place / "images.bin");
     }
     // The same model in both forms is one.
@@ -186,7 +186,7 @@ TEST(FoundFiles, TransformsUnderOtherNames) {
         save(scene.folder / file);
         scene.model["frames"] = {test::transforms_frame(named)};
         const Dataset dataset = scene.load();
-        EXPECT_EQ(names_of(dataset), std::vector<std::string>{file});
+        EXPECT_EQ(image_names(dataset), std::vector<std::string>{file});
         EXPECT_EQ(used_text(dataset), "1 of 1 photo");
     }
 }
@@ -196,14 +196,14 @@ TEST(FoundFiles, RemovedPhotosAreNotReplaced) {
     const Colmap data;
     data.model("sparse/0", {"0.png", "1.png"});
     data.photos({"images/1.png", "images/rejected/0.png", "input/0.png", "0.png"});
-    EXPECT_EQ(names_of(data.load()), std::vector<std::string>{"1.png"});
+    EXPECT_EQ(image_names(data.load()), std::vector<std::string>{"1.png"});
     EXPECT_EQ(data.load().missing_images, 1);
     EXPECT_EQ(data.used(),
               "1 of 3 photos (images/0.png is missing; images/rejected/0.png has no camera), 2 points");
     test::TransformsScene blender;
     for (const char* file : {"train/1.png", "test/0.png", "val/0.png"}) save(blender.folder / file);
     blender.model["frames"] = {test::transforms_frame("./train/0"), test::transforms_frame("./train/1")};
-    EXPECT_EQ(names_of(blender.load()), std::vector<std::string>{"train/1.png"});
+    EXPECT_EQ(image_names(blender.load()), std::vector<std::string>{"train/1.png"});
 }
 
 TEST(FoundFiles, ImagesThatCannotBeTold) {
@@ -214,7 +214,7 @@ TEST(FoundFiles, ImagesThatCannotBeTold) {
         [&] { data.load(); },
         {"images.txt: the image \"/gone/0.png\" is one of 2 images", "a/0.png and b/0.png"});
     data.model("sparse/0", {"/gone/b/0.png"});
-    EXPECT_EQ(names_of(data.load()), std::vector<std::string>{"b/0.png"});
+    EXPECT_EQ(image_names(data.load()), std::vector<std::string>{"b/0.png"});
 }
 
 TEST(FoundFiles, AWorkspaceHasTheImagesThatTheModelLacks) {
