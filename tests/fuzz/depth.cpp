@@ -37,7 +37,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     std::ofstream(frame.depth_path, std::ios::binary) << bytes;
     std::string text = "a depth map of " + std::to_string(size) + " bytes";
     try {
-        const Image depth = scene::load_depth_map(frame);
+        const Image depth = load_depth_map(frame);
         EWA_REQUIRE(depth.width == frame.camera.width && depth.height == frame.camera.height &&
                     depth.channels == 1);
         for (const float z : depth.pixels) EWA_REQUIRE(std::isfinite(z) && z >= 0);
