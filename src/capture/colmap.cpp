@@ -333,7 +333,8 @@ std::vector<Model> map_if_possible(const Colmap& colmap, const Photos& photos, c
 std::set<std::string> names_in(const std::vector<Model>& models) {
     std::set<std::string> names;
     if (!models.empty())
-        for (const io::ImageRecord& image : io::read_colmap({models.front().folder}).images)
+        for (const io::ImageRecord& image :
+             io::read_colmap(io::colmap_model_in(models.front().folder)).images)
             names.insert(image.name);
     return names;
 }

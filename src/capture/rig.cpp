@@ -90,7 +90,7 @@ int agreed(const std::vector<Pose>& poses, double scale, Pose& pose) {
 
 RigPoses rig_poses(const fs::path& model) {
     Views views;
-    for (const io::ImageRecord& view : io::read_colmap({model}).images) {
+    for (const io::ImageRecord& view : io::read_colmap(io::colmap_model_in(model)).images) {
         const auto [k, photo] = photo_of_view(view.name);
         if (!photo.empty())
             views[photo].push_back({glm::quat_cast(glm::transpose(view_rotation(k)) * view.camera.rotation),
@@ -160,7 +160,7 @@ void join_views(const std::map<std::string, Pose>& poses, const fs::path& views_
         image.camera.translation = -(image.camera.rotation * pose->second.center);
         images.push_back(image);
     }
-    io::write_colmap(model, images, io::read_colmap({views_model}).points);
+    io::write_colmap(model, images, io::read_colmap(io::colmap_model_in(views_model)).points);
 }
 
 }  // namespace ewa::capture

@@ -66,6 +66,10 @@ std::vector<ColmapModel> colmap_models(const fs::path& root) {
     return by_size(models_in(root));
 }
 
+ColmapModel colmap_model_in(const fs::path& folder) {
+    return {.folder = folder, .extension = core::is_file(folder / "cameras.bin") ? ".bin" : ".txt"};
+}
+
 std::vector<ColmapModel> colmap_workspaces(const fs::path& root) {
     const fs::path dense = entry_in(root, "dense");
     std::vector<fs::path> folders = numbered_in(dense);

@@ -89,6 +89,8 @@ struct ColmapModel {
 /// The models of a dataset, which are in sparse/0 and so on, sparse or root itself. The one with the most images is first. As in COLMAP,
 /// .bin is preferred.
 std::vector<ColmapModel> colmap_models(const std::filesystem::path& root);
+/// The model whose files are in this very folder.
+ColmapModel colmap_model_in(const std::filesystem::path& folder);
 /// Those of a workspace that is in the folder: dense/0 and so on, dense, undistorted, distorted or colmap.
 std::vector<ColmapModel> colmap_workspaces(const std::filesystem::path& root);
 /// The number of images in the model's file; 0 if it cannot be read.
