@@ -65,6 +65,11 @@ std::string option_text(const Json& value, const std::string& where) {
     throw InputError(where + " is neither a number, a text nor true or false");
 }
 
+/// Runs write their options without a value, too.
+bool says_nothing(const Json& value) {
+    return value.is_null() || value == "";
+}
+
 CLI::Option* find_option(CLI::App& app, const std::string& name) {
     if (name == "dataset") return app.get_option_no_throw("DATASET");
     if (name == "config" || name == "help") return nullptr;
@@ -95,7 +100,7 @@ void apply_config(CLI::App& app, const std::filesystem::path& file) {
         // A file from a stranger decides neither what is replaced nor who may connect.
         if (std::ranges::find(kOnlyOnCommandLine, name) != kOnlyOnCommandLine.end())
             throw InputError(where + " belongs on the command line, not into a file: --" + name);
-        if (value.is_null() || given(app, name)) continue;
+        if (says_nothing(value) || given(app, name)) continue;
         values.emplace_back(option, option_text(value, where));
         check_type(*option, value, where);
     }
@@ -109,7 +114,7 @@ void apply_run_config(CLI::App& app, const nlohmann::json& values, const std::fi
     std::vector<std::pair<CLI::Option*, std::string>> given_by_run;
     for (const auto& [name, value] : values.items()) {
         CLI::Option* option = find_option(app, name);
-        if (!option || value.is_null() || value == false || given(app, name)) continue;
+        if (!option || says_nothing(value) || value == false || given(app, name)) continue;
         given_by_run.emplace_back(option, option_text(value, where.string() + ": \"" + name + "\""));
     }
     try {
