@@ -116,8 +116,14 @@ void check_no_names_of_others(const fs::path& folder) {
             refuse(name);
     for (const char* name : report::kCameraModelFiles)
         if (is(name, fs::file_type::regular)) refuse(name);
+    // What a killed command left is no user's.
+    const auto is_of_user = [](const fs::directory_entry& entry) {
+        return !entry.path().filename().string().starts_with(".ewa-");
+    };
     for (const char* name : {"test", "train", "inria", report::kPassersByFolder})
-        if (is(name, fs::file_type::directory) && !fs::is_empty(folder / name, absent)) refuse(name);
+        if (is(name, fs::file_type::directory) &&
+            std::ranges::any_of(fs::directory_iterator(folder / name, absent), is_of_user))
+            refuse(name);
 }
 
 }  // namespace
