@@ -379,7 +379,8 @@ void check_max_width(int most, int width, int height, const std::string& image) 
     const double shape = double(height) / width;
     const auto high = [&](int wide) { return int(std::lround(wide * shape)); };
     if (std::min(most, high(most)) >= kSsimSide) return;
-    const int enough = int(std::ceil(kSsimSide / std::min(1.0, shape)));
+    // The height may have been rounded.
+    const int enough = int(std::ceil(kSsimSide / std::min(1.0, (height - 0.5) / width)));
     throw InputError(fmt::format(
         "--max-width {} leaves {}x{} pixels of {}; a side needs {} or more, as with --max-width {}", most,
         most, std::max(1, high(most)), image, kSsimSide, enough));

@@ -293,7 +293,7 @@ TEST(Convert, SaysWhatToWriteInstead) {
         const Outcome outcome = run_ewa({"convert", folder / "s.ply", folder / name});
         expect_failure(outcome, 2,
                        ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, lod-meta.json, .glb, "
-                       ".gltf, .usda, .usdz, .rad\n");
+                       ".gltf, .usda, .usdz, .rad, tileset.json, .html (a page)");
     }
     EXPECT_EQ(files_below(folder / ""), Names{"s.ply"});
 }

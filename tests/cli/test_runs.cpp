@@ -443,7 +443,7 @@ TEST_F(Runs, KeepTheLimitOfTheImagesWidth) {
 TEST_F(Runs, AWidthThatIsTooSmallIsRefused) {
     const Outcome small = run_ewa({"train", folder / "data", "-o", folder / "o", "--max-width", "10"});
     expect_failure(small, 2,
-                   "--max-width 10 leaves 10x7 pixels of the image images/0.png; a side needs 16 or more");
+                   "--max-width 10 leaves 10x7 pixels of the image images/1.png; a side needs 16 or more");
     const std::string enough = small.err.substr(small.err.find("as with --max-width ") + 20);
     expect_success(run_ewa({"train", folder / "data", "-o", folder / "o", "--steps", "1", "--quiet",
                             "--max-width", enough.substr(0, enough.find_first_not_of("0123456789"))}));
