@@ -203,8 +203,8 @@ int make_mesh(const MeshArguments& arguments, const std::optional<live::Run>& ru
     const std::span<const Camera> cameras = pinholes.cameras();
     mesh::meshing();  // says at once that it is missing
 
-    Renderer renderer(open_device(arguments.device), gaussians, options);
     end_on_signals();
+    Renderer renderer(open_device(arguments.device), gaussians, options);
     Progress progress("meshed", int((arguments.collision ? 2 : 3) * cameras.size()), "views",
                       arguments.quiet);
     const auto done = [&](size_t steps) { progress.update(int(steps)); };

@@ -284,21 +284,24 @@ TEST(Mesh, OfA360Image) {
 TEST(Mesh, OfAFisheye) {
     const Prepared folder;
     std::filesystem::create_directories(folder / "fish/images");
-    ewa::save_image(folder / "fish/images/a.png", ewa::Image(128, 128, 3));
-    const double degrees = 220, radius = 64, fl = radius / (degrees / 2 * std::numbers::pi / 180);
-    write_file(
-        folder / "fish/transforms.json",
-        nlohmann::json{{"camera_model", "OPENCV_FISHEYE"},
+    const auto write_fisheye = [&](int side) {
+        ewa::save_image(folder / "fish/images/a.png", ewa::Image(side, side, 3));
+        const double degrees = 220, radius = 0.5 * side, fl = radius / (degrees / 2 * std::numbers::pi / 180);
+        write_file(folder / "fish/transforms.json",
+                   nlohmann::json{
+                       {"camera_model", "OPENCV_FISHEYE"},
                        {"fl_x", fl},
                        {"fl_y", fl},
-                       {"cx", 64},
-                       {"cy", 64},
-                       {"w", 128},
-                       {"h", 128},
+                       {"cx", radius},
+                       {"cy", radius},
+                       {"w", side},
+                       {"h", side},
                        {"frames",
                         {{{"file_path", "images/a.png"},
                           {"transform_matrix", {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}}}}}}
-            .dump());
+                       .dump());
+    };
+    write_fisheye(128);
     const Outcome outcome = run_ewa({"mesh", folder / "shell.ply", "-o", folder / "m.ply", "--cameras",
                                      folder / "fish", "--voxel", "0.05"});
     expect_success(outcome);
@@ -312,6 +315,7 @@ TEST(Mesh, OfAFisheye) {
     EXPECT_LT(nearest, -0.9);
     EXPECT_GT(farthest, 0.5) << "the corners see behind the camera";
     EXPECT_LT(farthest, 0.97) << "nothing sees straight behind";
+    write_fisheye(64);
     const Outcome coarse =
         run_ewa({"mesh", folder / "shell.ply", "-o", folder / "m.ply", "--cameras", folder / "fish"});
     expect_success(coarse);
