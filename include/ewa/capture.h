@@ -4,6 +4,7 @@
 #pragma once
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,9 @@ enum class Matching {
     sequence,   // each image with those that follow it in the order of names
     unordered   // all pairs; the time grows with the square of their number
 };
+
+/// Limits of CaptureOptions::frames.
+inline constexpr int kFewestVideoFrames = 3, kMostVideoFrames = 100000;
 
 struct CaptureOptions {
     int frames = 300;  // of a video, about; the sharpest of each of as many equal parts is taken
@@ -59,6 +63,12 @@ bool archive_has_cameras(const std::filesystem::path& archive);
 /// RunError.
 std::filesystem::path unpack_archive(const std::filesystem::path& archive,
                                      const std::filesystem::path& folder);
+/// Unpacks the dataset of an archive into a temporary folder, and calls `read` with it. An InputError of `read` names the archive
+/// and the entry in place of the folder. Returns what keeps the folder. Throws InputError for an archive without cameras, and as
+/// unpack_archive does.
+std::shared_ptr<const void> read_archive(
+    const std::filesystem::path& archive,
+    const std::function<void(const std::filesystem::path& folder)>& read);
 
 /// The size of the smallest photo, or of the video's frames. 0 x 0 where that cannot be known before make_dataset.
 ImageSize smallest_image(const std::filesystem::path& input);

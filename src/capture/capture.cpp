@@ -2,6 +2,8 @@
 // From photos or a video to a dataset: which input it is, what is done already, and what did not work.
 #include "ewa/capture.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <iterator>
 #include <map>
@@ -441,6 +443,25 @@ bool archive_has_cameras(const fs::path& archive) {
 fs::path unpack_archive(const fs::path& archive, const fs::path& folder) {
     io::ZipFiles(archive).unpack(folder, [](int) { return true; });
     return main_folder(folder);
+}
+
+std::shared_ptr<const void> read_archive(const fs::path& archive,
+                                         const std::function<void(const fs::path& folder)>& read) {
+    if (!archive_has_cameras(archive))
+        throw InputError(core::one_line(archive.string()) +
+                         ": an archive without cameras; ewa cameras searches those of the photos in it");
+    // A process that is forked from this one leaves the folder to it.
+    const std::shared_ptr<const core::TemporaryFolder> folder(
+        new core::TemporaryFolder("ewa-zip-"), [owner = getpid()](const core::TemporaryFolder* made) {
+            if (getpid() == owner) delete made;
+        });
+    try {
+        read(unpack_archive(archive, folder->path()));
+    } catch (const InputError& error) {
+        // The folder is no more when the user reads this.
+        throw InputError(io::named_in_archive(error.what(), folder->path(), archive));
+    }
+    return folder;
 }
 
 bool is_capture(const fs::path& path) {

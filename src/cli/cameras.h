@@ -9,9 +9,6 @@
 
 namespace ewa::cli {
 
-// Limits of the number of frames to take from a video.
-inline constexpr int kFewestVideoFrames = 3, kMostVideoFrames = 100000;
-
 /// Throws InputError if --frames is given with a folder of photos.
 void refuse_frames(const std::string& frames, const std::filesystem::path& photos);
 

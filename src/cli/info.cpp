@@ -290,20 +290,6 @@ void info_dataset(const fs::path& path, const fs::path& named, int test_every, b
                extent);
 }
 
-/// Describes a zip archive that has a dataset, which is unpacked first.
-void info_archive(const fs::path& path, int test_every, bool json) {
-    const core::TemporaryFolder folder("ewa-zip-");
-    if (!archive_has_cameras(path))
-        throw InputError(core::one_line(path.string()) +
-                         ": an archive without cameras; ewa cameras searches those of the photos in it");
-    try {
-        info_dataset(unpack_archive(path, folder.path()), path, test_every, json);
-    } catch (const InputError& error) {
-        // The folder is no more when the user reads it.
-        throw InputError(io::named_in_archive(error.what(), folder.path(), path));
-    }
-}
-
 void info_mesh(const fs::path& path, int test_every, bool json) {
     const scene::MeshScene scene = io::read_gltf_mesh(path);
     const Dataset views = scene_cameras(path, {});
@@ -387,13 +373,15 @@ int run(const InfoArguments& arguments) {
     const fs::path& path = arguments.path;
     std::error_code error;
     if (!fs::exists(path, error)) throw InputError(path.string() + ": no such file or folder");
-    if (const auto run = find_run(path))
+    if (const auto run = run_named(path))
         info_splats(splat_input(path).file, &*run, arguments);
     else if (fs::is_directory(path) || (path.extension() == ".json" && !is_sog(path)) ||
              io::find_importer(path))
         info_dataset(path, path, arguments.test_every, arguments.json);
     else if (is_archive(path) && (archive_has_cameras(path) || !io::has_splats(io::ZipFiles(path))))
-        info_archive(path, arguments.test_every, arguments.json);
+        read_archive(path, [&](const fs::path& folder) {
+            info_dataset(folder, path, arguments.test_every, arguments.json);
+        });
     else if (const std::string_view format = image_format(path); !format.empty())
         info_image(path, format, arguments.json);
     else if (is_mesh_scene(path))

@@ -32,7 +32,7 @@ bool same_folder(const fs::path& a, const fs::path& b) {
 }  // namespace
 
 void settle_dataset(RunOptions& options) {
-    const std::optional<live::Run> run = find_run(options.dataset);
+    const std::optional<live::Run> run = run_named(options.dataset);
     if (!run) return;
     if (options.output.empty()) options.output = run->folder;
     const bool own_folder = same_folder(options.output, run->folder);

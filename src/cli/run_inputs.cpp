@@ -10,62 +10,11 @@
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
-#include "io/datasets/dataset_folders.h"
 #include "report/run_file_names.h"
 #include "scene/names.h"
 
 namespace ewa::cli {
-namespace {
-
 namespace fs = std::filesystem;
-
-}  // namespace
-
-std::optional<live::Run> find_run(const fs::path& path) {
-    if (!core::is_folder(path) || io::is_dataset_folder(path)) return std::nullopt;
-    return live::find_run(path);
-}
-
-SplatInput splat_input(const fs::path& path) {
-    if (!core::is_folder(path)) return {path, {}};
-    const std::string name = core::one_line(path.string());
-    std::optional<live::Run> run = live::find_run(path);
-    if (!run) {
-        const std::string runs = live::runs_in(path);
-        throw InputError(name +
-                         ": a folder without splats; expected a splat file, or the folder of a training run "
-                         "with splats.ply in it" +
-                         (runs.empty() ? "" : ", such as " + runs));
-    }
-    if (run->splats.empty())
-        throw InputError(
-            name +
-            ": this training run has no splats.ply yet; ewa train writes it at the end, or every N "
-            "steps with --save-every N");
-    const fs::path file = run->splats;
-    return {file, std::move(run)};
-}
-
-bool names_run_with_splats(const fs::path& path) {
-    if (!core::is_folder(path)) return false;
-    const std::optional<live::Run> run = live::find_run(path);
-    return run && !run->splats.empty();
-}
-
-fs::path dataset_of(const live::Run& run) {
-    if (!run.dataset.empty()) return run.dataset;
-    const std::string config = core::one_line((run.folder / "config.json").string());
-    if (run.named_dataset.empty()) throw InputError(config + ": names no dataset; name the dataset itself");
-    throw InputError(
-        config + ": the dataset " + core::one_line(run.named_dataset) +
-        " was not found; looked in the current folder and in each folder above the run; name the "
-        "dataset itself");
-}
-
-fs::path dataset_input(const fs::path& path) {
-    const std::optional<live::Run> run = find_run(path);
-    return run ? dataset_of(*run) : path;
-}
 
 namespace {
 
@@ -107,14 +56,6 @@ void use_options_of(const live::Run& run, CLI::App& app, const fs::path& other) 
         if (name == std::string_view("nearest") && (!points || points->count() == 0)) continue;
         apply_config_value(app, name, *value, config);
     }
-}
-
-fs::path refined_cameras_of(const live::Run& run) {
-    fs::path file = run.refined_cameras();
-    if (file.empty() && run.flag("refine-poses"))
-        core::warn(core::one_line(run.folder.string()) +
-                   ": cameras.json is missing; the dataset's cameras are used, which --refine-poses moved");
-    return file;
 }
 
 void add_appearance_options(CLI::App& app, AppearanceArguments& arguments) {

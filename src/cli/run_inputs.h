@@ -8,40 +8,22 @@
 
 #include "cli/arguments.h"
 #include "ewa/appearance.h"
-#include "live/run_folder.h"
+#include "live/run_inputs.h"
 
 namespace ewa::cli {
 
-/// The run whose folder this is. Empty for other paths, and for a folder that is also a dataset.
-std::optional<live::Run> find_run(const std::filesystem::path& path);
-
-/// A path that names splats.
-struct SplatInput {
-    std::filesystem::path file;    // the path itself, or splats.ply of the run's folder
-    std::optional<live::Run> run;  // if the path is a run's folder
-};
-/// Any path but a folder stays as it is: the reader of splats says what is wrong with it. Throws InputError for a
-/// folder that is not a run's, or whose run has no splats yet.
-SplatInput splat_input(const std::filesystem::path& path);
-
-/// Whether the path is the folder of a run that has splats.
-bool names_run_with_splats(const std::filesystem::path& path);
-
-/// The path itself, or the dataset of the run whose folder it is. A folder that holds both is a dataset. Throws
-/// InputError if the run's dataset is not found.
-std::filesystem::path dataset_input(const std::filesystem::path& path);
-
-/// The dataset of a run. Throws InputError that says where it was searched.
-std::filesystem::path dataset_of(const live::Run& run);
+using live::dataset_input;
+using live::dataset_of;
+using live::names_run_with_splats;
+using live::refined_cameras_of;
+using live::run_named;
+using live::splat_input;
+using live::SplatInput;
 
 /// Gives --kernel, --background, --downscale, --max-width, --masks, --lens and --test-every the run's values, where `app` has the option
 /// and the command line does not. other: a dataset in place of the run's; its images become as wide as those that the run was trained on,
 /// where they are wider. Empty: none. Throws InputError for a value that the option refuses.
 void use_options_of(const live::Run& run, CLI::App& app, const std::filesystem::path& other = {});
-
-/// cameras.json of the run. Empty if its cameras are those of the dataset. Warns if they should be refined, and the file
-/// is missing.
-std::filesystem::path refined_cameras_of(const live::Run& run);
 
 /// The cameras of the run's dataset as it was trained, refined ones if it has them. Throws InputError.
 Dataset cameras_of_run(const live::Run& run);

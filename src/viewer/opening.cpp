@@ -14,7 +14,7 @@
 #include "ewa/synthetic_dataset.h"
 #include "io/datasets/importers/importer.h"
 #include "io/datasets/refined_cameras.h"
-#include "live/run_folder.h"
+#include "live/run_inputs.h"
 #include "report/run_file_names.h"
 #include "scene/looks.h"
 
@@ -72,20 +72,6 @@ Look look_of(const live::Run& run) {
     return look;
 }
 
-/// How the run reads its images.
-DatasetOptions images_of(const live::Run& run) {
-    DatasetOptions options;
-    const auto downscale = run.config.find("downscale");
-    if (downscale != run.config.end() && downscale->is_number_integer())
-        options.downscale = std::clamp(downscale->get<int>(), 1, 1024);
-    const auto width = run.config.find("max-width");
-    if (width != run.config.end() && width->is_number_integer())
-        options.max_width = std::clamp(width->get<int>(), 0, 65535);
-    options.masks = core::find_value(scene::kMaskWords, run.text("masks")).value_or(options.masks);
-    options.lens = core::find_value(scene::kLensWords, run.text("lens")).value_or(options.lens);
-    return options;
-}
-
 void add_appearances(OpenedScene& scene, const live::Run& run) {
     for (const char* name : {report::kExposuresFile, report::kAppearanceFile}) {
         if (!core::is_file(run.folder / name)) continue;
@@ -106,7 +92,7 @@ void add_cameras(OpenedScene& scene, const live::Run& run, const fs::path& camer
     const fs::path dataset = cameras.empty() ? run.dataset : cameras;
     try {
         if (!dataset.empty())
-            scene.dataset = load_cameras(dataset, images_of(run), points,
+            scene.dataset = load_cameras(dataset, live::dataset_options_of(run), points,
                                          cameras.empty() ? run.refined_cameras() : fs::path());
         else
             scene.remark = "the dataset of this run was not found; name it with --cameras DATASET";
