@@ -217,6 +217,17 @@ void add_frames_options(CLI::App& app, std::string& frames, int& test_every) {
     add_test_every_option(app, test_every);
 }
 
+void add_transform_option(CLI::App& app, std::vector<std::string>& steps, const std::string& of) {
+    app.add_option("--transform", steps,
+                   of + ": move=x,y,z, turn=x,y,z,degrees, scale=s, or a matrix of 12 or 16 numbers, "
+                        "row by row. Repeat the option for several steps, applied in order. Axes are those "
+                        "of a PLY: y down, z forward")
+        ->type_name("STEP")
+        ->expected(1)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+        ->take_all();
+}
+
 void add_quiet_option(CLI::App& app, bool& quiet) {
     app.add_flag("--quiet", quiet, "Print only errors");
 }

@@ -8,15 +8,13 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <memory>
 #include <set>
+#include <sstream>
 
 #include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/convert_clean.h"
-#include "cli/convert_edits.h"
 #include "cli/convert_files.h"
 #include "cli/convert_output.h"
-#include "cli/convert_page.h"
-#include "cli/convert_tiles.h"
 #include "cli/orbit_check.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
@@ -29,6 +27,7 @@
 #include "ewa/splat_files.h"
 #include "io/splats/formats.h"
 #include "report/run_file_names.h"
+#include "scene/edits.h"
 
 namespace ewa::cli {
 namespace {
@@ -42,7 +41,7 @@ struct ConvertArguments {
     std::vector<glm::dmat4> placements;  // of the inputs
     std::vector<std::string> transform;
     std::string scale_to, decimate, sort;
-    Edits edits;
+    scene::Edits edits;
     Cleaning cleaning;
     OutputOptions output_options;
     int level = 0;  // of the inputs
@@ -50,6 +49,28 @@ struct ConvertArguments {
     bool bake_sky = false, check = false, allow_empty = false, quiet = false;
     std::optional<live::Run> run;  // that the only input is of
 };
+
+struct PlacedInput {
+    fs::path file;
+    glm::dmat4 transform{1.0};
+};
+
+/// Parses an input with its own steps: FILE, FILE:STEP or FILE:STEP:STEP. A path that exists is a file, whatever its
+/// name. Throws InputError for a step that is none.
+PlacedInput parse_input(const std::string& text) {
+    std::error_code error;
+    if (fs::exists(text, error)) return {text};
+    for (size_t colon = text.find(':'); colon != std::string::npos; colon = text.find(':', colon + 1)) {
+        const std::string file = text.substr(0, colon);
+        if (!fs::exists(file, error)) continue;
+        std::vector<std::string> steps;
+        std::istringstream rest(text.substr(colon + 1));
+        for (std::string step; std::getline(rest, step, ':');) steps.push_back(step);
+        if (steps.empty()) steps.emplace_back();
+        return {file, scene::parse_transform(steps, file)};
+    }
+    return {text};
+}
 
 struct Work {
     Gaussians gaussians;
@@ -92,7 +113,7 @@ Work read_all(const ConvertArguments& arguments) {
         SplatScene scene =
             arguments.level > 0 ? read_splat_level(path, size_t(arguments.level)) : read_splats(path);
         if (arguments.bake_sky) bake_sky(path, scene.gaussians);
-        place_splats(scene.gaussians, arguments.placements.at(i), path.string());
+        scene::place_splats(scene.gaussians, arguments.placements.at(i), path.string());
         if (!arguments.quiet)
             fmt::print("{}\n",
                        described(path, name_of(scene.format), scene.variant, scene_size(scene.gaussians),
@@ -192,7 +213,7 @@ bool clean_scene(const ConvertArguments& arguments, Work& work, bool in_place) {
     const bool dry = !arguments.cleaning.picture.empty();
     const Gaussians before = dry ? work.gaussians : Gaussians();
     const size_t all = work.gaussians.size();
-    for (const Removed& removed : clean(work.gaussians, arguments.cleaning, run)) {
+    for (const scene::Removed& removed : clean(work.gaussians, arguments.cleaning, run)) {
         work.lost.push_back(fmt::format("{} {} {} of {}", removed.option, dry ? "would remove" : "removed",
                                         removed.splats, core::counted(all, "splat")));
         work.removed[removed.option] = work.removed.value(removed.option, size_t(0)) + removed.splats;
@@ -209,32 +230,33 @@ bool clean_scene(const ConvertArguments& arguments, Work& work, bool in_place) {
 
 int run(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
-    const ConvertOutput output = output_of(out, arguments.output_options, arguments.check);
+    const ConvertOutput output = report::output_of(out, arguments.output_options);
+    if (arguments.check) check_readable(output, arguments.output_options);
     // Report wrong use before the inputs are read: they may be large.
-    Edits edits = arguments.edits;
-    edits.transform = parse_transform(arguments.transform);
+    scene::Edits edits = arguments.edits;
+    edits.transform = scene::parse_transform(arguments.transform);
     if (!arguments.scale_to.empty()) {
-        const double factor = parse_scale_to(arguments.scale_to, edits.transform);
+        const double factor = scene::parse_scale_to(arguments.scale_to, edits.transform);
         edits.transform = glm::scale(glm::dmat4(1.0), glm::dvec3(factor)) * edits.transform;
         if (!arguments.quiet) fmt::print("--scale-to: times {:.6g}\n", factor);
     }
-    edits.decimation = parse_decimation(arguments.decimate);
+    edits.decimation = scene::parse_decimation(arguments.decimate);
     edits.morton = arguments.sort == "morton";
     if (!arguments.cleaning.picture.empty() && !arguments.cleaning.any())
         throw InputError(
             "--dry-run: no option removes splats; see --remove-floaters and others of ewa convert --help");
-    check_cleaning(arguments.cleaning);
+    scene::check_cleaning(arguments.cleaning);
     check_files(arguments);
     Work work = read_all(arguments);
     const size_t read = work.gaussians.size();
     const bool in_place = edits.transform == glm::dmat4(1);
-    place_splats(work.gaussians, edits.transform,
-                 arguments.scale_to.empty()    ? "--transform"
-                 : arguments.transform.empty() ? "--scale-to"
-                                               : "--transform and --scale-to");
+    scene::place_splats(work.gaussians, edits.transform,
+                        arguments.scale_to.empty()    ? "--transform"
+                        : arguments.transform.empty() ? "--scale-to"
+                                                      : "--transform and --scale-to");
     edits.transform = glm::dmat4(1);
     if (arguments.cleaning.any() && clean_scene(arguments, work, in_place)) return 0;
-    for (std::string& remark : apply_edits(work.gaussians, edits, output.format))
+    for (std::string& remark : scene::apply_edits(work.gaussians, edits, output.format))
         work.lost.push_back(std::move(remark));
 
     const SceneSize size = scene_size(work.gaussians);
@@ -245,9 +267,11 @@ int run(const ConvertArguments& arguments) {
     Progress progress("written", static_cast<int>(std::min<size_t>(count, 1u << 30)), "splats",
                       arguments.quiet || count < kShowFrom);
     work.save.progress = [&](uint64_t done, uint64_t) { progress.update(static_cast<int>(done)); };
-    const std::vector<std::string> quantised = write_output(
-        output, arguments.output_options, work.gaussians, work.save, in_place ? arguments.run : std::nullopt);
     std::vector<std::string> remarks = work.lost;
+    const bool shows_run = output.page && in_place;
+    const report::PageCameras cameras = page_cameras(shows_run ? arguments.run : std::nullopt, remarks);
+    const std::vector<std::string> quantised =
+        report::write_output(output, arguments.output_options, work.gaussians, work.save, cameras);
     remarks.insert(remarks.end(), quantised.begin(), quantised.end());
 
     if (!arguments.quiet) {

@@ -6,8 +6,7 @@
 #include <set>
 #include <utility>
 
-#include "cli/convert_page.h"
-#include "cli/convert_tiles.h"
+#include "cli/convert_output.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"

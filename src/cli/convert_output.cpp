@@ -4,46 +4,11 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/arguments.h"
-#include "cli/convert_page.h"
-#include "cli/convert_tiles.h"
+#include "cli/run_inputs.h"
 #include "core/text.h"
 #include "ewa/error.h"
 
 namespace ewa::cli {
-namespace {
-
-namespace fs = std::filesystem;
-
-void check_options(const ConvertOutput& output, const OutputOptions& options) {
-    const SplatFormat format = output.format;
-    const bool levels =
-        format == SplatFormat::sog_levels || format == SplatFormat::rad || output.tiles || options.unbundled;
-    if (!options.geo.empty() && !output.tiles) throw InputError("--geo: only a tileset.json is on a globe");
-    if (!options.title.empty() && !output.page) throw InputError("--title: only a page has one");
-    if (options.unbundled && !output.page) throw InputError("--unbundled: only a page has its scene inside");
-    if (options.levels > 0 && !levels)
-        throw InputError(
-            "--levels: only a lod-meta.json, a .rad, a tileset.json and an --unbundled page have levels");
-    if (options.spz_version > 0 && (output.tiles || options.gltf_spz))
-        throw InputError("--spz-version: a glTF and tiles hold SPZ 2; only an .spz has a version to choose");
-    if (options.spz_version > 0 && format != SplatFormat::spz)
-        throw InputError("--spz-version: only an .spz has one");
-    if (options.gltf_spz && format != SplatFormat::glb && format != SplatFormat::gltf)
-        throw InputError("--gltf-spz: only a .glb or .gltf can hold an SPZ");
-}
-
-void check_readable(const ConvertOutput& output, const OutputOptions& options) {
-    if (output.page) throw InputError("--check: ewa does not read a page; check a .sog, which it holds");
-    if (output.tiles)
-        throw InputError("--check: ewa reads no tileset; check a .glb with --gltf-spz, which its tiles are");
-    if (output.format == SplatFormat::sog_levels)
-        throw InputError(
-            "--check: its splats are in another order; check a .sog, which level 0 holds in chunks");
-    if (output.format == SplatFormat::rad && options.levels > 1)
-        throw InputError("--check: the splats of a tree are in another order; check a .rad without --levels");
-}
-
-}  // namespace
 
 void add_output_options(CLI::App& app, OutputOptions& options) {
     app.add_option("--spz-version", options.spz_version,
@@ -71,43 +36,27 @@ void add_output_options(CLI::App& app, OutputOptions& options) {
         ->type_name("LAT,LON,HEIGHT[,HEADING]|ecef");
 }
 
-namespace {
-
-SplatFormat format_of_output(const fs::path& file) try {
-    return format_to_write(file);
-} catch (const InputError& error) {
-    const std::string extension = core::lower(file.extension().string());
-    std::string hint = ", tileset.json, .html (a page)";
-    for (const char* mesh : {".obj", ".stl", ".fbx", ".dae"})
-        if (extension == mesh)
-            hint += "; ewa mesh makes meshes: ewa mesh IN -o " + file.stem().string() +
-                    (extension == ".obj" ? ".obj" : ".glb");
-    throw InputError(error.what() + core::one_line(hint));
+void check_readable(const ConvertOutput& output, const OutputOptions& options) {
+    if (output.page) throw InputError("--check: ewa does not read a page; check a .sog, which it holds");
+    if (output.tiles)
+        throw InputError("--check: ewa reads no tileset; check a .glb with --gltf-spz, which its tiles are");
+    if (output.format == SplatFormat::sog_levels)
+        throw InputError(
+            "--check: its splats are in another order; check a .sog, which level 0 holds in chunks");
+    if (output.format == SplatFormat::rad && options.levels > 1)
+        throw InputError("--check: the splats of a tree are in another order; check a .rad without --levels");
 }
 
-}  // namespace
-
-ConvertOutput output_of(const fs::path& file, const OutputOptions& options, bool check) {
-    ConvertOutput output{.file = file,
-                         .page = names_page(file),
-                         .tiles = names_tileset(file),
-                         .earth = parse_geo(options.geo)};
-    output.format = output.page ? SplatFormat::sog : output.tiles ? SplatFormat::glb : format_of_output(file);
-    check_options(output, options);
-    if (check) check_readable(output, options);
-    return output;
-}
-
-std::vector<std::string> write_output(const ConvertOutput& output, const OutputOptions& options,
-                                      Gaussians& gaussians, SaveOptions save,
-                                      const std::optional<live::Run>& run) {
-    if (options.spz_version > 0) save.spz_version = options.spz_version;
-    save.gltf_spz = options.gltf_spz;
-    save.levels = options.levels;
-    if (output.page) return write_page(output.file, std::move(gaussians), save, run, options);
-    if (output.tiles) return write_tiles(output.file, std::move(gaussians), save, output.earth);
-    if (output.format == SplatFormat::sog_levels) return save_levels(output.file, std::move(gaussians), save);
-    return save_splats(output.file, gaussians, save);
+report::PageCameras page_cameras(const std::optional<live::Run>& run, std::vector<std::string>& remarks) {
+    report::PageCameras cameras;
+    if (!run) return cameras;
+    cameras.background = core::parse_colour(run->text("background")).value_or(cameras.background);
+    try {
+        cameras.dataset = cameras_of_run(*run);
+    } catch (const InputError& error) {
+        remarks.push_back("the page has no views of photos: " + core::one_line(error.what()));
+    }
+    return cameras;
 }
 
 }  // namespace ewa::cli

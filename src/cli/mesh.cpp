@@ -1,23 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa mesh: the surfaces of a splat scene as a mesh, from the depth that the cameras of its run see.
 #include <spdlog/fmt/fmt.h>
-#include <unistd.h>
 #include <CLI/CLI.hpp>
 
-#include <algorithm>
-#include <cmath>
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
-#include <glm/mat3x3.hpp>
 #include <memory>
-#include <numbers>
 #include <optional>
-#include <span>
 
 #include "cli/arguments.h"
 #include "cli/command.h"
-#include "cli/convert_edits.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "cli/render_views.h"
@@ -28,16 +19,13 @@
 #include "ewa/renderer.h"
 #include "io/datasets/dataset_folders.h"
 #include "io/datasets/refined_cameras.h"
-#include "mesh/colors.h"
-#include "mesh/depth_cache.h"
-#include "mesh/fusion.h"
 #include "mesh/mesh_files.h"
-#include "mesh/meshing.h"
 #include "mesh/parts.h"
 #include "mesh/pinholes.h"
+#include "mesh/scene_mesh.h"
 #include "run/loss_option.h"
 #include "scene/dataset_files.h"
-#include "scene/framing.h"
+#include "scene/edits.h"
 #include "scene/splat_shape.h"
 
 namespace ewa::cli {
@@ -57,27 +45,6 @@ struct MeshArguments {
     DeviceOptions device;
     bool quiet = false;
 };
-
-constexpr int kOwnViews = 64, kOwnViewSide = 512;
-/// A part that is smaller than this was seen within the truncation alone.
-constexpr double kLeastPart = 4 * mesh::kTruncation;  // voxels
-/// A collision mesh: its voxels in usual ones, and its triangles unless --triangles says another number.
-constexpr double kCollisionVoxels = 4;
-constexpr size_t kCollisionTriangles = 10000;
-
-/// Around the scene from all directions, for splats whose cameras are not known.
-mesh::Pinholes own_cameras(const Gaussians& gaussians) {
-    const scene::Framing framing = scene::frame_scene(gaussians, kOwnViewSide, kOwnViewSide);
-    const double distance = glm::length(framing.camera.position() - framing.target);
-    std::vector<Camera> cameras;
-    for (int i = 0; i < kOwnViews; ++i) {  // on Fibonacci's spiral
-        const double z = 1 - (2 * i + 1.0) / kOwnViews, turn = i * std::numbers::pi * (3 - std::sqrt(5.0));
-        const glm::dvec3 to(std::sqrt(1 - z * z) * std::cos(turn), std::sqrt(1 - z * z) * std::sin(turn), z);
-        cameras.push_back(scene::look_at(framing.target + distance * to, framing.target, framing.up,
-                                         kOwnViewSide, kOwnViewSide));
-    }
-    return mesh::Pinholes(std::move(cameras));
-}
 
 /// The cameras of --cameras or of the run, refined as the run refined them. Empty without both.
 std::optional<Dataset> dataset_of_mesh(const MeshArguments& arguments, const std::optional<live::Run>& run) {
@@ -112,64 +79,12 @@ bool at_mean_depth(const MeshArguments& arguments, const std::optional<live::Run
     return !loss.empty() && train::parse_loss(loss).depth > 0;
 }
 
-/// The mean depth where the splats take at least half of the light; elsewhere 0.
-Image solid_mean_depth(const Rendering& seen) {
-    constexpr float kSolid = 0.5f;
-    Image depth = seen.depth;
-    for (size_t i = 0; i < depth.pixels.size(); ++i)
-        if (!(seen.alpha.pixels[i] >= kSolid)) depth.pixels[i] = 0;
-    return depth;
-}
-
-/// Half of the machine's memory.
-uint64_t memory_for_volume() {
-    return uint64_t(sysconf(_SC_PHYS_PAGES)) * uint64_t(sysconf(_SC_PAGESIZE)) / 2;
-}
-
-mesh::FusionOptions fusion_options(const MeshArguments& arguments) {
-    mesh::FusionOptions options{.voxel = arguments.voxel,
-                                .unbounded = arguments.unbounded,
-                                .closed = arguments.collision,
-                                .least_part = kLeastPart,
-                                .most_triangles = size_t(arguments.triangles),
-                                .most_bytes = memory_for_volume()};
-    if (arguments.collision) {
-        options.coarser = kCollisionVoxels;
-        if (arguments.triangles == 0) options.most_triangles = kCollisionTriangles;
-    }
-    return options;
-}
-
 /// From --transform and --scale-to.
 glm::dmat4 placement_of(const MeshArguments& arguments) {
-    const glm::dmat4 transform = parse_transform(arguments.transform);
+    const glm::dmat4 transform = scene::parse_transform(arguments.transform);
     if (arguments.scale_to.empty()) return transform;
-    return glm::scale(glm::dmat4(1.0), glm::dvec3(parse_scale_to(arguments.scale_to, transform))) * transform;
-}
-
-void place(mesh::Fused& fused, const glm::dmat4& placement) {
-    if (placement == glm::dmat4(1.0)) return;
-    mesh::transform_mesh(fused.mesh, placement);
-    const double scale = std::cbrt(std::abs(glm::determinant(glm::dmat3(placement))));
-    fused.voxel *= scale;
-    fused.space.radius *= scale;
-}
-
-/// Says where nobody chose voxels that are too large to show the scene.
-void note_coarse_voxels(const mesh::Fused& fused, const MeshArguments& arguments, Progress& progress) {
-    constexpr double kFew = 60, kMany = 200;  // voxels from corner to corner
-    if (arguments.voxel > 0 || arguments.collision) return;
-    glm::vec3 low(fused.mesh.positions.at(0)), high(low);
-    for (const glm::vec3& p : fused.mesh.positions) {
-        low = glm::min(low, p);
-        high = glm::max(high, p);
-    }
-    const double voxels = double(glm::length(high - low)) / fused.voxel;
-    if (voxels < kFew)
-        progress.note(fmt::format(
-            "voxels of {:.3g}, two pixels of the images, are coarse: the mesh is {:.0f} of them from "
-            "corner to corner; --voxel {:.1g} makes it {:.0f}",
-            fused.voxel, voxels, voxels * fused.voxel / kMany, kMany));
+    return glm::scale(glm::dmat4(1.0), glm::dvec3(scene::parse_scale_to(arguments.scale_to, transform))) *
+           transform;
 }
 
 void print(const mesh::Fused& fused, const MeshArguments& arguments, size_t most, Progress& progress) {
@@ -198,42 +113,24 @@ int make_mesh(const MeshArguments& arguments, const std::optional<live::Run>& ru
     const std::optional<Dataset> dataset = dataset_of_mesh(arguments, run);
     check_output(arguments, dataset);
     // The splats of a run have seen no more than its images.
-    const mesh::Pinholes pinholes =
-        dataset ? mesh::Pinholes(*dataset, !run || !arguments.cameras.empty()) : own_cameras(gaussians);
-    const std::span<const Camera> cameras = pinholes.cameras();
-    mesh::meshing();  // says at once that it is missing
+    const mesh::Pinholes pinholes = dataset ? mesh::Pinholes(*dataset, !run || !arguments.cameras.empty())
+                                            : mesh::cameras_around(gaussians);
 
     end_on_signals();
     Renderer renderer(open_device(arguments.device), gaussians, options);
-    Progress progress("meshed", int((arguments.collision ? 2 : 3) * cameras.size()), "views",
-                      arguments.quiet);
-    const auto done = [&](size_t steps) { progress.update(int(steps)); };
-    const bool mean = at_mean_depth(arguments, run);
-    mesh::DepthCache cache(cameras.size(), [&](size_t i) {
-        Image seen = mean ? solid_mean_depth(renderer.render(cameras[i], Drawing::depth))
-                          : renderer.render(cameras[i], Drawing::median_depth).median_depth;
-        pinholes.cut(i, seen);
-        return seen;
-    });
-    const mesh::DepthOfView depth = [&](size_t i) -> const Image& { return cache.at(i); };
-    const mesh::FusionOptions fusion = fusion_options(arguments);
-    mesh::Fused fused = mesh::fuse(cameras, depth, fusion, done);
-    scene::TriangleMesh& made = fused.mesh;
-    if (made.triangles.empty())
-        throw InputError(
-            fmt::format("no surface is as large as {:g} voxels of {:.3g}; take a smaller --voxel", kLeastPart,
-                        fused.voxel));
-    mesh::set_normals(made);
-    if (!arguments.collision)
-        mesh::set_colors(
-            made, cameras, depth, [&](size_t i) { return renderer.render(cameras[i]).color; },
-            [&](const glm::dvec3& at) { return mesh::kTruncation * fused.voxel_at(at); },
-            [&](size_t views) { done(2 * cameras.size() + views); });
-    note_coarse_voxels(fused, arguments, progress);
-    place(fused, placement);
+    const mesh::SceneMeshOptions made_as{.voxel = arguments.voxel,
+                                         .triangles = size_t(arguments.triangles),
+                                         .mean_depth = at_mean_depth(arguments, run),
+                                         .unbounded = arguments.unbounded,
+                                         .collision = arguments.collision,
+                                         .placement = placement};
+    Progress progress("meshed", int(mesh::steps_of_mesh(pinholes, made_as)), "views", arguments.quiet);
+    const mesh::SceneMesh made =
+        mesh::mesh_of_scene(renderer, pinholes, made_as, [&](size_t steps) { progress.update(int(steps)); });
+    if (!made.note.empty()) progress.note(made.note);
     make_folder(arguments.output.parent_path());
-    mesh::save_mesh(arguments.output, made, up.value_or(glm::dvec3(0, -1, 0)));
-    print(fused, arguments, fusion.most_triangles, progress);
+    mesh::save_mesh(arguments.output, made.fused.mesh, up.value_or(glm::dvec3(0, -1, 0)));
+    print(made.fused, arguments, made.most_triangles, progress);
     return 0;
 }
 

@@ -17,8 +17,9 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Where the library is, from the folder of the program or libewa: installed, for programs and for libewa; in
-/// a build tree, for programs and tests. LD_LIBRARY_PATH and the working folder do not count.
-constexpr const char* kFolders[] = {EWA_MODULES_FROM_PROGRAMS, "ewa", "modules", "../modules"};
+/// a build tree, for programs, tests and the Python package. LD_LIBRARY_PATH and the working folder do not count.
+constexpr const char* kFolders[] = {EWA_MODULES_FROM_PROGRAMS, "ewa", "modules", "../modules",
+                                    "../../modules"};
 
 /// The shared library that has this function, or else the program. Without symbolic links.
 fs::path own_file() {

@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The edits of ewa convert between reading and writing.
+// Edits of a whole scene as people name them: those of ewa convert, but for what it removes (cleaning.h).
 #pragma once
-#include <CLI/CLI.hpp>
-
-#include <filesystem>
 #include <glm/mat4x4.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "ewa/splat_files.h"
+#include "ewa/splat_scene.h"
 
-namespace ewa::cli {
+namespace ewa::scene {
 
 /// How many splats to leave: a number, or a part of those that are there.
 struct Decimation {
@@ -22,7 +19,7 @@ struct Decimation {
 struct Edits {
     glm::dmat4 transform{1.0};
     int max_sh = kMaxShDegree;
-    std::optional<Decimation> decimation;
+    std::optional<Decimation> decimation = {};
     bool morton = false;
 };
 
@@ -31,21 +28,9 @@ struct Edits {
 /// step.
 glm::dmat4 parse_transform(const std::vector<std::string>& steps, const std::string& what = "--transform");
 
-/// --transform. of: what it moves.
-void add_transform_option(CLI::App& app, std::vector<std::string>& steps, const std::string& of);
-
 /// Parses --scale-to, "x,y,z,X,Y,Z,LENGTH". Returns the factor by which the scene grows about the world's origin, so that the two points
 /// are LENGTH apart after `transform` and it. Throws InputError.
 double parse_scale_to(const std::string& text, const glm::dmat4& transform = glm::dmat4(1.0));
-
-struct PlacedInput {
-    std::filesystem::path file;
-    glm::dmat4 transform{1.0};
-};
-
-/// Parses an input with its own steps: FILE, FILE:STEP or FILE:STEP:STEP. A path that exists is a file, whatever its
-/// name. Throws InputError for a step that is none.
-PlacedInput parse_input(const std::string& text);
 
 /// Transforms the splats. Throws InputError, which begins with `what`, if fewer of them could be drawn afterwards.
 void place_splats(Gaussians& gaussians, const glm::dmat4& matrix, const std::string& what);
@@ -62,4 +47,4 @@ size_t left_of(size_t count, const Decimation& decimation);
 /// splat undrawable.
 std::vector<std::string> apply_edits(Gaussians& gaussians, const Edits& edits, SplatFormat format);
 
-}  // namespace ewa::cli
+}  // namespace ewa::scene

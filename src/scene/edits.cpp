@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "cli/convert_edits.h"
+#include "scene/edits.h"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -7,14 +7,13 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
-#include <sstream>
 
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "scene/splat_arrays.h"
 
-namespace ewa::cli {
+namespace ewa::scene {
 namespace {
 
 /// what: the option or the file that has the step.
@@ -69,6 +68,7 @@ glm::dmat4 turn(const glm::dvec3& axis, double degrees) {
 }
 
 glm::dmat4 parse_step(const std::string& what, const std::string& step) {
+    if (step.empty()) refuse(what, step);
     const size_t equals = step.find('=');
     if (equals == std::string::npos) return parse_matrix(what, step);
     const std::string name = step.substr(0, equals);
@@ -94,17 +94,6 @@ glm::dmat4 parse_transform(const std::vector<std::string>& steps, const std::str
     return matrix;
 }
 
-void add_transform_option(CLI::App& app, std::vector<std::string>& steps, const std::string& of) {
-    app.add_option("--transform", steps,
-                   of + ": move=x,y,z, turn=x,y,z,degrees, scale=s, or a matrix of 12 or 16 numbers, "
-                        "row by row. Repeat the option for several steps, applied in order. Axes are those "
-                        "of a PLY: y down, z forward")
-        ->type_name("STEP")
-        ->expected(1)
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-        ->take_all();
-}
-
 double parse_scale_to(const std::string& text, const glm::dmat4& transform) {
     const std::vector<double> n = parse_numbers("--scale-to", text);
     if (n.size() != 7)
@@ -115,21 +104,6 @@ double parse_scale_to(const std::string& text, const glm::dmat4& transform) {
     if (!(n[6] > 0 && std::isfinite(factor) && factor > 0))
         throw InputError("--scale-to: '" + text + "' needs two points that differ, and a length above 0");
     return factor;
-}
-
-PlacedInput parse_input(const std::string& text) {
-    std::error_code error;
-    if (std::filesystem::exists(text, error)) return {text};
-    for (size_t colon = text.find(':'); colon != std::string::npos; colon = text.find(':', colon + 1)) {
-        const std::string file = text.substr(0, colon);
-        if (!std::filesystem::exists(file, error)) continue;
-        std::vector<std::string> steps;
-        std::istringstream rest(text.substr(colon + 1));
-        for (std::string step; std::getline(rest, step, ':');) steps.push_back(step);
-        if (steps.empty()) refuse(file, "");
-        return {file, parse_transform(steps, file)};
-    }
-    return {text};
 }
 
 void place_splats(Gaussians& gaussians, const glm::dmat4& matrix, const std::string& what) {
@@ -195,4 +169,4 @@ std::vector<std::string> apply_edits(Gaussians& gaussians, const Edits& edits, S
     return remarks;
 }
 
-}  // namespace ewa::cli
+}  // namespace ewa::scene
