@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dataset.h"
+#include "inputs.h"
 
-#include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
@@ -19,8 +18,8 @@
 #include "cameras.h"
 #include "core/typing.h"
 #include "errors.h"
+#include "images.h"
 #include "options.h"
-#include "png.h"
 
 namespace ewa::python {
 namespace {
@@ -61,11 +60,6 @@ Images some_images(const Images& images, const nb::slice& key) {
 
 using DatasetState = std::tuple<std::filesystem::path, int, int, bool, int, int>;
 
-LoadedDataset opened(const std::filesystem::path& path, const DatasetOptions& options) {
-    auto dataset = std::make_shared<Dataset>(with_files([&] { return load_dataset(path, options); }));
-    return {std::move(dataset), std::filesystem::absolute(path), options};
-}
-
 DatasetState pickled(const LoadedDataset& data) {
     return {data.path,
             data.options.downscale,
@@ -77,11 +71,11 @@ DatasetState pickled(const LoadedDataset& data) {
 
 LoadedDataset opened(const DatasetState& state) {
     const auto& [path, downscale, masks, need_images, max_width, lens] = state;
-    return opened(path, {.downscale = downscale,
-                         .masks = MaskUse(masks),
-                         .lens = LensUse(lens),
-                         .need_images = need_images,
-                         .max_width = max_width});
+    return open_dataset(path, {.downscale = downscale,
+                               .max_width = max_width,
+                               .masks = MaskUse(masks),
+                               .lens = LensUse(lens),
+                               .need_images = need_images});
 }
 
 // Where a rolling shutter begins, and the pose at its end.
@@ -177,19 +171,16 @@ Frame frame_of(const FrameState& state) {
             .kept = {}};
 }
 
-MaskUse mask_use(const std::string& word) {
-    return asked_for("masks", word).masks;
-}
-
-void open_dataset(LoadedDataset* self, const std::filesystem::path& path, int downscale,
-                  const std::string& masks, bool need_images, int max_width, const std::string& lens) {
-    if (downscale < 1) throw InputError("downscale is less than 1");
-    if (max_width < 0) throw InputError("max_width is less than 0");
-    new (self) LoadedDataset(opened(path, {.downscale = downscale,
-                                           .masks = mask_use(masks),
-                                           .lens = asked_for("lens", lens).lens,
-                                           .need_images = need_images,
-                                           .max_width = max_width}));
+void make_dataset(LoadedDataset* self, const std::filesystem::path& path, std::optional<int> downscale,
+                  const std::optional<std::string>& masks, bool need_images, std::optional<int> max_width,
+                  const std::optional<std::string>& lens) {
+    AskedDataset asked{
+        .downscale = downscale, .max_width = max_width, .masks = {}, .lens = {}, .need_images = need_images};
+    if (downscale && *downscale < 1) throw InputError("downscale is less than 1");
+    if (max_width && *max_width < 0) throw InputError("max_width is less than 0");
+    if (masks) asked.masks = asked_for("masks", *masks).masks;
+    if (lens) asked.lens = asked_for("lens", *lens).lens;
+    new (self) LoadedDataset(open_dataset(path, asked));
 }
 
 std::vector<Camera> cameras(const LoadedDataset& data) {
@@ -210,15 +201,20 @@ nb::ndarray<nb::numpy, uint8_t> colors(const LoadedDataset& data) {
     return to_numpy(std::move(values), {data.dataset->points.colors.size(), 3});
 }
 
-std::pair<std::vector<int>, std::vector<int>> split(const LoadedDataset& data, int test_every) {
-    if (test_every < 0) throw InputError("test_every is negative");
-    Split parts = split_frames(*data.dataset, test_every);
+std::pair<std::vector<int>, std::vector<int>> split(const LoadedDataset& data,
+                                                    std::optional<int> test_every) {
+    if (test_every && *test_every < 0) throw InputError("test_every is negative");
+    Split parts = split_frames(*data.dataset, test_every.value_or(data.test_every));
     return {std::move(parts.train), std::move(parts.test)};
 }
 
+/// For people.
+std::string place_of(const LoadedDataset& data) {
+    return (data.archived ? data.path : data.dataset->root).string();
+}
+
 std::string dataset_text(const LoadedDataset& data) {
-    return "Dataset('" + data.dataset->root.string() + "', " +
-           core::counted(data.dataset->frames.size(), "frame") + ")";
+    return "Dataset('" + place_of(data) + "', " + core::counted(data.dataset->frames.size(), "frame") + ")";
 }
 
 void bind_frame(nb::module_& module) {
@@ -274,7 +270,7 @@ void bind_frame(nb::module_& module) {
         .def("__repr__",
              [](const Images& images) {
                  return "Images(" + core::counted(images.frames.size(), "image") + " of '" +
-                        images.data.dataset->root.string() + "')";
+                        place_of(images.data) + "')";
              })
         .def(
             "__getstate__",
@@ -294,34 +290,21 @@ void bind_frame(nb::module_& module) {
 
 }  // namespace
 
-std::vector<int> frames_of(nb::handle value, const Dataset& dataset, const char* name) {
-    const Array<int64_t> array(value, name, {any('m')});
-    const auto count = int64_t(dataset.frames.size());
-    std::vector<int> frames;
-    for (const int64_t index : array.values()) {
-        if (index < 0 || index >= count)
-            throw nb::index_error((std::string(name) + " has the index " + std::to_string(index) +
-                                   "; the dataset has " + core::counted(uint64_t(count), "frame"))
-                                      .c_str());
-        frames.push_back(int(index));
-    }
-    return frames;
-}
-
 void bind_dataset(nb::module_& module) {
     bind_frame(module);
     nb::class_<LoadedDataset>(module, "Dataset",
                               "Images with cameras, and the points that they were reconstructed from.")
-        .def("__init__", open_dataset, nb::arg("path"), nb::kw_only(), nb::arg("downscale") = 1,
-             nb::arg("masks") = "auto", nb::arg("need_images") = true, nb::arg("max_width") = 0,
-             nb::arg("lens") = "auto",
-             nb::sig(
-                 "def __init__(self, path: str | os.PathLike[str], *, downscale: int = 1, "
-                 "masks: typing.Literal['auto', 'ignore', 'cut', 'none'] = 'auto', need_images: bool = True, "
-                 "max_width: int = 0, lens: typing.Literal['auto', 'native', 'undistort'] = 'auto') "
-                 "-> None"),
-             "Reads a COLMAP model or transforms.json: a folder, or the file. need_images False reads only "
-             "cameras. Raises "
+        .def("__init__", make_dataset, nb::arg("path"), nb::kw_only(), nb::arg("downscale") = nb::none(),
+             nb::arg("masks") = nb::none(), nb::arg("need_images") = true, nb::arg("max_width") = nb::none(),
+             nb::arg("lens") = nb::none(),
+             nb::sig("def __init__(self, path: str | os.PathLike[str], *, downscale: int | None = None, "
+                     "masks: typing.Literal['auto', 'ignore', 'cut', 'none'] | None = None, "
+                     "need_images: bool = True, max_width: int | None = None, "
+                     "lens: typing.Literal['auto', 'native', 'undistort'] | None = None) -> None"),
+             "Reads a COLMAP model, transforms.json or cameras of another program: a folder, the file, or a "
+             "zip archive. "
+             "The folder of a training run stands for its dataset, read as the run did where nothing else is "
+             "given, with the cameras that it refined. need_images False reads only cameras. Raises "
              "InputError.")
         .def_prop_ro("root", [](const LoadedDataset& d) { return d.dataset->root; })
         .def_prop_ro(
@@ -348,8 +331,10 @@ void bind_dataset(nb::module_& module) {
                      nb::for_getter(nb::sig("def point_colors(self) -> numpy.typing.NDArray[numpy.uint8]")),
                      "[m, 3]")
         .def_prop_ro("missing_images", [](const LoadedDataset& d) { return d.dataset->missing_images; })
-        .def("split", split, nb::arg("test_every") = 8,
-             "The indices of the training frames and of those held out, as ewa train chooses them.")
+        .def("split", split, nb::arg("test_every") = nb::none(),
+             "The indices of the training frames and of those held out, as ewa train chooses them: every "
+             "eighth unless given, or "
+             "as the run did.")
         .def("__len__", [](const LoadedDataset& d) { return d.dataset->frames.size(); })
         .def("__repr__", dataset_text)
         .def(

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <string>
+#include <type_traits>
 
 #include "ewa/error.h"
 
@@ -16,12 +17,28 @@ std::string spelled(const char* text);
 /// Issues a Python warning. Throws python_error if it is to be an error.
 void warn(PyObject* category, const std::string& text);
 
-/// Calls work without the interpreter. Its RunError, which is of the disk, becomes OSError.
+/// Keeps what libewa says (ewa/log.h) for say_log.
+void keep_log();
+/// Issues as Python's warnings what libewa has said since. Its threads may say it where the interpreter is not free, and where nothing
+/// may throw. Throws python_error if a warning is to be an error.
+void say_log();
+
+/// Calls work without the interpreter. Then says what it had to say. Its RunError, which is of the disk, becomes OSError.
 template <class Work>
 auto with_files(const Work& work) {
-    try {
+    const auto run = [&] {
         const nanobind::gil_scoped_release released;
         return work();
+    };
+    try {
+        if constexpr (std::is_void_v<decltype(work())>) {
+            run();
+            say_log();
+        } else {
+            auto result = run();
+            say_log();
+            return result;
+        }
     } catch (const RunError& error) {
         PyErr_SetString(PyExc_OSError, spelled(error.what()).c_str());
         throw nanobind::python_error();

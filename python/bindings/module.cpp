@@ -38,11 +38,14 @@ NB_MODULE(_native, module) {
     module.attr("__version__") = EWA_VERSION;
     nb::set_leak_warnings(false);  // an exception's traceback may keep objects until the process ends
     nb::register_exception_translator(translate);
+    ewa::python::keep_log();
     ewa::python::bind_device(module);
     ewa::python::bind_splats(module);
     ewa::python::bind_images(module);
     ewa::python::bind_render(module);
     ewa::python::bind_dataset(module);
+    ewa::python::bind_metrics(module);
+    ewa::python::bind_capture(module);
     ewa::python::bind_train(module);
     ewa::python::bind_operators(module);
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "options.h"
 
+#include <nanobind/stl/string.h>
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -65,6 +67,14 @@ Footprint kernel_of(const LookArguments& arguments, const Splats& splats) {
 }
 
 }  // namespace
+
+std::string list_text(nb::handle value) {
+    if (nb::isinstance<nb::str>(value)) return nb::cast<std::string>(value);
+    std::string text;
+    for (const nb::handle number : value)
+        text.append(text.empty() ? "" : ",").append(nb::repr(nb::float_(nb::cast<double>(number))).c_str());
+    return text;
+}
 
 RunOptions asked_for(const char* name, const std::string& text) {
     RunOptions options;

@@ -29,6 +29,9 @@ auto of_argument(const char* name, const Function& function) {
     }
 }
 
+/// Numbers separated by commas, as the command line takes them. Text stays.
+std::string list_text(nanobind::handle value);
+
 /// The usual options with this one, which is named as on the command line. Throws InputError.
 RunOptions asked_for(const char* name, const std::string& text);
 

@@ -17,8 +17,9 @@
 #include "device.h"
 #include "errors.h"
 #include "ewa/error.h"
+#include "images.h"
+#include "inputs.h"
 #include "options.h"
-#include "png.h"
 
 namespace ewa::python {
 namespace {
@@ -130,7 +131,9 @@ class SceneRenderer {
             std::make_unique<Renderer>(work.device(), fitted_to(options_.kernel, splats, fitted), options_));
     }
 
-    void replace(const Splats& splats) {
+    void replace(const ObjectOrPath<Splats>& given) {
+        const Opened<Splats> opened(given, open_splats);
+        const Splats& splats = *opened;
         splats_ = splats.gaussians.size();
         const DeviceWork work;
         Gaussians fitted;
@@ -191,13 +194,13 @@ class SceneRenderer {
     OnDevice<Renderer> renderer_;
 };
 
-Renders render(const Splats& splats, nb::handle viewmats, nb::handle intrinsics, int width, int height,
-               nb::handle background, const std::string& mode, const std::string& camera_model,
+Renders render(const ObjectOrPath<Splats>& splats, nb::handle viewmats, nb::handle intrinsics, int width,
+               int height, nb::handle background, const std::string& mode, const std::string& camera_model,
                nb::object distortion, const std::string& rolling_shutter, nb::object viewmats_end,
                std::optional<bool> antialias, std::optional<std::string> kernel,
                const std::string& integrator, std::optional<int> samples, bool points,
                std::optional<int> nearest, int sh_degree) {
-    return SceneRenderer(splats,
+    return SceneRenderer(*Opened<Splats>(splats, open_splats),
                          {antialias, std::move(kernel), integrator, samples, points, nearest, sh_degree})
         .render(viewmats, intrinsics, width, height, background, mode, camera_model, std::move(distortion),
                 rolling_shutter, std::move(viewmats_end));
@@ -275,18 +278,20 @@ void bind_render(nb::module_& module) {
         module, "Renderer", "A scene on the device, for more than one call of render(). Threads take turns.")
         .def(
             "__init__",
-            [](SceneRenderer* self, const Splats& splats, std::optional<bool> antialias,
+            [](SceneRenderer* self, const ObjectOrPath<Splats>& splats, std::optional<bool> antialias,
                std::optional<std::string> kernel, const std::string& integrator, std::optional<int> samples,
                bool points, std::optional<int> nearest, int sh_degree) {
                 new (self) SceneRenderer(
-                    splats, {antialias, std::move(kernel), integrator, samples, points, nearest, sh_degree});
+                    *Opened<Splats>(splats, open_splats),
+                    {antialias, std::move(kernel), integrator, samples, points, nearest, sh_degree});
             },
             "splats"_a, nb::kw_only(), "antialias"_a = nb::none(), "kernel"_a = nb::none(),
             "integrator"_a = "splat", "samples"_a = nb::none(), "points"_a = false, "nearest"_a = nb::none(),
             "sh_degree"_a = kMaxShDegree,
-            nb::sig("def __init__(self, splats: Splats, *, " EWA_SCENE_TYPES ") -> None"),
+            nb::sig("def __init__(self, splats: " EWA_SPLATS_TYPE ", *, " EWA_SCENE_TYPES ") -> None"),
             "Uploads a copy of the splats.")
         .def("replace", &SceneRenderer::replace, "splats"_a,
+             nb::sig("def replace(self, splats: " EWA_SPLATS_TYPE ") -> None"),
              "Uploads other splats, with the kernels that there are.")
         .def("render", &SceneRenderer::render, "viewmats"_a, "Ks"_a.none(), "width"_a, "height"_a,
              nb::kw_only(), "background"_a = nb::make_tuple(0, 0, 0), "mode"_a = "color",
@@ -299,7 +304,8 @@ void bind_render(nb::module_& module) {
                "viewmats_end"_a = nb::none(), "antialias"_a = nb::none(), "kernel"_a = nb::none(),
                "integrator"_a = "splat", "samples"_a = nb::none(), "points"_a = false,
                "nearest"_a = nb::none(), "sh_degree"_a = kMaxShDegree,
-               nb::sig("def render(splats: Splats, " EWA_CAMERA_TYPES ", " EWA_SCENE_TYPES ") -> Renders"),
+               nb::sig("def render(splats: " EWA_SPLATS_TYPE ", " EWA_CAMERA_TYPES ", " EWA_SCENE_TYPES
+                       ") -> Renders"),
                kRenderHelp);
 }
 

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -14,6 +13,7 @@
 #include "ewa/dataset.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
+#include "inputs.h"
 
 namespace ewa::python {
 namespace {
@@ -141,13 +141,6 @@ Splats join(const nb::args& parts) {
     return all;
 }
 
-Splats load(const std::filesystem::path& path) {
-    SplatScene scene = with_files([&] { return read_splats(path); });
-    for (const std::string& remark : scene.remarks)
-        warn(PyExc_UserWarning, spelled((path.string() + ": " + remark).c_str()));
-    return {std::move(scene.gaussians), scene.antialiased, std::move(scene.comments)};
-}
-
 std::vector<std::string> save(const std::filesystem::path& path, const Splats& splats,
                               const std::vector<std::string>& comments, std::optional<bool> antialiased,
                               int spz_version) {
@@ -234,8 +227,9 @@ void bind_class(nb::module_& module) {
 
 void bind_splats(nb::module_& module) {
     bind_class(module);
-    module.def("load", load, nb::arg("path"),
-               "Reads splats of any format that ewa reads. Contents of the file that are skipped are "
+    module.def("load", open_splats, nb::arg("path"),
+               "Reads splats of any format that ewa reads, or those of a training run by its folder. "
+               "Contents of the file that are skipped are "
                "warnings. Raises "
                "InputError that names the file and the place.");
     module.def(

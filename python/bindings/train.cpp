@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
@@ -13,18 +12,25 @@
 
 #include "arrays.h"
 #include "bindings.h"
+#include "core/folders.h"
 #include "core/json.h"
+#include "core/text.h"
 #include "core/typing.h"
-#include "dataset.h"
 #include "device.h"
 #include "errors.h"
 #include "ewa/evaluation.h"
+#include "ewa/run_observer.h"
 #include "ewa/splat_edit.h"
 #include "ewa/trainer.h"
+#include "inputs.h"
+#include "live/run_inputs.h"
+#include "metrics.h"
 #include "options.h"
+#include "report/run_file_names.h"
 #include "run/option_table.h"
 #include "run/resume.h"
 #include "run/run_input.h"
+#include "run/scout.h"
 #include "train/checkpoint.h"
 #include "train_options.h"
 
@@ -33,16 +39,12 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Every which frame is held out unless frames are given.
-int usual_test_every() {
-    return RunOptions().test_every;
-}
-
 /// What a training begins with.
 struct TrainerStart {
     SharedDataset dataset;
-    RunOptions run = usual_options();  // with a concrete strategy and SH degree
-    std::vector<int> frames;
+    std::optional<train::Masks> masks = {};  // of robust=True, where they are known
+    RunOptions run = usual_options();        // with a concrete strategy and SH degree
+    std::vector<int> frames = {};
     bool own_start = false;  // the first splats are an argument
 
     void resolve_options() {
@@ -58,32 +60,81 @@ struct TrainerStart {
     }
 };
 
-Gaussians first_splats(const TrainerStart& start, const Splats* init, const std::string& word) {
-    if (!init) {
-        RunOptions run = start.run;
-        run.init = word;
-        return train::initial_splats(run, *start.dataset, start.frames);
+/// The argument init.
+struct FirstSplats {
+    const Splats* given = nullptr;
+    std::string word = "sfm";  // without `given`: as RunOptions::init
+
+    explicit FirstSplats(nb::handle init) {
+        if (init.is_none()) return;
+        if (nb::isinstance<Splats>(init)) {
+            given = &nb::cast<const Splats&>(init);
+            return;
+        }
+        std::filesystem::path path;
+        if (!nb::try_cast(init, path)) throw nb::type_error("init is neither Splats nor a path");
+        word = path.string();
+        if (train::starts_by_word(word)) return;
+        std::error_code ignored;
+        if (!std::filesystem::exists(path, ignored))
+            throw InputError(
+                "init is neither splats nor \"sfm\", \"stereo\" or \"random\", and there is no file " +
+                core::one_line(word));
+        word = std::filesystem::absolute(live::splat_input(path).file).string();
     }
-    Gaussians splats = init->gaussians;
-    set_sh_degree(splats, start.run.train.sh_degree);
-    return splats;
+
+    Gaussians splats(const TrainerStart& start) const {
+        if (!given) {
+            RunOptions run = start.run;
+            run.init = word;
+            return train::initial_splats(run, *start.dataset, start.frames);
+        }
+        Gaussians splats = given->gaussians;
+        set_sh_degree(splats, start.run.train.sh_degree);
+        return splats;
+    }
+};
+
+/// A signal ends the scout of robust=True.
+struct EndedBySignals : RunObserver {
+    bool should_stop() override {
+        check_signals();
+        return false;
+    }
+};
+
+/// Masks what single images show and the others do not. Finds the masks if they are not known. Returns why there are none, if so.
+std::string leave_out_passers_by(TrainerStart& start, const Gaussians& splats, const DeviceWork& work) {
+    train::RunInput input;
+    input.options = start.run;
+    input.dataset = *start.dataset;
+    input.split = start.split();
+    input.start = splats;
+    EndedBySignals observer;
+    const bool known = start.masks.has_value();
+    const std::string note = train::leave_out_passers_by(work.device(), input, start.masks, &observer);
+    start.masks = train::masks_of(input);
+    const bool masked = std::ranges::any_of(*start.masks, [](const Image& mask) { return mask.width > 0; });
+    auto kept = std::make_shared<std::pair<Dataset, SharedDataset>>(std::move(input.dataset), start.dataset);
+    start.dataset = SharedDataset(kept, &kept->first);
+    return known || masked ? "" : note;
 }
 
 /// ewa.Trainer
 class Training {
   public:
-    Training(TrainerStart start, nb::handle init) : start_(std::move(start)) {
-        const Splats* given = nb::isinstance<Splats>(init) ? &nb::cast<const Splats&>(init) : nullptr;
-        if (!given && !init.is_none() && !nb::isinstance<nb::str>(init))
-            throw nb::type_error("init is neither Splats nor text");
-        const std::string word = given ? "" : init.is_none() ? "sfm" : nb::cast<std::string>(init);
-        if (!given && word != "sfm" && word != "stereo" && word != "random")
-            throw InputError("init is neither splats nor \"sfm\", \"stereo\" or \"random\"");
-        start_.own_start = given;
-        word_ = word;
-        const DeviceWork work;
-        trainer_ = OnDevice(std::make_unique<Trainer>(work.device(), *start_.dataset, start_.frames,
-                                                      first_splats(start_, given, word), start_.run.train));
+    Training(TrainerStart start, const FirstSplats& first) : start_(std::move(start)), word_(first.word) {
+        start_.own_start = first.given;
+        std::string unmasked;
+        {
+            const DeviceWork work;
+            Gaussians splats = first.splats(start_);
+            if (start_.run.robust) unmasked = leave_out_passers_by(start_, splats, work);
+            trainer_ = OnDevice(std::make_unique<Trainer>(work.device(), *start_.dataset, start_.frames,
+                                                          std::move(splats), start_.run.train));
+        }
+        say_log();
+        if (!unmasked.empty()) warn(PyExc_UserWarning, spelled(unmasked.c_str()));
     }
 
     StepReport step() {
@@ -133,6 +184,7 @@ class Training {
         settings["fields"] = options_json(start_.run);
         settings["train_frames"] = start_.frames;
         settings["init"] = start_.own_start ? "splats" : word_;
+        if (start_.masks) settings[train::kMasksSetting] = train::fingerprint_of(*start_.masks);
         TrainerState state = [this] {
             const DeviceWork work;
             return trainer_->state();
@@ -167,23 +219,28 @@ class Training {
 };
 
 TrainerStart start_of(const LoadedDataset& dataset) {
-    TrainerStart start{dataset.dataset, {}, {}};
+    TrainerStart start{.dataset = dataset.dataset};
     start.run.downscale = dataset.options.downscale;
     return start;
 }
 
-void start_training(Training* self, const LoadedDataset& dataset, nb::handle init, nb::handle train_frames,
+void start_training(Training* self, const ObjectOrPath<LoadedDataset>& given, nb::handle init,
+                    nb::handle train_frames, const std::optional<std::string>& quality,
                     const nb::kwargs& options) {
-    TrainerStart start = start_of(dataset);
+    const Opened<LoadedDataset> dataset(given, open_dataset);
+    TrainerStart start = start_of(*dataset);
+    if (quality)
+        start.run.train.steps =
+            of_argument("quality", [&] { return core::value_of(train::kQualities, *quality); });
     for (const auto& [name, value] : options) set_option(start.run, nb::cast<std::string>(name), value);
-    start.frames = train_frames.is_none() ? split_frames(*dataset.dataset, usual_test_every()).train
-                                          : frames_of(train_frames, *dataset.dataset, "train_frames");
+    start.frames = train_frames.is_none() ? split_frames(*dataset->dataset, dataset->test_every).train
+                                          : frames_of(train_frames, *dataset->dataset, "train_frames");
     check_options(start.run);
-    const bool from_points =
-        init.is_none() || (nb::isinstance<nb::str>(init) && nb::cast<std::string>(init) == "sfm");
+    const FirstSplats first(init);
+    const bool from_points = !first.given && first.word == "sfm";
     if (!from_points && start.run.train.halvings == kAutomaticHalvings) start.run.train.halvings = 0;
     start.resolve_options();
-    new (self) Training(std::move(start), init);
+    new (self) Training(std::move(start), first);
 }
 
 /// The options and the training frames that a checkpoint was written with, of this package or of ewa train.
@@ -214,10 +271,8 @@ void read_settings(const Json& settings, TrainerStart& start) {
         throw InputError(
             "was written with --rolling-shutter, which Python does not have; ewa train --resume continues "
             "it");
-    if (run.robust)
-        throw InputError(
-            "was written with --robust, which Python does not have; ewa train --resume continues it");
     start.run.train = run.train;
+    start.run.robust = run.robust;
     start.run.dense_start = run.dense_start;
     start.run.init_opacity = run.init_opacity;
     start.run.init_scale = run.init_scale;
@@ -234,10 +289,26 @@ std::string other_dataset(const Json& settings, const TrainerStart& start) {
     return "is of another dataset, or its images or cameras have changed";
 }
 
-Training resume(const std::filesystem::path& path, const LoadedDataset& dataset, nb::handle init,
+/// The masks of a checkpoint with this fingerprint of them: none, or those that ewa train wrote beside it. Empty: they are to be found
+/// again.
+std::optional<train::Masks> known_masks(const std::filesystem::path& checkpoint, const TrainerStart& start,
+                                        const Json& fingerprint) {
+    train::Masks none(start.frames.size());
+    if (fingerprint == train::fingerprint_of(none)) return none;
+    train::RunInput input;
+    input.options.output = checkpoint.parent_path();
+    if (!core::is_folder(input.options.output / report::kPassersByFolder)) return std::nullopt;
+    input.dataset = *start.dataset;
+    input.split = start.split();
+    return train::saved_masks(input);
+}
+
+Training resume(const std::filesystem::path& named, const ObjectOrPath<LoadedDataset>& given, nb::handle init,
                 std::optional<int> steps) {
+    const auto path = core::is_folder(named) ? named / report::kCheckpointFile : named;
     const train::Checkpoint checkpoint = with_files([&] { return train::read_checkpoint(path); });
-    TrainerStart start = start_of(dataset);
+    const Opened<LoadedDataset> dataset(given, open_dataset);
+    TrainerStart start = start_of(*dataset);
     Json settings;
     try {
         settings = core::parse_json<Json>(checkpoint.settings, "its settings");
@@ -245,7 +316,7 @@ Training resume(const std::filesystem::path& path, const LoadedDataset& dataset,
     } catch (const InputError& error) {
         throw InputError(path.string() + ": " + error.what());
     }
-    if (settings.value("dataset", Json()) != train::dataset_fingerprint(*dataset.dataset, start.split()))
+    if (settings.value("dataset", Json()) != train::dataset_fingerprint(*dataset->dataset, start.split()))
         throw InputError(path.string() + ": " + other_dataset(settings, start));
     const Json begun = settings.value("init", Json("sfm"));
     if (begun == "splats" && init.is_none())
@@ -256,25 +327,37 @@ Training resume(const std::filesystem::path& path, const LoadedDataset& dataset,
     start.resolve_options();
     const nb::object first =
         init.is_none() ? nb::cast(begun.is_string() ? begun.get<std::string>() : "sfm") : nb::borrow(init);
-    Training training(std::move(start), first);
+    if (run.robust)
+        start.masks = with_files(
+            [&] { return known_masks(path, start, settings.value(train::kMasksSetting, Json())); });
+    Training training(std::move(start), FirstSplats(first));
+    const auto& masks = training.start().masks;
+    if (masks && settings.value(train::kMasksSetting, Json()) != train::fingerprint_of(*masks))
+        throw InputError(path.string() + ": its masks of robust=True are not those that are found now");
     training.restore(path, checkpoint.state);
     return training;
 }
 
-Evaluation evaluate_splats(const Splats& splats, const LoadedDataset& dataset, nb::handle frames,
+Evaluation evaluate_splats(const ObjectOrPath<Splats>& given_splats,
+                           const ObjectOrPath<LoadedDataset>& given_dataset, nb::handle frames,
+                           nb::handle metrics, const std::optional<std::filesystem::path>& lpips_weights,
                            nb::handle background, std::optional<bool> antialias,
                            std::optional<std::string> kernel, const std::string& integrator,
                            std::optional<int> samples, bool points, std::optional<int> nearest) {
-    std::vector<int> chosen = frames.is_none() ? split_frames(*dataset.dataset, usual_test_every()).test
-                                               : frames_of(frames, *dataset.dataset, "frames");
+    const Measures measures{.meter = meter_of(metrics, lpips_weights)};
+    const Opened<LoadedDataset> dataset(given_dataset, open_dataset);
+    const Opened<Splats> splats(given_splats, open_splats);
+    std::vector<int> chosen = frames.is_none() ? split_frames(*dataset->dataset, dataset->test_every).test
+                                               : frames_of(frames, *dataset->dataset, "frames");
     if (chosen.empty()) throw InputError("frames is empty: there is nothing to evaluate");
     RenderOptions options =
-        look_of({antialias, std::move(kernel), integrator, samples, points, nearest}, splats);
+        look_of({antialias, std::move(kernel), integrator, samples, points, nearest}, *splats);
     use_background(options, background);
     Gaussians fitted;
-    const Gaussians& gaussians = fitted_to(options.kernel, splats, fitted);
+    const Gaussians& gaussians = fitted_to(options.kernel, *splats, fitted);
     const DeviceWork work;
-    return evaluate(work.device(), gaussians, *dataset.dataset, chosen, options, {}, check_signals);
+    return evaluate(work.device(), gaussians, *dataset->dataset, chosen, options, {}, check_signals,
+                    measures);
 }
 
 std::string report_text(const StepReport& report) {
@@ -322,19 +405,28 @@ void bind_results(nb::module_& module) {
             .def_ro("name", &EvalFrame::name)
             .def_ro("psnr", &EvalFrame::psnr, "dB")
             .def_ro("ssim", &EvalFrame::ssim)
+            .def_prop_ro(
+                "metrics", [](const EvalFrame& f) { return figures_dict(f.psnr, f.ssim, f.figures); },
+                nb::for_getter(nb::sig("def metrics(self) -> dict[str, float]")),
+                "All that was measured, under the names of docs/figures.md.")
             .def("__repr__", [](const EvalFrame& f) {
                 return "EvalFrame('" + f.name + "', psnr=" + std::to_string(f.psnr) +
                        ", ssim=" + std::to_string(f.ssim) + ")";
             });
     bind_pickle(
-        frame, [](const EvalFrame& f) { return std::tuple(f.name, f.psnr, f.ssim); },
-        [](std::string name, double psnr, double ssim) {
-            return EvalFrame{.name = std::move(name), .psnr = psnr, .ssim = ssim, .figures = {}};
+        frame, [](const EvalFrame& f) { return std::tuple(f.name, f.psnr, f.ssim, pickled(f.figures)); },
+        [](std::string name, double psnr, double ssim, const FigureState& figures) {
+            return EvalFrame{
+                .name = std::move(name), .psnr = psnr, .ssim = ssim, .figures = figures_of(figures)};
         });
     auto evaluation =
         nb::class_<Evaluation>(module, "Evaluation", "How close renders are to a dataset's images.")
             .def_ro("psnr", &Evaluation::psnr, "dB, the mean over the frames.")
             .def_ro("ssim", &Evaluation::ssim, "The mean over the frames.")
+            .def_prop_ro(
+                "metrics", [](const Evaluation& e) { return figures_dict(e.psnr, e.ssim, e.figures); },
+                nb::for_getter(nb::sig("def metrics(self) -> dict[str, float]")),
+                "The means of all that was measured, under the names of docs/figures.md.")
             .def_ro("frames", &Evaluation::frames)
             .def_ro("seconds", &Evaluation::seconds)
             .def("__repr__", [](const Evaluation& e) {
@@ -342,29 +434,38 @@ void bind_results(nb::module_& module) {
                        ", " + core::counted(e.frames.size(), "frame") + ")";
             });
     bind_pickle(
-        evaluation, [](const Evaluation& e) { return std::tuple(e.psnr, e.ssim, e.frames, e.seconds); },
-        [](double psnr, double ssim, std::vector<EvalFrame> frames, double seconds) {
-            return Evaluation{
-                .psnr = psnr, .ssim = ssim, .figures = {}, .frames = std::move(frames), .seconds = seconds};
+        evaluation,
+        [](const Evaluation& e) {
+            return std::tuple(e.psnr, e.ssim, pickled(e.figures), e.frames, e.seconds);
+        },
+        [](double psnr, double ssim, const FigureState& figures, std::vector<EvalFrame> frames,
+           double seconds) {
+            return Evaluation{.psnr = psnr,
+                              .ssim = ssim,
+                              .figures = figures_of(figures),
+                              .frames = std::move(frames),
+                              .seconds = seconds};
         });
 }
 
 void bind_trainer(nb::module_& module) {
     using namespace nb::literals;
     const std::string init =
-        "def __init__(self, dataset: Dataset, *, init: Splats | typing.Literal['sfm', 'random'] | None = "
-        "None, "
-        "train_frames: collections.abc.Sequence[int] | None = None" +
+        "def __init__(self, dataset: " EWA_DATASET_TYPE
+        ", *, init: Splats | typing.Literal['sfm', 'stereo', 'random'] | str | os.PathLike[str] | None = "
+        "None, train_frames: collections.abc.Sequence[int] | None = None, "
+        "quality: typing.Literal['low', 'medium', 'high'] | None = None" +
         option_parameters() + ") -> None";
     nb::class_<Training>(
         module, "Trainer",
         "Trains splats on the images of a dataset. Iterating takes the steps: for report in trainer.")
-        .def("__init__", start_training, "dataset"_a, nb::kw_only(), "init"_a = nb::none(),
-             "train_frames"_a = nb::none(), "options"_a, nb::sig(init.c_str()),
-             "init: the first splats; \"sfm\", the usual, takes the dataset's points, or random ones if "
-             "there are none. "
-             "train_frames: all but every eighth frame unless given. docs/training.md explains the other "
-             "options.")
+        .def(
+            "__init__", start_training, "dataset"_a, nb::kw_only(), "init"_a = nb::none(),
+            "train_frames"_a = nb::none(), "quality"_a = nb::none(), "options"_a, nb::sig(init.c_str()),
+            "init: the first splats, a file of splats or points, or the folder of a run; \"sfm\", the "
+            "usual, takes the dataset's points. "
+            "train_frames: all but every eighth frame unless given. quality: low is 2000 steps, medium 7000, "
+            "high the usual 30000; steps goes before it. docs/training.md explains the other options.")
         .def(
             "__iter__", [](nb::handle self) { return nb::borrow(self); },
             nb::sig("def __iter__(self) -> Trainer"))
@@ -383,10 +484,11 @@ void bind_trainer(nb::module_& module) {
         .def_static(
             "resume", resume, "path"_a, "dataset"_a, nb::kw_only(), "init"_a = nb::none(),
             "steps"_a = nb::none(),
-            nb::sig(
-                "def resume(path: str | os.PathLike[str], dataset: Dataset, *, init: Splats | None = None, "
-                "steps: int | None = None) -> Trainer"),
-            "Continues from a checkpoint of this class or of ewa train, with its options. On the same device "
+            nb::sig("def resume(path: str | os.PathLike[str], dataset: " EWA_DATASET_TYPE
+                    ", *, init: Splats | str | os.PathLike[str] | None = None, steps: int | None = None) -> "
+                    "Trainer"),
+            "Continues from a checkpoint of this class or of ewa train, or from that of a run's folder, with "
+            "its options. On the same device "
             "the bytes are "
             "those of an uninterrupted training. init: the splats that the training began with, if it was "
             "given some. "
@@ -412,17 +514,21 @@ void bind_train(nb::module_& module) {
     bind_trainer(module);
     module.attr("_argument_names") = argument_names();
     module.attr("_value_words") = value_words();
-    module.def(
-        "evaluate", evaluate_splats, "splats"_a, "dataset"_a, "frames"_a = nb::none(), nb::kw_only(),
-        "background"_a = nb::make_tuple(0, 0, 0), "antialias"_a = nb::none(), "kernel"_a = nb::none(),
-        "integrator"_a = "splat", "samples"_a = nb::none(), "points"_a = false, "nearest"_a = nb::none(),
-        nb::sig("def evaluate(splats: Splats, dataset: Dataset, frames: collections.abc.Sequence[int] | None "
-                "= None, "
-                "*, background: numpy.typing.ArrayLike | str = (0, 0, 0), " EWA_LOOK_TYPES ") "
-                "-> Evaluation"),
-        "Renders frames and compares each with its image: every eighth frame unless given, those that "
-        "Trainer leaves "
-        "out. Ctrl-C ends it.");
+    module.def("evaluate", evaluate_splats, "splats"_a, "dataset"_a, "frames"_a = nb::none(), nb::kw_only(),
+               "metrics"_a = nb::tuple(), "lpips_weights"_a = nb::none(),
+               "background"_a = nb::make_tuple(0, 0, 0), "antialias"_a = nb::none(), "kernel"_a = nb::none(),
+               "integrator"_a = "splat", "samples"_a = nb::none(), "points"_a = false,
+               "nearest"_a = nb::none(),
+               nb::sig("def evaluate(splats: " EWA_SPLATS_TYPE ", dataset: " EWA_DATASET_TYPE
+                       ", frames: collections.abc.Sequence[int] | None = None, *, "
+                       "metrics: str | collections.abc.Sequence[str] = (), "
+                       "lpips_weights: str | os.PathLike[str] | None = None, background: "
+                       "numpy.typing.ArrayLike | str = (0, 0, 0), " EWA_LOOK_TYPES ") "
+                       "-> Evaluation"),
+               "Renders frames and compares each with its image: every eighth frame unless given, those that "
+               "Trainer leaves "
+               "out. metrics: names of docs/figures.md that are measured beside PSNR and SSIM; \"all\" names "
+               "all. Ctrl-C ends it.");
 }
 
 }  // namespace ewa::python

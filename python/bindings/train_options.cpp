@@ -77,14 +77,8 @@ nb::object region_value(const RunOptions& options) {
 }
 
 void set_region(RunOptions& options, nb::handle value) {
-    std::string text;
-    if (nb::isinstance<nb::str>(value)) {
-        text = nb::cast<std::string>(value);
-    } else {
-        for (const double number : nb::cast<std::array<double, 6>>(value))
-            text += (text.empty() ? "" : ",") + number_text(nb::float_(number));
-    }
-    train::run_option("region").set(options, text);
+    if (!nb::isinstance<nb::str>(value)) nb::cast<std::array<double, 6>>(value);  // throws
+    train::run_option("region").set(options, list_text(value));
 }
 
 /// Python's unit of memory is the byte.

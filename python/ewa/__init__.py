@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """3D Gaussian splatting on any Vulkan device, a plain CPU included. docs/python.md describes the package."""
 
+from . import _native
 from ._errors import DeviceError, InputError
 from ._native import (
     Dataset,
@@ -18,14 +19,20 @@ from ._native import (
     current_device,
     devices,
     evaluate,
+    find_cameras,
     join,
     load,
     load_image,
+    metrics,
     render,
     save,
     save_image,
     set_device,
 )
+from ._signatures import add_signatures
+
+add_signatures(_native)
+del add_signatures
 
 __all__ = [
     "Dataset",
@@ -45,9 +52,11 @@ __all__ = [
     "current_device",
     "devices",
     "evaluate",
+    "find_cameras",
     "join",
     "load",
     "load_image",
+    "metrics",
     "render",
     "save",
     "save_image",

@@ -29,6 +29,12 @@ _ADVICE = (
     ("--resume continues a training run", "Trainer.resume continues from a checkpoint"),
     ("a larger --test-every leaves more of them", "name some as train_frames="),
     ("with --transform move=", "by their means and origin"),
+    ("with convert --crop", "with crop"),
+    ("ewa cameras searches", "ewa.find_cameras searches"),
+)
+# Python's unit of memory is the byte.
+_MEMORY = re.compile(
+    r"--device-memory \S+ is too little: this needs \S+ or more \((\d+) bytes, not (\d+)\)"
 )
 _OPTION = re.compile(r"--([a-z][a-z-]*[a-z])(?: (?:(\d[\d.]*(?<!\.))|([a-z]+))(?![\w-]))?")
 
@@ -36,16 +42,19 @@ _OPTION = re.compile(r"--([a-z][a-z-]*[a-z])(?: (?:(\d[\d.]*(?<!\.))|([a-z]+))(?
 def spelled(text: str) -> str:
     """An error of libewa with Python's arguments in place of the programs' options.
 
-    `--bands 2` becomes `bands=2`, and `--max-splats` becomes `max_splats=`.
+    `--bands 2` becomes `bands=2`, `--max-splats` becomes `max_splats=`, and `--crop:` becomes `crop:`.
     """
     native = vars(sys.modules["ewa._native"])  # that module imports this one
     names, values = native["_argument_names"], native["_value_words"]
     for words, advice in _ADVICE:
         text = text.replace(words, advice)
+    text = _MEMORY.sub(r"device_memory_bytes=\2 is too little: this needs \1 or more", text)
 
     def argument(found: re.Match[str]) -> str:
         option, number, word = found.groups()
         name = names.get(option, option.replace("-", "_"))
+        if found.string.startswith(":", found.end()) and not number and not word:
+            return name
         value = number or (f'"{word}"' if word in values else "")
         return f"{name}={value}" + (f" {word}" if word and not value else "")
 
@@ -168,7 +177,7 @@ def _takes(annotation: ast.expr, kind: str) -> bool:
             return True
         if base == "Literal" and kind in {type(value).__name__ for value in _literals(choice)}:
             return True
-        if base == "PathLike" and kind not in _SCALARS and kind != "bytes":
+        if base == "PathLike" and "Path" in kind:
             return True
         if base in ("Sequence", "list", "tuple") and kind not in _SCALARS:
             return True

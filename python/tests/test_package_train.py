@@ -206,7 +206,6 @@ def test_the_cap_is_chosen_and_kept(still_life, tmp_path):
     "options, error, message",
     [
         ({"stepz": 3}, TypeError, "Trainer has no option stepz; did you mean steps?"),
-        ({"robust": True}, TypeError, "Trainer has no option robust; ewa train has it"),
         ({"skip_blurred": True}, TypeError, "Trainer has no option skip_blurred; ewa train has it"),
         ({"steps": 0}, ewa.InputError, "steps=0: '0' is not a whole number from 1 to "),
         ({"steps": 1.5}, ewa.InputError, "steps=1.5: '1.5' is not a whole number"),
@@ -223,7 +222,7 @@ def test_the_cap_is_chosen_and_kept(still_life, tmp_path):
             IndexError,
             "train_frames has the index 48; the dataset has 48 frames",
         ),
-        ({"max_splats": 10}, ewa.InputError, "3000 splats"),
+        ({"max_splats": 10, "init": make_splats(11)}, ewa.InputError, "11 splats"),
         ({"max_splats": 0}, ewa.InputError, "max_splats=0: '0' is not a whole number from 1 to"),
         ({"max_splats": "many"}, TypeError, "max_splats='many' is of the wrong type"),
         ({"init": make_splats(2).means}, TypeError, ""),
@@ -371,3 +370,63 @@ def test_evaluation_is_that_of_the_command_line(still_life, command_line_run, pr
         ewa.evaluate(splats, still_life, [])
     with pytest.raises(IndexError, match="frames has the index -1"):
         ewa.evaluate(splats, still_life, [-1])
+
+
+def test_quality_stands_for_steps(still_life):
+    for quality, steps in (("low", 2000), ("medium", 7000), ("high", 30000)):
+        assert ewa.Trainer(still_life, quality=quality, max_splats=3000).steps == steps
+    assert ewa.Trainer(still_life, quality="low", steps=5).steps == 5
+    with pytest.raises(ewa.InputError, match="quality: .*did you mean low"):
+        ewa.Trainer(still_life, quality="lwo")
+
+
+def test_a_limit_of_memory_is_an_error_in_bytes(still_life):
+    with pytest.raises(ewa.DeviceError, match="device_memory_bytes=2 is too little: this needs ") as e:
+        ewa.Trainer(still_life, device_memory_bytes=2)
+    needed = int(re.search(r"needs (\d+) or more", str(e.value))[1])
+    assert needed > 1000 and "--" not in str(e.value)
+
+
+@pytest.fixture(scope="module")
+def passers_by(still_life, tmp_path_factory):
+    """The still life in small images, three of which show a block that the others do not."""
+    folder = tmp_path_factory.mktemp("passers_by")
+    shutil.copytree(still_life.root, folder, dirs_exist_ok=True)
+    for index in (5, 20, 33):
+        frame = still_life.frames[index]
+        image = still_life.images[index].copy()
+        image[40:110, 60:130, :3] = (1, 0, 1)
+        ewa.save_image(folder / "images" / frame.name, image)
+    return ewa.Dataset(folder, downscale=4)
+
+
+def test_robust_trainings_are_those_of_the_command_line(passers_by, program, tmp_path):
+    options = dict(steps=252, robust=True, max_splats=3000, seed=2)
+    words = ["--steps=252", "--robust", "--max-splats=3000", "--seed=2", "--appearance=none"]
+    program("train", passers_by.root, "-o", tmp_path / "run", "--downscale=4", *words)
+    masks = sorted(path.name for path in (tmp_path / "run/passers_by").rglob("*.png"))
+    assert masks
+    trainer = ewa.Trainer(passers_by, **options)
+    for _ in range(250):
+        trainer.step()
+    trainer.save_checkpoint(tmp_path / "half.ewa")
+    splats = trained(trainer)
+    assert same(splats, ewa.load(tmp_path / "run"))
+    assert same(trained(ewa.Trainer.resume(tmp_path / "half.ewa", passers_by)), splats)
+    # The command line keeps the masks beside its checkpoint.
+    again = ewa.Trainer.resume(tmp_path / "run", passers_by, steps=253)
+    assert again.options["robust"] and again.steps_done == 252
+    again.step()
+    shutil.rmtree(tmp_path / "run/passers_by")
+    (tmp_path / "run/passers_by").mkdir()
+    with pytest.raises(ewa.InputError, match="its masks of robust=True are not those"):
+        ewa.Trainer.resume(tmp_path / "run", passers_by, steps=253)
+
+
+def test_short_robust_trainings_mask_nothing(passers_by, tmp_path):
+    with pytest.warns(UserWarning, match="robust: nothing is masked, since 6 steps show too little"):
+        trainer = ewa.Trainer(passers_by, steps=6, robust=True, max_splats=3000)
+    trainer.step()
+    trainer.save_checkpoint(tmp_path / "short.ewa")
+    again = ewa.Trainer.resume(tmp_path / "short.ewa", passers_by, steps=600)
+    assert same(again.splats(), trainer.splats())

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The types that the stubs state."""
 
+import importlib.util
 import inspect
 import pathlib
 import subprocess
@@ -49,6 +50,18 @@ length: str = len(ewa.load("a.ply"))
 """
 
 
+def code_of(document):
+    """The Python of a document, in its order, with what its comments say goes before."""
+    spec = importlib.util.spec_from_file_location("commands", ROOT / "tests/docs/commands.py")
+    commands = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(commands)
+    parts = []
+    for _, language, body, comments in commands.blocks_of(document.read_text()):
+        if language == "python":
+            parts += [text for kind, _, text in comments if kind == "first"] + body
+    return "\n".join(parts) + "\n"
+
+
 def mypy(*arguments):
     words = [
         sys.executable,
@@ -69,7 +82,13 @@ def checked(tmp_path_factory):
     folder = tmp_path_factory.mktemp("types")
     (folder / "user.py").write_text(USER)
     (folder / "wrong.py").write_text(WRONG)
-    return mypy(folder / "user.py", folder / "wrong.py", ROOT / "examples/python/render_ply.py")
+    documents = []
+    for document in sorted((ROOT / "docs").glob("python*.md")):
+        documents.append(folder / f"{document.stem}_document.py")
+        documents[-1].write_text(code_of(document))
+    assert len(documents) == 2
+    example = ROOT / "examples/python/render_ply.py"
+    return mypy(folder / "user.py", folder / "wrong.py", example, *documents)
 
 
 def test_a_users_script_has_its_types(checked):
@@ -91,6 +110,38 @@ def test_the_stub_names_what_the_module_has():
     for name in ewa.__all__:
         if not name.startswith("_") and not name.endswith("Error"):
             assert f"def {name}(" in stub or f"class {name}:" in stub, name
+
+
+def test_everything_public_has_a_signature():
+    known = {}
+    for name in ewa.__all__:
+        value = getattr(ewa, name)
+        if callable(value) and not isinstance(value, type):
+            known[name] = inspect.signature(value)
+        elif isinstance(value, type):
+            known[name] = inspect.signature(value)
+            for member, method in vars(value).items():
+                if not member.startswith("_") and callable(method):
+                    known[f"{name}.{member}"] = inspect.signature(method)
+    assert len(known) > 40
+    assert list(known["load"].parameters) == ["path"]
+    render = known["render"].parameters
+    assert list(render)[:5] == ["splats", "viewmats", "Ks", "width", "height"]
+    assert render["mode"].kind is inspect.Parameter.KEYWORD_ONLY
+    assert render["background"].default == (0, 0, 0) and render["width"].annotation == "int"
+    trainer = known["Trainer"].parameters
+    assert list(trainer)[0] == "dataset" and trainer["steps"].default == 30000
+    assert "'stereo'" in trainer["init"].annotation and known["Trainer"].bind("photos", steps=3)
+    assert list(known["Trainer.step"].parameters) == ["self"]
+    assert list(known["Trainer.resume"].parameters)[0] == "path"
+    splats = ewa.Splats.from_points([[0, 0, 0]], [[0, 0, 0]], 0)
+    assert list(inspect.signature(ewa.Renderer(splats).replace).parameters) == ["splats"]
+
+    class Own(ewa.Splats):
+        def __init__(self, path): ...
+
+    assert list(inspect.signature(Own).parameters) == ["path"]
+    assert list(inspect.signature(type("Same", (ewa.Renderer,), {})).parameters)[0] == "splats"
 
 
 def test_everything_public_has_a_docstring():

@@ -293,8 +293,9 @@ RunError Device::out_of_memory(uint64_t bytes) const {
             return core::shown_number(std::ceil(1e4 * value / double(uint64_t(1) << 30)) / 1e4);
         };
         return RunError("--device-memory " + shown(double(limit)) + " is too little: this needs " +
-                        shown(least) +
-                        " or more; --downscale, a smaller --image-cache or fewer splats need less");
+                        shown(least) + " or more (" + std::to_string(uint64_t(std::ceil(least))) +
+                        " bytes, not " + std::to_string(limit) +
+                        "); --downscale, a smaller --image-cache or fewer splats need less");
     }
     return RunError("out of device memory on " + info_.name + ": " + core::address_limit_text() +
                     std::to_string(bytes >> 20) + " MiB are needed beside the " +

@@ -377,7 +377,7 @@ std::vector<Row> rows() {
          later_flag("skip-blurred", "Do not train on images that are blurred far more than the others",
                     [](RunOptions& o) -> bool& { return o.skip_blurred; })},
         {"Data", "", weigh_blurred_option()},
-        {"Data", "",
+        {"Data", "robust",
          later_flag("robust",
                     "Mask what single images show and the others do not, such as people who pass by. A short "
                     "training first finds it; DIR/passers_by has the masks",

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "inputs.h"
+
+#include "arrays.h"
+#include "core/typing.h"
+#include "errors.h"
+#include "ewa/capture.h"
+#include "ewa/run_options.h"
+#include "ewa/splat_files.h"
+#include "io/datasets/refined_cameras.h"
+#include "live/run_inputs.h"
+
+namespace ewa::python {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A dataset, and what keeps its files.
+struct KeptDataset {
+    Dataset dataset;
+    std::shared_ptr<const void> files = {};
+};
+
+DatasetOptions options_of(const AskedDataset& asked, const std::optional<live::Run>& run) {
+    DatasetOptions options = run ? live::dataset_options_of(*run) : DatasetOptions();
+    options.downscale = asked.downscale.value_or(options.downscale);
+    options.max_width = asked.max_width.value_or(options.max_width);
+    options.masks = asked.masks.value_or(options.masks);
+    options.lens = asked.lens.value_or(options.lens);
+    options.need_images = asked.need_images;
+    return options;
+}
+
+int test_every_of(const std::optional<live::Run>& run) {
+    const nlohmann::json none;
+    const nlohmann::json& value =
+        run && run->config.contains("test-every") ? run->config["test-every"] : none;
+    return value.is_number_unsigned() ? value.get<int>() : RunOptions().test_every;
+}
+
+}  // namespace
+
+LoadedDataset open_dataset(const fs::path& path, const AskedDataset& asked) {
+    return with_files([&] {
+        const std::optional<live::Run> run = live::run_named(path);
+        LoadedDataset opened{nullptr, fs::absolute(path), options_of(asked, run), test_every_of(run)};
+        const fs::path named = run ? live::dataset_of(*run) : path;
+        opened.archived = is_archive(named);
+        auto kept = std::make_shared<KeptDataset>();
+        const auto read = [&](const fs::path& folder) {
+            kept->dataset = load_dataset(folder, opened.options);
+        };
+        if (opened.archived)
+            kept->files = read_archive(named, read);
+        else
+            read(named);
+        const fs::path refined = run ? live::refined_cameras_of(*run) : fs::path();
+        if (!refined.empty()) io::use_refined_cameras(kept->dataset, refined);
+        opened.dataset = SharedDataset(kept, &kept->dataset);
+        return opened;
+    });
+}
+
+Splats open_splats(const fs::path& path) {
+    SplatScene scene = with_files([&] { return read_splats(live::splat_input(path).file); });
+    for (const std::string& remark : scene.remarks)
+        warn(PyExc_UserWarning, spelled((path.string() + ": " + remark).c_str()));
+    return {std::move(scene.gaussians), scene.antialiased, std::move(scene.comments)};
+}
+
+std::vector<int> frames_of(nb::handle value, const Dataset& dataset, const char* name) {
+    const Array<int64_t> array(value, name, {any('m')});
+    const auto count = int64_t(dataset.frames.size());
+    std::vector<int> frames;
+    for (const int64_t index : array.values()) {
+        if (index < 0 || index >= count)
+            throw nb::index_error((std::string(name) + " has the index " + std::to_string(index) +
+                                   "; the dataset has " + core::counted(uint64_t(count), "frame"))
+                                      .c_str());
+        frames.push_back(int(index));
+    }
+    return frames;
+}
+
+}  // namespace ewa::python
