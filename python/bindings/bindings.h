@@ -17,6 +17,7 @@ void bind_render(nanobind::module_& module);
 void bind_dataset(nanobind::module_& module);
 void bind_metrics(nanobind::module_& module);
 void bind_capture(nanobind::module_& module);
+void bind_mesh(nanobind::module_& module);
 void bind_train(nanobind::module_& module);
 void bind_operators(nanobind::module_& module);
 

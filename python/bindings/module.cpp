@@ -46,6 +46,7 @@ NB_MODULE(_native, module) {
     ewa::python::bind_dataset(module);
     ewa::python::bind_metrics(module);
     ewa::python::bind_capture(module);
+    ewa::python::bind_mesh(module);
     ewa::python::bind_train(module);
     ewa::python::bind_operators(module);
 }

@@ -9,11 +9,15 @@
 
 #include "arrays.h"
 #include "bindings.h"
+#include "edits.h"
 #include "errors.h"
 #include "ewa/dataset.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
 #include "inputs.h"
+#include "options.h"
+#include "report/scene_output.h"
+#include "scene/edits.h"
 
 namespace ewa::python {
 namespace {
@@ -141,13 +145,50 @@ Splats join(const nb::args& parts) {
     return all;
 }
 
+/// Options that only some files have.
+struct FileArguments {
+    std::optional<int> levels;
+    bool gltf_spz = false, unbundled = false;
+    std::optional<std::string> title;
+    nb::handle geo;
+    std::optional<ObjectOrPath<LoadedDataset>> cameras;
+
+    report::OutputOptions options() const {
+        constexpr int kMostLevels = 32;
+        if (levels && (*levels < 1 || *levels > kMostLevels))
+            throw InputError("levels is not from 1 to " + std::to_string(kMostLevels));
+        return {.levels = levels.value_or(0),
+                .gltf_spz = gltf_spz,
+                .unbundled = unbundled,
+                .geo = geo.is_none() ? "" : list_text(geo),
+                .title = title.value_or("")};
+    }
+};
+
 std::vector<std::string> save(const std::filesystem::path& path, const Splats& splats,
                               const std::vector<std::string>& comments, std::optional<bool> antialiased,
-                              int spz_version) {
+                              int spz_version, const FileArguments& arguments) {
     if (spz_version != 3 && spz_version != 4) throw nb::value_error("spz_version is neither 3 nor 4");
-    const SaveOptions options{comments, antialiased.value_or(splats.antialiased), spz_version};
-    std::vector<std::string> remarks =
-        with_new_file(path, [&] { return save_splats(path, splats.gaussians, options); });
+    const report::OutputOptions options = arguments.options();
+    const report::SceneOutput output = report::output_of(path, options);
+    if (arguments.cameras && !output.page) throw InputError("cameras: only a page has views");
+    report::PageCameras page;
+    if (arguments.cameras)
+        page.dataset = *Opened<LoadedDataset>(*arguments.cameras, [](const std::filesystem::path& named) {
+                            return open_dataset(named, {.need_images = false});
+                        })->dataset;
+    SaveOptions save{comments, antialiased.value_or(splats.antialiased), spz_version};
+    save.gltf_spz = options.gltf_spz;
+    save.levels = options.levels;
+    std::vector<std::string> remarks = with_new_file(path, [&] {
+        if (!output.page && !output.tiles) return save_splats(path, splats.gaussians, save);
+        Gaussians written = splats.gaussians;
+        // As ewa convert: without splats that cannot be drawn, in the order of the format.
+        std::vector<std::string> lost = scene::apply_edits(written, {}, output.format);
+        for (std::string& line : report::write_output(output, options, written, save, page))
+            lost.push_back(std::move(line));
+        return lost;
+    });
     for (std::string& remark : remarks) remark = spelled(remark.c_str());
     return remarks;
 }
@@ -214,6 +255,7 @@ void bind_class(nb::module_& module) {
         [](Splats& s, bool density) { s.gaussians.density = density; },
         "Whether opacity_logits are those of the density kernel. Files keep it as .ply alone.");
     splats.def_ro("comments", &Splats::comments, "The comments of the file.");
+    bind_edits(splats);
     splats.def("__len__", [](const Splats& s) { return s.gaussians.size(); });
     splats.def("__getitem__", selected, nb::arg("key"),
                nb::sig("def __getitem__(self, key: object, /) -> Splats"));
@@ -233,13 +275,29 @@ void bind_splats(nb::module_& module) {
                "warnings. Raises "
                "InputError that names the file and the place.");
     module.def(
-        "save", save, nb::arg("path"), nb::arg("splats"), nb::kw_only(),
-        nb::arg("comments") = std::vector<std::string>(), nb::arg("antialiased") = nb::none(),
-        nb::arg("spz_version") = 3,
-        nb::sig("def save(path: str | os.PathLike[str], splats: Splats, *, comments: "
-                "collections.abc.Sequence[str] = (), antialiased: bool | None = None, spz_version: int = 3) "
-                "-> list[str]"),
-        "Writes splats in the format of the extension. A file is replaced as a whole, and missing folders "
+        "save",
+        [](const std::filesystem::path& path, const Splats& splats, const std::vector<std::string>& comments,
+           std::optional<bool> antialiased, int spz_version, bool gltf_spz, std::optional<int> levels,
+           std::optional<std::string> title, bool unbundled, nb::handle geo,
+           std::optional<ObjectOrPath<LoadedDataset>> cameras) {
+            return save(path, splats, comments, antialiased, spz_version,
+                        {levels, gltf_spz, unbundled, std::move(title), geo, std::move(cameras)});
+        },
+        nb::arg("path"), nb::arg("splats"), nb::kw_only(), nb::arg("comments") = std::vector<std::string>(),
+        nb::arg("antialiased") = nb::none(), nb::arg("spz_version") = 3, nb::arg("gltf_spz") = false,
+        nb::arg("levels") = nb::none(), nb::arg("title") = nb::none(), nb::arg("unbundled") = false,
+        nb::arg("geo") = nb::none(), nb::arg("cameras") = nb::none(),
+        nb::sig(
+            "def save(path: str | os.PathLike[str], splats: Splats, *, comments: "
+            "collections.abc.Sequence[str] = (), antialiased: bool | None = None, spz_version: int = 3, "
+            "gltf_spz: bool = False, levels: int | None = None, title: str | None = None, unbundled: bool "
+            "= False, geo: str | collections.abc.Sequence[float] | None = None, cameras: " EWA_DATASET_TYPE
+            " | None = None) -> list[str]"),
+        "Writes splats in the format of the extension, a page that shows them (.html), or 3D Tiles "
+        "(tileset.json). The options of ewa convert: levels of a lod-meta.json, .rad, tileset.json or "
+        "unbundled "
+        "page; title and unbundled of a page; geo of a tileset.json. cameras: a dataset whose cameras become "
+        "the views of a page. A file is replaced as a whole, and missing folders "
         "are "
         "made. Returns one line for "
         "each thing that "

@@ -7,6 +7,7 @@ The text is one line: what is wrong, where, and what would help. The extension m
 
 import ast
 import difflib
+import inspect
 import re
 import sys
 
@@ -20,6 +21,10 @@ class DeviceError(RuntimeError):
 
 
 InputError.__module__ = DeviceError.__module__ = "ewa"
+# Of an exception, Python's inspect knows no signature before 3.13.
+for _error in (InputError, DeviceError):
+    _arguments = [inspect.Parameter("args", inspect.Parameter.VAR_POSITIONAL)]
+    setattr(_error, "__signature__", inspect.Signature(_arguments))
 
 # What libewa advises to users of its programs, and the advice for Python.
 _ADVICE = (
@@ -31,6 +36,7 @@ _ADVICE = (
     ("with --transform move=", "by their means and origin"),
     ("with convert --crop", "with crop"),
     ("ewa cameras searches", "ewa.find_cameras searches"),
+    ("ewa mesh makes meshes: ewa mesh IN -o ", "ewa.mesh makes meshes, such as "),
 )
 # Python's unit of memory is the byte.
 _MEMORY = re.compile(

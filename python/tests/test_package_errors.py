@@ -178,10 +178,14 @@ COMMAND_LINE = {
     "lpips-weights",
     "metrics",
     "output",
+    "protocol",
     "resume",
     "rolling-shutter",
     "save-every",
+    "scale-to",
+    "serve",
     "skip-blurred",
+    "stereo",
     "test-every",
     "transform",
     "weigh-blurred",
@@ -194,13 +198,15 @@ def test_every_option_in_an_error_of_libewa_is_an_argument():
     for function in (
         ewa.render,
         ewa.save,
+        ewa.mesh,
         ewa.evaluate,
         ewa.Dataset.__init__,
         ewa.Trainer.__init__,
     ):
         known |= set(re.findall(r"(\w+):", function.__nb_signature__[0][0]))
+    known |= set(vars(ewa.Splats))
     found = {}
-    modules = "core image scene gpu io pipeline operators report live train run ranks portions".split()
+    modules = "core image scene gpu io pipeline operators report live mesh train run ranks portions".split()
     for path in (p for m in modules for p in (ROOT / "src" / m).rglob("*.cpp")):
         code = re.sub(r"//.*", "", path.read_text())
         for literal in re.findall(r'"(?:[^"\\\n]|\\.)*"', code):
@@ -227,7 +233,7 @@ def test_errors_of_training_name_arguments(still_life, tmp_path):
     for options, text in (
         (dict(bands=2, exposure=True), "bands= and exposure= exclude each other"),
         (dict(batch=2, refine_poses=True), "batch= and refine_poses= exclude each other"),
-        (dict(steps=5, max_splats=1), "max_splats=1"),
+        (dict(steps=5, max_splats=1, init=SPLATS), "max_splats=1"),
         (dict(train_frames=[]), "name some as train_frames="),
     ):
         with pytest.raises(ewa.InputError, match=text) as found:
