@@ -33,7 +33,7 @@ int trained_width(const live::Run& run, int downscale) try {
 void use_options_of(const live::Run& run, CLI::App& app, const fs::path& other) {
     const fs::path config = run.folder / "config.json";
     std::error_code none;
-    const bool elsewhere = !other.empty() && !fs::equivalent(other, run.dataset, none);
+    const bool elsewhere = !other.empty() && !fs::equivalent(dataset_input(other), run.dataset, none);
     for (const char* name : {"points", "nearest", "integrator", "kernel", "background", "loss", "downscale",
                              "max-width", "masks", "lens", "test-every"}) {
         const auto value = run.config.find(name);
