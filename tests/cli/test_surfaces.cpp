@@ -316,8 +316,8 @@ TEST(Mesh, OfAFisheye) {
     EXPECT_GT(farthest, 0.5) << "the corners see behind the camera";
     EXPECT_LT(farthest, 0.97) << "nothing sees straight behind";
     write_fisheye(64);
-    const Outcome coarse =
-        run_ewa({"mesh", folder / "shell.ply", "-o", folder / "m.ply", "--cameras", folder / "fish"});
+    const Outcome coarse = run_ewa({"mesh", folder / "shell.ply", "-o", folder / "m.ply", "--cameras",
+                                    folder / "fish", "--downscale", "2"});
     expect_success(coarse);
     EXPECT_NE(coarse.out.find("are coarse: the mesh is "), std::string::npos) << coarse.out;
     EXPECT_NE(coarse.out.find(" of them from corner to corner; --voxel 0.0"), std::string::npos)
