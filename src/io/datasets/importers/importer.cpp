@@ -13,7 +13,6 @@
 #include "ewa/error.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/json_field.h"
-#include "io/datasets/importers/reality_scan.h"
 
 namespace ewa::io {
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The importers of other programs' cameras, and how their files are recognised.
 #pragma once
+#include <array>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -76,6 +78,19 @@ void add_points_beside(const std::filesystem::path& folder, bool with_points, Im
 
 /// A note about `count` images of the file without a pose, if there are any.
 void note_unplaced(size_t count, ImageRecords& records);
+
+/// The columns that a table of RealityScan's cameras must have, by its names.
+inline constexpr std::array kCsvColumns{"name", "x", "y", "alt", "heading", "pitch", "roll", "f"};
+
+/// Indices of the columns, by RealityScan's names.
+using CsvColumns = std::map<std::string, size_t>;
+
+/// The line of a table that names its columns: the first one with a comma, a semicolon or a tabulator. A line "#cameras N" may be
+/// before it.
+std::string_view reality_scan_heading(std::string_view head);
+
+/// Other spellings, such as yaw for heading, have RealityScan's names. A name may occur twice: the first one counts.
+CsvColumns reality_scan_columns(std::string_view heading);
 
 ImageRecords import_open_sfm(const ImportSource& source);
 ImageRecords import_open_mvg(const ImportSource& source);

@@ -1,28 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the two files of RealityScan (once RealityCapture) have in common: a calibration in units of the image's larger side.
 #pragma once
-#include <array>
-#include <map>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "io/datasets/image_records.h"
 
 namespace ewa::io {
-
-/// The columns that a table of cameras must have, by RealityScan's names.
-inline constexpr std::array kCsvColumns{"name", "x", "y", "alt", "heading", "pitch", "roll", "f"};
-
-/// Indices of the columns, by RealityScan's names.
-using CsvColumns = std::map<std::string, size_t>;
-
-/// The line of a table that names its columns: the first one with a comma, a semicolon or a tabulator. A line "#cameras N" may be
-/// before it.
-std::string_view reality_scan_heading(std::string_view head);
-
-/// Other spellings, such as yaw for heading, have RealityScan's names. A name may occur twice: the first one counts.
-CsvColumns reality_scan_columns(std::string_view heading);
 
 struct RealityScanCalibration {
     double focal = 0;     // mm on film of 36 mm along the larger side
