@@ -67,7 +67,7 @@ void place(Fused& fused, const glm::dmat4& placement) {
 
 /// A line where nobody chose voxels that are too large to show the scene; else nothing.
 std::string coarse_voxels(const Fused& fused, const SceneMeshOptions& options) {
-    constexpr double kFew = 60, kMany = 200;  // voxels from corner to corner
+    constexpr double kFew = 80, kMany = 200;  // voxels from corner to corner
     if (options.voxel > 0 || options.collision) return {};
     glm::vec3 low(fused.mesh.positions.at(0)), high(low);
     for (const glm::vec3& p : fused.mesh.positions) {
@@ -117,9 +117,9 @@ SceneMesh mesh_of_scene(Renderer& renderer, const Pinholes& pinholes, const Scen
     SceneMesh made{fuse(cameras, depth, fusion, done), fusion.most_triangles, {}};
     scene::TriangleMesh& mesh = made.fused.mesh;
     if (mesh.triangles.empty())
-        throw InputError(
-            fmt::format("no surface is as large as {:g} voxels of {:.3g}; take a smaller --voxel", kLeastPart,
-                        made.fused.voxel));
+        throw InputError(fmt::format(
+            "no surface is as large as {:g} voxels of {:.3g}; take a smaller --voxel, such as {:.1g}",
+            kLeastPart, made.fused.voxel, made.fused.voxel / 8));
     set_normals(mesh);
     if (!options.collision)
         set_colors(

@@ -316,8 +316,8 @@ TEST(Mesh, OfAFisheye) {
     EXPECT_GT(farthest, 0.5) << "the corners see behind the camera";
     EXPECT_LT(farthest, 0.97) << "nothing sees straight behind";
     write_fisheye(64);
-    const Outcome coarse = run_ewa({"mesh", folder / "shell.ply", "-o", folder / "m.ply", "--cameras",
-                                    folder / "fish", "--downscale", "2"});
+    const Outcome coarse =
+        run_ewa({"mesh", folder / "shell.ply", "-o", folder / "m.ply", "--cameras", folder / "fish"});
     expect_success(coarse);
     EXPECT_NE(coarse.out.find("are coarse: the mesh is "), std::string::npos) << coarse.out;
     EXPECT_NE(coarse.out.find(" of them from corner to corner; --voxel 0.0"), std::string::npos)
@@ -337,6 +337,8 @@ TEST(Mesh, ErrorsAreOneLine) {
     expect_failure(mesh(folder, "m.stl"), 2, ".ply, .obj or .glb");
     expect_failure(mesh(folder, "m.ply", {"--voxel", "0"}), 2, "--voxel");
     expect_failure(mesh(folder, "m.ply", {"--voxel", "1e-9"}), 2, "--voxel");
+    expect_failure(mesh(folder, "m.ply", {"--voxel", "1"}), 2,
+                   "voxels of 1; take a smaller --voxel, such as 0.1");
     expect_failure(mesh(folder, "m.ply", {"--voxel", "50"}), 2, "--voxel");
     expect_failure(mesh(folder, "shell.ply"), 2, "SPLATS");
     expect_failure(run_ewa({"mesh", folder / "absent.ply", "-o", folder / "m.ply"}), 2, "absent.ply");

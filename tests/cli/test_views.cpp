@@ -148,7 +148,8 @@ TEST_F(Views, ThroughALens) {
     EXPECT_EQ(image("usual.jpg", {"--lens", "equirect"}).width, 2048);
     EXPECT_NE(read_file(folder / "usual.jpg").find("GPano:FullPanoWidthPixels=\"2048\""), std::string::npos);
 
-    EXPECT_EQ(image("depth.jpg", {"--mode", "depth", "--size", "30x20"}).width, 30) << "a grey JPEG";
+    EXPECT_EQ(image("depth.jpg", {"--mode", "depth", "--lens", "fisheye:200", "--size", "30x20"}).width, 30)
+        << "a grey JPEG";
 
     const Image fisheye = image("fisheye.png", {"--lens", "fisheye:200", "--size", "300x200"});
     const glm::dvec3 axis = glm::normalize(glm::dvec3(4, 0, -1));
