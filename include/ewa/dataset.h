@@ -121,7 +121,7 @@ struct DatasetOptions {
 
 /// Loads a dataset. There are four kinds of paths:
 /// - A folder with a COLMAP model (.bin or .txt, in sparse/0 and so on, sparse, the folder itself, or a workspace such as dense/0) and
-///   images. Of several models, the one with the most images counts.
+///   images. The model with the most images counts.
 /// - A folder with transforms.json, or with transforms_train.json and transforms_test.json.
 /// - A folder with the cameras of another program: Metashape, RealityScan, OpenSfM, OpenDroneMap, OpenMVG, Polycam or Record3D.
 /// - One of these files. src/io/datasets/transforms.cpp has the dialects, and src/io/datasets/importers/ the other formats.

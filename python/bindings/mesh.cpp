@@ -77,7 +77,7 @@ std::optional<live::Run> run_of(const ObjectOrPath<Splats>& splats) {
 
 using Cameras = std::optional<ObjectOrPath<LoadedDataset>>;
 
-/// Of the run, or those that are given; empty: neither. Frames without an image are skipped, as in training.
+/// Those that are given, or the cameras of the run; empty: neither. Frames without an image are skipped, as in training.
 std::optional<Dataset> cameras_of(const Cameras& cameras, const std::optional<live::Run>& run) {
     if (!cameras && !run) return std::nullopt;
     const Opened<LoadedDataset> opened(

@@ -72,7 +72,7 @@ TrainingImage load_training_image(const Frame& frame, const std::array<float, 3>
 std::string used_text(const Dataset& dataset) {
     std::string text;
     for (const UsedOf& kind : dataset.used) {
-        // Points and models are many or one, and seldom left out.
+        // Points and models are many or one, and nearly always used.
         const bool all = kind.used == kind.found && kind.what != "photo" && kind.what != "mask" &&
                          kind.what != "depth map";
         text += (text.empty() ? "" : ", ") + (all ? "" : std::to_string(kind.used) + " of ") +

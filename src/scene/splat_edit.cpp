@@ -150,7 +150,7 @@ void turn_general(Gaussians& gaussians, const glm::dmat3& linear) {
         float* log_scale = &gaussians.log_scales[3 * i];
         if (!drawable(gaussians, i)) continue;
         const glm::dmat3 rotation = glm::mat3_cast(glm::normalize(glm::dquat(q[0], q[1], q[2], q[3])));
-        // Of a splat that is flat along all axes, too.
+        // A splat may be flat along all axes.
         const double largest =
             std::max({log_scale[0], log_scale[1], log_scale[2], std::numeric_limits<float>::lowest()});
         glm::dmat3 factor = linear * rotation;

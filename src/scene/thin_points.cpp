@@ -9,7 +9,7 @@ namespace ewa::scene {
 namespace {
 
 constexpr size_t kRoomPerPoint = 4, kLeastRoom = 4096;
-// Of a cell's side. The largest are eight, which hold all that float32 can.
+// Powers of two that a cell's side can be. The eight cells of the largest side hold all that float32 can.
 constexpr int kFinest = -200, kCoarsest = 128;
 
 }  // namespace

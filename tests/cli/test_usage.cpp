@@ -106,7 +106,7 @@ INSTANTIATE_TEST_SUITE_P(
         WrongUse{{"train", "/nowhere", "--wings"}, "--wings"},
         WrongUse{{"convert", "a.ply", "b.ply", "--decimate", ""}, "--decimate: the value is empty"},
         WrongUse{{"convert", "a.ply", "b.ply", "--crop", ""}, "--crop: the value is empty"},
-        WrongUse{{"render", "a.ply", "--device="}, "--device: the value is empty"},
+        WrongUse{{"render", "a.ply", "--device="}, "--device needs a value"},
         WrongUse{{"train", "/nowhere", "--init", ""}, "--init: the value is empty"},
         WrongUse{{"info", ""}, "the value is empty"},
         WrongUse{{"train", "/nowhere", "--steps", "0"}, "--steps"},

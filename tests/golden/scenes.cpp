@@ -219,7 +219,8 @@ GoldenScene poisoned() {
         float* const spoilt[] = {&s.gaussians.means[3 * at + i % 3], &s.gaussians.quaternions[4 * at + i % 4],
                                  &s.gaussians.log_scales[3 * at + i % 3], &s.gaussians.opacity_logits[at],
                                  &s.gaussians.sh[s.gaussians.sh_stride() * at + i]};
-        *spoilt[i % 5] = i % 2 ? nan : std::numeric_limits<float>::infinity();
+        // An infinite opacity is drawn.
+        *spoilt[i % 5] = i % 2 || i % 5 == 3 ? nan : std::numeric_limits<float>::infinity();
     }
     return s;
 }

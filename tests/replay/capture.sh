@@ -41,7 +41,7 @@ row_N4_options_are_checked_before_colmap_starts() {
     a_colmap
     some_photos
     local options
-    for options in "--device nvidia" "--serve 99999" "--init nothere.ply" "--downscale 1000" "--test-every 1" "--max-splats 1" \
+    for options in "--device nvidia" "--serve 99999" "--init nothere.ply" "--downscale 1000" "--test-every 1" \
         "--frames 5" "--frames 0-3"; do
         # shellcheck disable=SC2086
         run 2 ewa train photos -o out $options

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The parts of a capture that need neither ffmpeg nor COLMAP.
 #include <cmath>
+#include <cstdlib>
 
 #include "capture/steps.h"
 #include "support/temp_folder.h"
@@ -104,8 +105,12 @@ TEST(CapturePhotos, AreTheImagesOfAFolder) {
         },
         {"has 2 photos", "at least 3", "1 photo cannot be used: c.jpg (it is empty)"});
     folder.write("c.HEIC", "anything");
+    // This machine may have a program that converts them.
+    const std::string path = getenv("PATH");
+    setenv("PATH", folder.path().c_str(), 1);
     test::expect_error<InputError>([&] { capture::photos_in(folder.path()); },
                                    {"1 photo is HEIC", "heif-convert"});
+    setenv("PATH", path.c_str(), 1);
 }
 
 /// images.bin and points3D.bin as COLMAP writes them: a point that both images see.

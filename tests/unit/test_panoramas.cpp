@@ -242,7 +242,7 @@ TEST_F(Rig, HasAllViewsOfAPhoto) {
     const std::map<std::string, Pose> poses{{"a.png", posed(turned, {1, 2, 3})},
                                             {"c.png", posed({1, 0, 0, 0}, {0, 1, 0})}};
     capture::write_rig(poses, views, folder_ / "rig", folder_ / "rig.json");
-    const io::ImageRecords written = io::read_colmap({folder_ / "rig"});
+    const io::ImageRecords written = io::read_colmap(io::colmap_model_in(folder_ / "rig"));
     EXPECT_EQ(written.images.size(), size_t(2 * kPanoramaViews));
     for (const io::ImageRecord& image : written.images) EXPECT_EQ(image.camera.fx, 10.0) << image.name;
     const capture::RigPoses again = capture::rig_poses(folder_ / "rig");
@@ -254,7 +254,7 @@ TEST_F(Rig, HasAllViewsOfAPhoto) {
     }
     view(0, "a.png", turned, {1, 2, 3});
     capture::join_views(poses, model(), photos, folder_ / "model");
-    const io::ImageRecords joined = io::read_colmap({folder_ / "model"});
+    const io::ImageRecords joined = io::read_colmap(io::colmap_model_in(folder_ / "model"));
     ASSERT_EQ(joined.images.size(), 2u);
     ASSERT_EQ(joined.points.positions.size(), 1u);
     for (const io::ImageRecord& image : joined.images) {

@@ -44,7 +44,7 @@ class ColmapBuilder {
                 result_.images[image->second].seen.push_back(uint32_t(result_.points.positions.size() - 1));
         return true;
     }
-    /// Of all points, times the scale.
+    /// The colours of all points, times the scale.
     void set_colors(const std::vector<std::array<float, 3>>& colors, float scale) {
         for (size_t i = 0; i < colors.size(); ++i)
             for (size_t k = 0; k < 3; ++k)
@@ -293,7 +293,7 @@ bool is_observations(std::string_view line) {
     return core::parse_number(last) && (words > kEnough || words % 3 == 0);
 }
 
-/// Calls `visit` at each line of an image. Some programs leave out the lines of observations, or the empty ones.
+/// Calls `visit` at each line of an image. Some programs write no lines of observations, or no empty ones.
 template <class Visit>
 void visit_text_images(Lines& lines, const Visit& visit) {
     for (bool more = lines.next_entry(); more;) {

@@ -103,7 +103,7 @@ ImageFinder image_finder(const ColmapModel& model) {
         add(model.originals, true, false);
     }
     if (model.folder != model.dataset) add_all(model.folder, false);
-    // Whoever names the model's own folder, or the sparse/ that it is in, means the images beside that.
+    // A path of the model's own folder, or of the sparse/ that it is in, means the images beside that.
     const fs::path sparse = entry_in(model.dataset, "sparse");
     if (model.folder != sparse && model.folder.parent_path() != sparse) {
         const fs::path whole = fs::absolute(model.dataset / "x").lexically_normal().parent_path();

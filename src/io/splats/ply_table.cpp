@@ -91,6 +91,8 @@ std::optional<PlyColors> find_colors(const std::filesystem::path& path, const Pl
         if (found < 3) continue;
         const PlyType type = element.properties[colors.columns[0]].type;
         if (type == PlyType::int8 || type == PlyType::uint8) return colors;
+        // Some programs let bytes run over a little. 16 bits have at least one value far beyond.
+        constexpr double kMostOfBytes = 1023;
         double largest = 0;
         PlyTable table(path);
         table.go_to(element.name);
@@ -99,7 +101,7 @@ std::optional<PlyColors> find_colors(const std::filesystem::path& path, const Pl
                 if (std::isfinite(row[k])) largest = std::max(largest, row[k]);
         });
         const bool real = type == PlyType::float32 || type == PlyType::float64;
-        colors.full = real && largest <= 1 ? 1 : largest <= 255 ? 255 : 65535;
+        colors.full = real && largest <= 1 ? 1 : largest <= kMostOfBytes ? 255 : 65535;
         return colors;
     }
     return std::nullopt;

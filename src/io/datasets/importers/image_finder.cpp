@@ -147,7 +147,7 @@ std::vector<fs::path> ImageFinder::matches(size_t place, const fs::path& name, b
     if (const auto there = exact(folder, name)) return {*there};
     const Listing& list = listing(place);
     const fs::path above = name.parent_path();
-    // Whoever removes an image from a folder does not want another of the same name from elsewhere.
+    // An image that was removed from its folder is not replaced by one of the same name from elsewhere.
     const bool there = strict || (!above.empty() && core::is_folder(folder / above));
     const auto look = [&](const auto& map, const fs::path& key) {
         std::vector<fs::path> found;

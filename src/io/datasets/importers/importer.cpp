@@ -86,7 +86,7 @@ bool begins_as_numpy(std::string_view head) {
     return head.starts_with("\x93NUMPY");
 }
 
-/// Of many keyframes, the cameras come far behind.
+/// The cameras come far behind the keyframes.
 bool begins_as_camera_path(std::string_view head) {
     return core::trim(head).starts_with('{') &&
            (holds(head, "\"camera_path\"") || holds(head, "\"keyframes\""));
