@@ -14,10 +14,10 @@ void check(const RenderOptions& options) {
     if (options.sh_degree < 0)
         throw InputError("the SH degree of a render is " + std::to_string(options.sh_degree) +
                          "; it can be 0 or more");
-    if (options.integrator == Integrator::march && (options.samples < 1 || options.samples > kMostSamples))
+    if (options.samples < 1 || options.samples > kMostSamples)
         throw InputError(std::to_string(options.samples) + " samples of a ray; it can have 1 to " +
                          std::to_string(kMostSamples));
-    if (options.points && (options.nearest < 1 || options.nearest > kMostNearest))
+    if (options.nearest < 1 || options.nearest > kMostNearest)
         throw InputError(std::to_string(options.nearest) + " spheres at a pixel; it can have 1 to " +
                          std::to_string(kMostNearest));
     if (options.sky) check(*options.sky);

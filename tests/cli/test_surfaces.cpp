@@ -65,6 +65,7 @@ size_t header_count(const std::string& bytes, const std::string& word) {
 TEST(Mesh, SignalsEndItInTheMiddleOfAStep) {
     const Prepared folder;
     for (const int signal : {SIGINT, SIGTERM}) {
+        std::filesystem::remove(folder / "held");
         Circumstances held = held_at(4, folder / "held", signal);
         held.then = [] {};
         const Outcome outcome = run_ewa({"mesh", folder / "shell.ply", "-o", folder / "out/m.ply",

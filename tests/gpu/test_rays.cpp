@@ -48,7 +48,7 @@ class RayChain : public testing::TestWithParam<RayCase>, protected ChainScene {
         ChainScene::operator=(
             chain_scene(c.seed, c.kind, c.splats, c.width, c.height, c.sh_degree, c.kernel));
         options.integrator = c.integrator;
-        options.samples = c.samples;
+        if (c.samples > 0) options.samples = c.samples;
     }
     /// 1000 times longer than wide, and nothing widens them: their own digits decide more.
     static bool has_needles() {
