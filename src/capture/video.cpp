@@ -39,7 +39,8 @@ struct Film {
 };
 
 std::vector<std::string> ffmpeg(const Film& film, const std::vector<std::string>& more) {
-    std::vector<std::string> words{"ffmpeg", "-nostdin", "-hide_banner", "-v", "error"};
+    // ffmpeg 4.2 repeats the first frames of a GIF unless its own times are passed over too.
+    std::vector<std::string> words{"ffmpeg", "-nostdin", "-hide_banner", "-v", "error", "-r", "25"};
     for (std::string& word : film_input(film.path)) words.push_back(std::move(word));
     // V: pictures that are no cover of a record.
     const int stream = film.info.stream;
