@@ -156,7 +156,7 @@ std::vector<fs::path> photos_in(const fs::path& folder) {
     if (const auto heif = std::ranges::count_if(files, is_heif); heif > 0 && !converts_heif())
         throw InputError(name + ": " + core::counted(uint64_t(heif), "photo") + " " +
                          std::string(core::is_or_are(uint64_t(heif))) +
-                         " HEIC or AVIF, and no program here reads them; heif-convert does "
+                         " HEIC or AVIF, and nothing here reads them; heif-convert does "
                          "(Debian: apt install libheif-examples)");
     for (const fs::path& file : files)
         if (!core::links_stay_inside(folder, file))

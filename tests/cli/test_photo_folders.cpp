@@ -132,11 +132,13 @@ TEST_F(PhotoFolders, InHeicAreConverted) {
     write_file(folder_ / "photos/3.heic", "a copy of 3.png");
     fs::remove_all(folder_ / "models");
     make_model("0", {"0.jpg", "1.jpg", "2.jpg", "3.png"});
-    const Circumstances nothing{.environment = {{"PATH", folder_ / "bin"}, {"CALLS", folder_ / "calls"}}};
-    expect_failure(
-        run_ewa({"cameras", folder_ / "photos", "-o", folder_ / "dataset"}, nothing), 2,
-        "4 photos are HEIC or AVIF, and no program here reads them; heif-convert does (Debian: apt "
-        "install libheif-examples)");
+    // Without ewa's modules, too.
+    fs::copy_file(EWA_PROGRAM, folder_ / "bin/ewa");
+    const Circumstances nothing{.program = folder_ / "bin/ewa",
+                                .environment = {{"PATH", folder_ / "bin"}, {"CALLS", folder_ / "calls"}}};
+    expect_failure(run_ewa({"cameras", folder_ / "photos", "-o", folder_ / "dataset"}, nothing), 2,
+                   "4 photos are HEIC or AVIF, and nothing here reads them; heif-convert does (Debian: apt "
+                   "install libheif-examples)");
     make_program(folder_ / "bin/heif-dec", R"sh(
 [ "$1 $2" = "-q 95" ] || exit 2
 for jpeg in "$JPEGS"/*.jpg; do
