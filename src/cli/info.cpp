@@ -271,9 +271,11 @@ void info_dataset(const fs::path& path, const fs::path& named, int test_every, b
     for (const std::string& note : dataset.notes) fmt::print("note            {}\n", core::one_line(note));
     fmt::print("used            {}\n", used_text(dataset));
     for (const std::string& warning : warnings) fmt::print("warning         {}\n", core::one_line(warning));
-    if (dataset.frame_rate > 0) fmt::print("rate            {:.6g} frames per second\n", dataset.frame_rate);
-    fmt::print("frames          {} ({} train, {} test with --test-every {})\n", dataset.frames.size(),
-               split.train.size(), split.test.size(), test_every);
+    if (dataset.frame_rate > 0)  // a path, which is drawn and not trained on
+        fmt::print("frames          {}, {:.6g} per second\n", dataset.frames.size(), dataset.frame_rate);
+    else
+        fmt::print("frames          {} ({} train, {} test with --test-every {})\n", dataset.frames.size(),
+                   split.train.size(), split.test.size(), test_every);
     if (dataset.missing_images > 0)
         fmt::print("images          {} missing; their frames are skipped unless all images are missing\n",
                    dataset.missing_images);

@@ -124,9 +124,7 @@ Image load_image(const fs::path& path) {
 
 namespace image {
 
-bool reads_heif() try {
-    return openimageio().reads_heif();
-} catch (const RunError&) {
+bool reads_heif() try { return openimageio().reads_heif(); } catch (const RunError&) {
     return false;  // there is no module
 }
 

@@ -117,5 +117,4 @@ void jpeg_of_heif(const std::string& heif, const std::string& jpeg,
 }  // namespace
 
 extern "C" __attribute__((visibility("default"))) const OpenImageIO ewa_openimageio_layout_2;
-const OpenImageIO ewa_openimageio_layout_2 = {EWA_VERSION, limit,      read,
-                                                encode_exr,  reads_heif, jpeg_of_heif};
+const OpenImageIO ewa_openimageio_layout_2 = {EWA_VERSION, limit, read, encode_exr, reads_heif, jpeg_of_heif};

@@ -74,7 +74,8 @@ class Films : public testing::Test {
 
     /// ffmpeg with these words. A word "IN" is a film of frames in `in`; the last one is the name of a file in the folder.
     void ffmpeg(const std::string& words, const std::string& name, const std::string& size = "128x64") {
-        std::string command = film_writer() + " -v error -y " + words + " '" + (folder_ / name).string() + "'";
+        std::string command =
+            film_writer() + " -v error -y " + words + " '" + (folder_ / name).string() + "'";
         const std::string in =
             "-f rawvideo -pix_fmt rgb48le -r 10 -s " + size + " -i " + (folder_ / "in").string();
         for (size_t at; (at = command.find(" IN ")) != std::string::npos;) command.replace(at + 1, 2, in);

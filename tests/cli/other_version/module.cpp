@@ -4,4 +4,4 @@
 
 extern "C" const ewa::image::OpenImageIO ewa_openimageio_layout_2;
 const ewa::image::OpenImageIO ewa_openimageio_layout_2 = {"0.0.0", nullptr, nullptr,
-                                                                      nullptr, nullptr, nullptr};
+                                                          nullptr, nullptr, nullptr};
