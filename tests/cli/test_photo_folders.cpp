@@ -185,7 +185,7 @@ TEST_F(PhotoFolders, WithoutPhotosGiveTheFramesOfTheirVideos) {
 case "$*" in
 *image2pipe*)
     for i in 0 1 2 3 4 5; do printf 'P5\n4 3\n255\naaaabbbbcccc'; done;;
-*)
+*frame_*)
     for word; do last=${word#file:}; done
     for i in 0 1 2; do cp "$PHOTOS/$i.png" "$(dirname "$last")/frame_0000$((i + 1)).jpg"; done;;
 esac

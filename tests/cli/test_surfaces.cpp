@@ -150,7 +150,10 @@ TEST(Mesh, ForCollisionIsClosed) {
     const std::string ply = read_file(folder / "m.ply");
     EXPECT_EQ(ply.find("property uchar red"), std::string::npos);
     EXPECT_LE(header_count(ply, "element face "), 10000u);
-    EXPECT_NE(told({"--collision", "--triangles", "300"}).find("300 triangles"), std::string::npos);
+    told({"--collision", "--triangles", "300"});
+    const size_t fewer = header_count(read_file(folder / "m.ply"), "element face ");
+    EXPECT_LE(fewer, 300u);
+    EXPECT_GE(fewer, 250u);
 }
 
 TEST(Mesh, OfABackground) {
@@ -325,12 +328,14 @@ TEST(Mesh, OfAFisheye) {
         << coarse.out;
 }
 
+/// meshoptimizer 0.18 keeps more than four triangles of a closed surface, 0.22 does not.
 TEST(Mesh, SaysWhereFewerTrianglesWouldTearIt) {
     const Prepared folder;
-    const Outcome told = run_ewa({"mesh", folder / "shell.ply", "-o", folder / "m.glb", "--cameras",
+    const Outcome told = run_ewa({"mesh", folder / "shell.ply", "-o", folder / "m.ply", "--cameras",
                                   folder / "data", "--voxel", "0.1", "--triangles", "4"});
     expect_success(told);
-    EXPECT_NE(told.out.find("--triangles 4: with fewer than "), std::string::npos) << told.out;
+    const bool tears = header_count(read_file(folder / "m.ply"), "element face ") > 4;
+    EXPECT_EQ(told.out.find("--triangles 4: with fewer than ") != std::string::npos, tears) << told.out;
 }
 
 TEST(Mesh, ErrorsAreOneLine) {
