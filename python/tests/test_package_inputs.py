@@ -278,3 +278,25 @@ def test_searches_that_fail(photos, tmp_path, monkeypatch):
     monkeypatch.setenv("FAIL", "feature_extractor")
     with pytest.raises(ewa.DeviceError, match="colmap feature_extractor failed"):
         ewa.find_cameras(photos, tmp_path / "out")
+
+
+def copy_of_still_life(folder):
+    shutil.copytree(STILL_LIFE, folder, symlinks=True)
+    return folder
+
+
+def test_what_is_not_used_is_a_warning(tmp_path):
+    data = copy_of_still_life(tmp_path / "a")
+    assert ewa.Dataset(data).used.startswith("60 of 60 photos"), ewa.Dataset(data).used
+    (data / "masks").mkdir(exist_ok=True)
+    shutil.copy(data / ewa.Dataset(data).frames[0].image_path.relative_to(data), data / "masks/other.png")
+    with pytest.warns(UserWarning, match="masks/other.png"):
+        changed = ewa.Dataset(data)
+    assert "masks/other.png" in changed.used and isinstance(changed.notes, list)
+
+
+def test_what_makes_a_training_useless_is_a_warning(still_life):
+    away = make_splats()
+    away.means = away.means + np.float32(1e4)
+    with pytest.warns(UserWarning, match="none of the first splats of init is in view"):
+        ewa.Trainer(still_life, init=away, steps=1, downscale=4)
