@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <map>
 #include <memory>
@@ -410,6 +411,19 @@ std::string splat_kind(const fs::path& file) try {
     return {};
 }
 
+/// Photos as the sensor has them, which have to be developed. Empty where the folder has none.
+std::string raw_photos_text(const fs::path& folder) {
+    constexpr std::array kRaw{".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw"};
+    uint64_t count = 0;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder_of_photos(folder)))
+        count += std::ranges::find(kRaw, extension_of(entry.path())) != kRaw.end();
+    return count == 0
+               ? std::string()
+               : ": " + core::counted(count, "raw photo") +
+                     ", which ewa does not develop; convert to JPEG, as darktable-cli does (Debian: apt "
+                     "install darktable)";
+}
+
 /// Throws what the path is instead of an input; `otherwise` if nothing is known.
 [[noreturn]] void refuse(const fs::path& path, const char* otherwise) {
     const std::string name = core::one_line(path.string());
@@ -420,6 +434,8 @@ std::string splat_kind(const fs::path& file) try {
         if (const std::string kind = splat_kind(path); !kind.empty())
             throw InputError(name + " is " + kind + ", not a folder of photos, a video or a dataset");
     }
+    if (is_folder(path))
+        if (const std::string raw = raw_photos_text(path); !raw.empty()) throw InputError(name + raw);
     throw InputError(name + ": " + otherwise);
 }
 
@@ -472,6 +488,12 @@ bool is_capture(const fs::path& path) {
 
 bool has_videos(const fs::path& path) {
     return !videos_of(path).empty();
+}
+
+std::string capture_text(const fs::path& path) {
+    if (const std::vector<fs::path> videos = videos_of(path); !videos.empty())
+        return core::counted(videos.size(), "video");
+    return core::counted(capture::photos_in(folder_of_photos(path)).size(), "photo");
 }
 
 ImageSize smallest_image(const fs::path& input) {

@@ -371,12 +371,26 @@ void info_image(const fs::path& path, std::string_view format, bool json) {
         fmt::print("orientation     {} in EXIF: to be turned or mirrored when shown\n", size.orientation);
 }
 
+/// Photos or videos that have no cameras yet.
+void info_capture(const fs::path& path, bool json) {
+    const std::string text = capture_text(path);
+    const ImageSize size = smallest_image(path);
+    if (json)
+        return print_json(
+            {{"kind", "capture"}, {"contents", text}, {"width", size.width}, {"height", size.height}});
+    fmt::print("{}\nkind            {} without cameras; ewa train finds them first, ewa cameras alone\n",
+               core::one_line(path.string()), text);
+    if (size.width > 0) fmt::print("smallest image  {}x{}\n", size.width, size.height);
+}
+
 int run(const InfoArguments& arguments) {
     const fs::path& path = arguments.path;
     std::error_code error;
     if (!fs::exists(path, error)) throw InputError(path.string() + ": no such file or folder");
     if (const auto run = run_named(path))
         info_splats(splat_input(path).file, &*run, arguments);
+    else if (!is_archive(path) && is_capture(path))
+        info_capture(path, arguments.json);
     else if (fs::is_directory(path) || (path.extension() == ".json" && !is_sog(path)) ||
              io::find_importer(path))
         info_dataset(path, path, arguments.test_every, arguments.json);
@@ -405,7 +419,7 @@ Action add_info(CLI::App& app) {
                    ".gltf .usda "
                    ".usdz .rad), COLMAP folder, "
                    "transforms.json, cameras of another program, zip archive of one of these, "
-                   "glTF file of meshes, image, or folder of a training run")
+                   "glTF file of meshes, image, folder of photos, video, or folder of a training run")
         ->required();
     add_test_every_option(app, arguments->test_every);
     app.add_flag("--json", arguments->json, "Print JSON");
