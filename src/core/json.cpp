@@ -78,7 +78,9 @@ class Builder : public nlohmann::json_sax<Json> {
         if (error.id == kNumberOverflow) return "the number " + shown + " is too large";
         if (std::string_view(error.what()).find("ill-formed UTF-8") != std::string_view::npos)
             return "a text that is not UTF-8";
-        if (std::string_view(error.what()).find("unexpected end of input") != std::string_view::npos)
+        // nlohmann 3.11.3 has other words for an empty text.
+        if (token.empty() ||
+            std::string_view(error.what()).find("unexpected end of input") != std::string_view::npos)
             return "the text ends too early";
         return "unexpected '" + shown + "'";
     }

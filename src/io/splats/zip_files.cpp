@@ -177,7 +177,9 @@ ZipFiles::ZipFiles(const fs::path& path) : state_(std::make_unique<State>()) {
     state_->name = core::one_line(path.string());
     const uint64_t bytes = core::FileReader(path).size();
     state_->zip = unzOpen64(path.c_str());
-    if (!state_->zip)
+    // Releases of minizip differ in whether they open an archive without entries.
+    unz_global_info64 directory{};
+    if (!state_->zip || unzGetGlobalInfo64(state_->zip, &directory) != UNZ_OK || directory.number_entry == 0)
         throw InputError(state_->name + ": not a zip archive, or its directory at byte " +
                          std::to_string(bytes) + " is damaged or cut off");
     state_->list(bytes);
