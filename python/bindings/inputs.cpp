@@ -70,8 +70,10 @@ LoadedDataset read_dataset(const fs::path& path, const AskedDataset& asked) {
 LoadedDataset open_dataset(const fs::path& path, const AskedDataset& asked) {
     LoadedDataset opened = read_dataset(path, asked);
     const Dataset& dataset = *opened.dataset;
-    const bool unused =
-        std::ranges::any_of(dataset.used, [](const UsedOf& kind) { return !kind.why.empty(); });
+    // Some photos without cameras are usual.
+    const bool unused = std::ranges::any_of(dataset.used, [](const UsedOf& kind) {
+        return !kind.why.empty() && (kind.what != "photo" || 2 * kind.used <= kind.found);
+    });
     if (unused && opened.options.need_images)
         warn(PyExc_UserWarning, spelled((path.string() + ": used " + used_text(dataset)).c_str()));
     return opened;
