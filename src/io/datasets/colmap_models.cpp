@@ -151,7 +151,9 @@ ImageFinder image_finder(const ColmapModel& model) {
     // What is missing is said of the usual folder.
     if (places.empty() || places[0].own) places.insert(places.begin(), {model.dataset / "images"});
     ImageFinder finder(std::move(places));
-    finder.add_last(model.originals.empty() ? model.dataset : model.originals);
+    // A workspace's images are those of its own model.
+    const fs::path& root = model.originals.empty() ? model.dataset : model.originals;
+    if (colmap_workspaces(root).empty()) finder.add_last(root);
     return finder;
 }
 

@@ -499,7 +499,7 @@ Dataset load_dataset(const std::filesystem::path& given, const DatasetOptions& o
         frame.depth_unit = image.depth_unit;
         if (!image.seen.empty()) frame.seen = std::make_shared<const std::vector<uint32_t>>(image.seen);
     }
-    note_photos_outside(dataset);
+    if (dataset.format == "COLMAP" || dataset.format == "transforms") note_photos_outside(dataset);
     note_corner(model, dataset.notes);
     if (!path_of_cameras) dataset.used.push_back(io::used_photos(model, dataset));
     if (!path_of_cameras) add_companions(model, records, options, dataset);
