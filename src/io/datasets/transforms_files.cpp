@@ -3,25 +3,14 @@
 
 #include <algorithm>
 #include <array>
-#include <string>
 
 #include "core/folders.h"
-#include "core/text.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/importer.h"
 
 namespace ewa::io {
 
 namespace fs = std::filesystem;
-
-bool is_named_transforms(const fs::path& name) {
-    const std::string text = core::lower(name.filename().string());
-    return text.starts_with("transforms") && text.ends_with(".json");
-}
-
-bool begins_as_transforms(std::string_view head) {
-    return head.find("\"frames\"") != std::string_view::npos;
-}
 
 std::vector<fs::path> transforms_files(const fs::path& folder) {
     constexpr std::array kUsual{"transforms.json", "transforms_train.json", "transforms_test.json",

@@ -2,16 +2,9 @@
 // The files of a dataset that transforms.cpp reads, under the names that programs and people give them.
 #pragma once
 #include <filesystem>
-#include <string_view>
 #include <vector>
 
 namespace ewa::io {
-
-/// Whether a file may be a transforms.json by its name: one that begins with "transforms", in any case.
-bool is_named_transforms(const std::filesystem::path& name);
-
-/// Whether these first bytes are of a file with frames.
-bool begins_as_transforms(std::string_view head);
 
 /// Those of the folder: transforms.json, else transforms_train.json, _test and _val, and then others that have frames. In any case.
 std::vector<std::filesystem::path> transforms_files(const std::filesystem::path& folder);

@@ -13,7 +13,6 @@
 #include "ewa/error.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/json_field.h"
-#include "io/datasets/transforms_files.h"
 
 namespace ewa::io {
 
@@ -173,6 +172,15 @@ constexpr std::array kOther{
            "not RealityScan's file of cameras, whose first line names name, heading, pitch and roll"}};
 
 }  // namespace
+
+bool is_named_transforms(const fs::path& name) {
+    const std::string text = core::lower(name.filename().string());
+    return text.starts_with("transforms") && text.ends_with(".json");
+}
+
+bool begins_as_transforms(std::string_view head) {
+    return head.find("\"frames\"") != std::string_view::npos;
+}
 
 std::string head_of(const fs::path& file) try {
     core::FileReader reader(file);

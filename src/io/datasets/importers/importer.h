@@ -64,6 +64,12 @@ std::filesystem::path other_cameras(const std::filesystem::path& dataset, const 
 /// a file is not the one that its name promises. Empty if there is nothing to say.
 std::string export_advice(const std::filesystem::path& path);
 
+/// Whether a file may be a transforms.json by its name: one that begins with "transforms", in any case.
+bool is_named_transforms(const std::filesystem::path& name);
+
+/// Whether these first bytes are of a file with frames.
+bool begins_as_transforms(std::string_view head);
+
 /// The first kHeadBytes of a file as text, without a byte order mark. ASCII in UTF-16 is ASCII. Empty if it cannot be read.
 std::string head_of(const std::filesystem::path& file);
 
