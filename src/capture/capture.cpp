@@ -47,12 +47,22 @@ bool is_video(const fs::path& path) {
     return is_file(path) && capture::is_film(path);
 }
 
-/// The folder in which an archive has everything: itself, or a folder that is alone in it.
+/// The folder in which an archive has everything: itself, or the only one in it that is a dataset with photos, or the only one that has
+/// cameras or photos.
 fs::path main_folder(fs::path folder) {
-    while (!io::is_dataset_folder(folder)) {
-        const auto first = fs::directory_iterator(folder);
-        if (std::distance(first, {}) != 1 || !fs::directory_iterator(folder)->is_directory()) break;
-        folder = fs::directory_iterator(folder)->path();
+    while (!io::is_dataset_folder(folder, false) && io::list_images(folder, false).empty() &&
+           !(io::has_photos_folder(folder) && io::is_dataset_folder(folder))) {
+        std::vector<fs::path> whole, some;
+        for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+            if (!entry.is_directory()) continue;
+            const bool cameras = io::is_dataset_folder(entry.path()),
+                       photos = !capture::photo_files(entry.path()).empty();
+            if (cameras && photos) whole.push_back(entry.path());
+            if (cameras || photos) some.push_back(entry.path());
+        }
+        if (whole.size() != 1) whole = some;
+        if (whole.size() != 1) break;
+        folder = whole[0];
     }
     return folder;
 }

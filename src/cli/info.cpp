@@ -269,7 +269,7 @@ void info_dataset(const fs::path& path, const fs::path& named, int test_every, b
     fmt::print("{}\nkind            {}\n", core::one_line(named.string()), dataset.format);
     if (!dataset.program.empty()) fmt::print("program         {}\n", core::one_line(dataset.program));
     for (const std::string& note : dataset.notes) fmt::print("note            {}\n", core::one_line(note));
-    fmt::print("used            {}\n", used_text(dataset));
+    if (!dataset.used.empty()) fmt::print("used            {}\n", used_text(dataset));
     for (const std::string& warning : warnings) fmt::print("warning         {}\n", core::one_line(warning));
     if (dataset.frame_rate > 0)  // a path, which is drawn and not trained on
         fmt::print("frames          {}, {:.6g} per second\n", dataset.frames.size(), dataset.frame_rate);

@@ -90,6 +90,7 @@ Split split_frames(const Dataset& dataset, int test_every) {
         const bool test = own != 0 ? own == 2 : test_every > 0 && i % test_every == 0;
         (test ? split.test : split.train).push_back(i);
     }
+    if (test_every == 0 && split.train.empty()) std::swap(split.train, split.test);
     return split;
 }
 
