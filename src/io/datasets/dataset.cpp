@@ -419,8 +419,8 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
         frame.depth_unit = image.depth_unit;
         if (!image.seen.empty()) frame.seen = std::make_shared<const std::vector<uint32_t>>(image.seen);
     }
-    dataset.used.push_back(io::used_photos(model, dataset));
     add_companions(model, records, options, dataset);
+    dataset.used.insert(dataset.used.begin(), io::used_photos(model, dataset));
     if (const uint64_t points = dataset.points.positions.size() + uint64_t(dataset.dropped_points);
         points > 0)
         dataset.used.push_back({.what = "point",
