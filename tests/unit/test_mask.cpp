@@ -79,7 +79,7 @@ TEST(Mask, NumbersOfObjectsAreRefused) {
              {[](int x, int y) { return x < 32   ? 90
                                         : x < 33 ? 60 + y % 5
                                                  : 0; }, 90},
-             {[](int x, int) { return x < 60 ? 0 : 1 + (x - 60) * 3; }, 0}})
+             {[](int x, int y) { return std::max(0, x + y - 101); }, 0}})
         EXPECT_EQ(at(scene::load_mask(mask_of(folder, level))), middle);
 }
 
