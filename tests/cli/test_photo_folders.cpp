@@ -124,9 +124,9 @@ TEST_F(PhotoFolders, WithMasksAreSearchedAndTrainedWithThem) {
 TEST_F(PhotoFolders, HaveTheMasksOfTheirFolder) {
     const std::string project = folder_ / "project";
     for (const char* camera : {"/images/a", "/images/b"}) fs::create_directories(project + camera);
-    for (const char* name : {"0.png", "1.png"})
+    for (const std::string name : {"0.png", "1.png"})
         for (const char* camera : {"a/", "b/"})
-            fs::copy_file(folder_ / "photos" / name, project + "/images/" + camera + name);
+            fs::copy_file(folder_ / ("photos/" + name), project + "/images/" + camera + name);
     fs::remove_all(folder_ / "models");
     make_model("0", {"a/0.png", "a/1.png", "b/0.png", "b/1.png"});
     ewa::Image alpha(48, 32, 4);  // black, and white where its alpha is
@@ -314,7 +314,7 @@ exit 1
 /// What an interrupted search has done does not count for its pace.
 TEST_F(PhotoFolders, AContinuedSearchHasItsOwnPace) {
     std::vector<DatabaseImage> images;
-    for (const char* name : {"0.png", "1.png"})
+    for (const std::string name : {"0.png", "1.png"})
         images.push_back({name, std::vector<std::uint8_t>(128, 1), {1.0f}});
     write_colmap_database(folder_ / "features.db", images);
     make_program(folder_ / "bin/colmap", R"sh(

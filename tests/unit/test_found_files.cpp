@@ -323,6 +323,7 @@ TEST(FoundFiles, MasksUnderOtherNames) {
         {{"images/mask_a.png", "images/mask_b.png"}, "2 of 2 masks", "images/mask_a.png"},
         {{"images/mask.png"}, "1 of 1 mask (for all photos)", "images/mask.png"},
         {{"static_mask.png"}, "1 of 1 mask (for all photos)", "static_mask.png"},
+        {{"poster_mask.png"}, "0 of 1 mask (poster_mask.png matches no photo)", ""},
         {{"sam_masks/a.png", "sam_masks/b.png"}, "0 of 2 masks (sam_masks/ is none of masks/ and mask/)", ""},
         {{"masks/c.png"}, "0 of 1 mask (masks/c.png matches no photo)", ""}};
     for (const auto& [files, used, mask] : cases) {

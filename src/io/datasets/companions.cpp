@@ -35,6 +35,9 @@ constexpr std::array<std::string_view, 7> kMaskWords{"mask",   "masks",        "
 constexpr std::array<std::string_view, 6> kOtherFolders{"matte",        "mattes",        "alpha",
                                                         "segmentation", "segmentations", "seg"};
 constexpr std::array<std::string_view, 2> kDepthWords{"depth", "depths"};
+/// Masks for all photos, as in static_mask.png.
+constexpr std::array<std::string_view, 12> kOfAll{"all",    "global", "static", "common", "shared", "vehicle",
+                                                  "camera", "car",    "ego",    "rig",    "lens",   "body"};
 
 struct Names {
     std::string what;
@@ -281,6 +284,8 @@ fs::path Companions::of_all() {
         !files_[0].fault.empty())
         return {};
     const std::string key = name_key(files_[0].name.stem()), rest = without_word(key, kMaskWords);
+    // A file beside the photos' folder must say so.
+    if (files_[0].folder == root_ && !rest.empty() && std::ranges::count(kOfAll, rest) == 0) return {};
     std::set<std::string> others;
     for (const fs::path& name : list_images(folder_, true))
         if (folder_ / name != files_[0].folder / files_[0].name) others.insert(name_key(name.stem()));
