@@ -216,7 +216,7 @@ void Companions::examine() {
                 }
             file.fault = at->second;
         } catch (const InputError&) {
-            file.fault = " cannot be read";
+            continue;  // who reads it names it
         }
 }
 
