@@ -78,12 +78,14 @@ fs::path folder_of_photos(const fs::path& folder) {
     return folder;
 }
 
-/// The videos that a dataset is made of: the input itself, or those of a folder without photos.
-std::vector<fs::path> videos_of(const fs::path& input) {
+/// The videos that a dataset is made of: the input itself, or those of a folder without photos. proxies: get those that are left out.
+std::vector<fs::path> videos_of(const fs::path& input, std::vector<fs::path>* proxies = nullptr) {
     if (is_video(input)) return {input};
-    std::vector<fs::path> videos;
-    if (is_folder(input) && capture::photo_files(folder_of_photos(input)).empty())
-        for (const fs::path& name : capture::films_in(input)) videos.push_back(input / name);
+    if (!is_folder(input) || !capture::photo_files(folder_of_photos(input)).empty()) return {};
+    std::vector<fs::path> videos = capture::films_in(input);
+    const std::vector<fs::path> copies = capture::take_proxies(videos);
+    if (proxies) *proxies = copies;
+    for (fs::path& video : videos) video = input / video;
     return videos;
 }
 
@@ -245,6 +247,7 @@ struct Making {
     const capture::ProgressFunction& progress;
     Json record, before;           // before: of what has begun; null: nothing has
     std::vector<fs::path> videos;  // none: the input is photos or an archive
+    std::vector<fs::path> proxies = {};
     std::unique_ptr<core::FolderLock> lock = nullptr;
 
     /// After all errors of the input: they leave no folder.
@@ -267,6 +270,10 @@ Capture make_of_video(Making& now) {
     require_programs(now.folder, true);
     now.begin();
     core::make_folder(work);
+    if (const size_t count = now.proxies.size(); count > 0)
+        say({std::to_string(count) + (count == 1 ? " proxy is" : " proxies are") +
+             " not used, by the name a small copy of a film: " + core::one_line(now.proxies[0].string())},
+            now.progress);
     if (!fs::exists(fs::symlink_status(images)))
         say(capture::extract_frames(now.videos, images, now.options.frames, work / "log.txt", now.progress),
             now.progress);
@@ -330,13 +337,9 @@ Capture make_of_photos(Making& now, const fs::path& photos, const fs::path& link
     now.begin();
     core::make_folder(now.folder / "colmap");
     convert(now, photos, link, chosen);
-    const size_t masked =
-        capture::copy_masks(photos, chosen.names, now.folder / "images", now.folder / "masks", now.progress);
-    if (masked > 0)
-        say({std::to_string(masked) + " of " + core::counted(chosen.names.size(), "photo") +
-             (masked == 1 ? " has a mask" : " have masks") +
-             ": what is black there is neither searched nor trained"},
-            now.progress);
+    const std::string masks = capture::copy_masks(photos, chosen.names, now.folder / "images",
+                                                  now.folder / "masks", now.input, now.progress);
+    if (!masks.empty()) say({masks}, now.progress);
     return search(now.folder, chosen, now.options, now.progress);
 }
 
@@ -392,9 +395,10 @@ Capture make_of_archive(Making& now) {
 
 Capture make(const fs::path& input, const fs::path& folder, const CaptureOptions& options,
              const capture::ProgressFunction& progress) {
-    const std::vector<fs::path> videos = videos_of(input);
+    std::vector<fs::path> proxies;
+    const std::vector<fs::path> videos = videos_of(input, &proxies);
     const bool video = !videos.empty();
-    Making now{input, folder, options, progress, record_of(input, options, video), {}, videos};
+    Making now{input, folder, options, progress, record_of(input, options, video), {}, videos, proxies};
     now.before = check_claim(folder, now.record, video);
     if (video) return make_of_video(now);
     if (is_archive(input)) return make_of_archive(now);

@@ -506,7 +506,20 @@ TEST(FoundFiles, MasksUnderOtherNames) {
         {{"mask.png"}, "1 of 1 mask (for all photos)", "mask.png"},
         {{"masks/a.png"}, "1 of 1 mask (1 photo has none: b.jpg)", "masks/a.png"},
         {{"masks/1.png", "masks/2.png"}, "0 of 2 masks (masks/1.png matches no photo)", ""},
-        {{"masks/x/a.png", "masks/y/a.png"}, "0 of 2 masks (masks/x/a.png matches no photo)", ""},
+        {{"masks/x/a.png", "masks/y/a.png"},
+         "0 of 2 masks (masks/x/a.png and masks/y/a.png have one name, and neither folder is that of a "
+         "photo)",
+         ""},
+        {{"masks/a.webp.png", "masks/b.HEIC.png"}, "2 of 2 masks", "masks/a.webp.png"},
+        {{"segmentation/a.png", "segmentation/b.png"}, "2 of 2 masks", "segmentation/a.png"},
+        {{"images/mattes/a.png"}, "1 of 1 mask (1 photo has none: b.jpg)", "images/mattes/a.png"},
+        {{"Alpha/a.png", "Alpha/b.png"}, "2 of 2 masks", "Alpha/a.png"},
+        {{"labels/a.png", "labels/b.png"}, "0 of 2 masks (labels/ is none of masks/ and mask/)", ""},
+        {{"images/a_alpha.png", "images/b_seg.png"}, "2 of 2 masks", "images/a_alpha.png"},
+        {{"images/mask_a.png", "images/mask_b.png"}, "2 of 2 masks", "images/mask_a.png"},
+        {{"images/mask.png"}, "1 of 1 mask (for all photos)", "images/mask.png"},
+        {{"static_mask.png"}, "1 of 1 mask (for all photos)", "static_mask.png"},
+        {{"poster_mask.png"}, "0 of 1 mask (poster_mask.png matches no photo)", ""},
         {{"sam_masks/a.png", "sam_masks/b.png"}, "0 of 2 masks (sam_masks/ is none of masks/ and mask/)", ""},
         {{"masks/c.png"}, "0 of 1 mask (masks/c.png matches no photo)", ""}};
     for (const auto& [files, used, mask] : cases) {
@@ -551,6 +564,30 @@ TEST(FoundFiles, MasksOfFolders) {
               "3 of 3 photos, 0 of 3 masks (--masks none), 2 points");
 }
 
+TEST(FoundFiles, MasksOfOtherContents) {
+    const Colmap data;
+    data.model("sparse/0", {"c0/images/a.jpg", "c1/images/a.jpg"});
+    data.photos({"images/c0/images/a.jpg", "images/c1/images/a.jpg"});
+    // Of one camera, beside its photos.
+    save(data.folder / "images/c1/masks/a.png", half());
+    EXPECT_EQ(data.used(), "2 of 2 photos, 1 of 1 mask (1 photo has none: c0/images/a.jpg), 2 points");
+    EXPECT_EQ(data.load().frames[1].mask_path, data.folder / "images/c1/masks/a.png");
+    fs::remove_all(data.folder / "images/c1/masks");
+    data.folder.write("masks/c0/a.gif", "GIF89a");
+    EXPECT_EQ(data.used(),
+              "2 of 2 photos, 0 of 1 mask (masks/c0/a.gif is of a format that ewa does not read), 2 points");
+    fs::remove_all(data.folder / "masks");
+    Image colours(8, 6, 3);
+    for (size_t i = 0; i < colours.pixels.size(); i += 2) colours.pixels[i] = float(i % 5) / 4;
+    save(data.folder / "segmentation/c0/a.png", colours);
+    EXPECT_EQ(data.used(),
+              "2 of 2 photos, 0 of 1 mask (segmentation/c0/a.png seems to be no mask), 2 points");
+    // Servers and desktops leave pictures, too.
+    for (const char* file : {"images/@eaDir/a.jpg", "images/__MACOSX/a.jpg", "images/.thumbnails/a.jpg"})
+        data.photos({file});
+    EXPECT_TRUE(data.used().starts_with("2 of 2 photos,")) << data.used();
+}
+
 TEST(FoundFiles, MasksThatTheCamerasFileNames) {
     test::TransformsScene scene;
     scene.model["frames"][0]["mask_path"] = "/other/machine/m0.png";
@@ -582,9 +619,12 @@ TEST(FoundFiles, DepthMaps) {
     EXPECT_EQ(used("depth/b.png", sixteen),
               "1 of 1 photo, 0 of 1 depth map (depth/b.png matches no photo), 2 points");
     fs::remove(data.folder / "depth/b.png");
-    save(data.folder / "depth/a_depth.png");  // a picture to look at
-    EXPECT_EQ(data.used(),
-              "1 of 1 photo, 0 of 1 depth map (depth/a_depth.png is no .exr or .png of 16 bits), 2 points");
+    for (const char* name : {"a_depth.png", "a.png"}) {  // pictures to look at
+        fs::remove_all(data.folder / "depth");
+        save(data.folder / "depth" / name);
+        EXPECT_EQ(data.used(), std::string("1 of 1 photo, 0 of 1 depth map (depth/") + name +
+                                   " is no .exr or .png of 16 bits), 2 points");
+    }
 }
 
 }  // namespace

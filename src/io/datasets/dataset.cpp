@@ -501,8 +501,10 @@ Dataset load_dataset(const std::filesystem::path& given, const DatasetOptions& o
     }
     if (dataset.format == "COLMAP" || dataset.format == "transforms") note_photos_outside(dataset);
     note_corner(model, dataset.notes);
-    if (!path_of_cameras) dataset.used.push_back(io::used_photos(model, dataset));
-    if (!path_of_cameras) add_companions(model, records, options, dataset);
+    if (!path_of_cameras) {
+        add_companions(model, records, options, dataset);
+        dataset.used.insert(dataset.used.begin(), io::used_photos(model, dataset));
+    }
     if (const uint64_t points = dataset.points.positions.size() + uint64_t(dataset.dropped_points);
         points > 0)
         dataset.used.push_back({.what = "point",

@@ -150,9 +150,9 @@ std::vector<fs::path> list_images(const fs::path& folder, bool below, bool (*nam
         if (++files > kMostFiles || names.size() > kMostImages)
             throw InputError(core::one_line(folder.string()) + ": holds more than 200000 images");
         if (at->is_directory(error) && (!below || is_of_others(at->path()))) at.disable_recursion_pending();
-        if (named(at->path()) && !at->path().filename().string().starts_with("._") &&
-            core::is_file(at->path()))
-            names.push_back(at->path().lexically_relative(folder));
+        if (fs::path name = at->path().lexically_relative(folder);
+            named(name) && !core::is_of_desktop(name) && core::is_file(at->path()))
+            names.push_back(std::move(name));
     }
     std::sort(names.begin(), names.end());
     return names;
