@@ -260,7 +260,8 @@ def test_cameras_of_photos_are_found(photos, tmp_path):
     assert [frame.name for frame in data.frames] == ["0.png", "1.png", "2.png"]
     assert len(data.points) == 8 and len(ewa.Dataset(tmp_path / "dataset")) == 3
     assert seen and all(isinstance(what, str) and 0 <= n <= all for what, n, all in seen)
-    trainer = ewa.Trainer(data, steps=1, strategy="none", train_frames=[0, 1, 2])
+    with pytest.warns(UserWarning, match="starts from 8 points"):
+        trainer = ewa.Trainer(data, steps=1, strategy="none", train_frames=[0, 1, 2])
     trainer.step()
 
 

@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "capture/steps.h"
+#include "image/image_files.h"
 #include "support/temp_folder.h"
 
 namespace {
