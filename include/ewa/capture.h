@@ -55,6 +55,9 @@ bool is_capture(const std::filesystem::path& path);
 /// Whether the dataset is made of frames: the path is a video by its extension, or a folder with videos and no photos.
 bool has_videos(const std::filesystem::path& path);
 
+/// The photos or videos that make_dataset would take of a folder or video: "8 photos". Throws InputError.
+std::string capture_text(const std::filesystem::path& path);
+
 /// Whether the path is a zip archive by its extension and its first bytes.
 bool is_archive(const std::filesystem::path& path);
 /// Whether an archive has the files of a dataset. Throws InputError, also for an archive that make_dataset refuses.

@@ -156,7 +156,7 @@ TrainingImage load_training_image(const Frame& frame, const std::array<float, 3>
 
 /// Indices of train and test frames. A frame's own split wins. Otherwise it is a test frame if its index in
 /// the order of names is a multiple of test_every, as in INRIA's code and gsplat. test_every 0: all are train
-/// frames.
+/// frames, also those of a dataset that would hold all out.
 struct Split {
     std::vector<int> train, test;
 };

@@ -21,7 +21,8 @@ namespace ewa {
 class Renderer;
 
 /// What libewa uses of a device. VkDeviceCreateInfo::pNext points to `features`, and pEnabledFeatures is null. Its extensions are
-/// `extensions`. A program adds what it uses itself to the members and to the end of the chain. libewa cannot do without
+/// `extensions`. A program adds what it uses itself to the members and to the end of the chain; VkPhysicalDeviceVulkan13Features by
+/// use(). libewa cannot do without
 /// VkPhysicalDeviceVulkan12Features::scalarBlockLayout. Without the other features and the extensions it is slower.
 struct DeviceNeeds {
     /// api_version: VkApplicationInfo::apiVersion of the instance, 1.2 or later.
@@ -32,6 +33,10 @@ struct DeviceNeeds {
     VkPhysicalDeviceFeatures2 features{};                          // the chain's first structure
     VkPhysicalDeviceVulkan12Features vulkan12{};                   // its second
     VkPhysicalDeviceSubgroupSizeControlFeatures subgroup_sizes{};  // its third, where the device has this
+
+    /// Puts the program's structure in the place of subgroup_sizes, whose features it gets: Vulkan allows only one of both in a
+    /// chain. Its pNext stays. For instances and devices of Vulkan 1.3.
+    void use(VkPhysicalDeviceVulkan13Features& vulkan13);
 };
 
 /// A program's own device. All handles must outlive what borrow_device returns.

@@ -5,6 +5,8 @@
 #include <nanobind/stl/string.h>
 
 #include <exception>
+#include <string>
+#include <vector>
 
 #include "bindings.h"
 #include "core/text.h"
@@ -32,6 +34,7 @@ class Watch {
         const nb::gil_scoped_acquire interpreter;
         try {
             check_signals();
+            if (!now.note.empty()) notes_.push_back(now.note);
             const auto state = std::tuple(now.what, now.done, now.total);
             if (!callback_.is_none() && now.total > 0 && std::exchange(last_, state) != state)
                 callback_(now.what + " " + now.unit, now.done, now.total);
@@ -44,10 +47,12 @@ class Watch {
     void check() const {
         if (raised_) std::rethrow_exception(raised_);
     }
+    const std::vector<std::string>& notes() const { return notes_; }
 
   private:
     nb::handle callback_;
     std::tuple<std::string, int, int> last_;
+    std::vector<std::string> notes_;
     std::exception_ptr raised_;
 };
 
@@ -67,6 +72,7 @@ LoadedDataset find_cameras(const fs::path& photos, const fs::path& output, int f
             make_dataset(photos, output, options, [&](const CaptureProgress& now) { return watch(now); });
     }
     watch.check();
+    for (const std::string& note : watch.notes()) warn(PyExc_UserWarning, spelled(note.c_str()));
     for (const std::string& remark : capture.remarks) warn(PyExc_UserWarning, spelled(remark.c_str()));
     return open_dataset(output);
 }

@@ -308,6 +308,13 @@ void bind_dataset(nb::module_& module) {
              "InputError.")
         .def_prop_ro("root", [](const LoadedDataset& d) { return d.dataset->root; })
         .def_prop_ro(
+            "used", [](const LoadedDataset& d) { return used_text(*d.dataset); },
+            "What was used of what was found, such as \"8 of 8 photos, 0 of 8 masks (...)\". A warning, too, "
+            "where masks, depth maps or most photos are not used.")
+        .def_prop_ro(
+            "notes", [](const LoadedDataset& d) { return d.dataset->notes; },
+            "What was chosen where the files leave a choice, and what they have that is not used.")
+        .def_prop_ro(
             "frames", [](const LoadedDataset& d) { return d.dataset->frames; }, "In the order of names.")
         .def_prop_ro("images", images_of)
         .def_prop_ro(

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "inputs.h"
 
+#include <algorithm>
+
 #include "arrays.h"
 #include "core/typing.h"
 #include "errors.h"
@@ -40,7 +42,9 @@ int test_every_of(const std::optional<live::Run>& run) {
 
 }  // namespace
 
-LoadedDataset open_dataset(const fs::path& path, const AskedDataset& asked) {
+namespace {
+
+LoadedDataset read_dataset(const fs::path& path, const AskedDataset& asked) {
     return with_files([&] {
         const std::optional<live::Run> run = live::run_named(path);
         LoadedDataset opened{nullptr, fs::absolute(path), options_of(asked, run), test_every_of(run)};
@@ -59,6 +63,20 @@ LoadedDataset open_dataset(const fs::path& path, const AskedDataset& asked) {
         opened.dataset = SharedDataset(kept, &kept->dataset);
         return opened;
     });
+}
+
+}  // namespace
+
+LoadedDataset open_dataset(const fs::path& path, const AskedDataset& asked) {
+    LoadedDataset opened = read_dataset(path, asked);
+    const Dataset& dataset = *opened.dataset;
+    // Some photos without cameras are usual.
+    const bool unused = std::ranges::any_of(dataset.used, [](const UsedOf& kind) {
+        return !kind.why.empty() && (kind.what != "photo" || 2 * kind.used <= kind.found);
+    });
+    if (unused && opened.options.need_images)
+        warn(PyExc_UserWarning, spelled((path.string() + ": used " + used_text(dataset)).c_str()));
+    return opened;
 }
 
 Splats open_splats(const fs::path& path) {

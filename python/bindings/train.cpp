@@ -27,6 +27,7 @@
 #include "metrics.h"
 #include "options.h"
 #include "report/run_file_names.h"
+#include "run/first_checks.h"
 #include "run/option_table.h"
 #include "run/resume.h"
 #include "run/run_input.h"
@@ -120,20 +121,37 @@ std::string leave_out_passers_by(TrainerStart& start, const Gaussians& splats, c
     return known || masked ? "" : note;
 }
 
+/// What makes the training useless. Evaluations read the held-out images again, if there are any.
+/// init: what the first splats are from, unless they are from the dataset.
+std::vector<train::Finding> findings_of(const TrainerStart& start, const Gaussians& splats,
+                                        const std::string& init) {
+    std::vector<train::Finding> findings = train::check_images(*start.dataset, start.split(), false);
+    const train::FirstPlaces places{splats.size(), [&](size_t i) { return splats.world_mean(i); }, init};
+    for (const train::Finding& finding : train::check_start(*start.dataset, start.frames, places))
+        findings.push_back(finding);
+    return findings;
+}
+
 /// ewa.Trainer
 class Training {
   public:
     Training(TrainerStart start, const FirstSplats& first) : start_(std::move(start)), word_(first.word) {
         start_.own_start = first.given;
         std::string unmasked;
+        std::vector<train::Finding> findings;
         {
             const DeviceWork work;
             Gaussians splats = first.splats(start_);
+            findings = findings_of(start_, splats,
+                                   first.given                    ? "init"
+                                   : train::starts_by_word(word_) ? ""
+                                                                  : word_);
             if (start_.run.robust) unmasked = leave_out_passers_by(start_, splats, work);
             trainer_ = OnDevice(std::make_unique<Trainer>(work.device(), *start_.dataset, start_.frames,
                                                           std::move(splats), start_.run.train));
         }
         say_log();
+        for (const train::Finding& finding : findings) warn(PyExc_UserWarning, spelled(finding.text.c_str()));
         if (!unmasked.empty()) warn(PyExc_UserWarning, spelled(unmasked.c_str()));
     }
 

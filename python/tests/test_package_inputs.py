@@ -101,7 +101,8 @@ def test_points_are_first_splats(still_life, tmp_path):
     points = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
     points += "property float z\nend_header\n0 0 0\n1 0 0\n0 1 0\n"
     (tmp_path / "points.ply").write_text(points)
-    trainer = ewa.Trainer(still_life, steps=1, init=tmp_path / "points.ply", strategy="none")
+    with pytest.warns(UserWarning, match="starts from 3 splats of .*points.ply"):
+        trainer = ewa.Trainer(still_life, steps=1, init=tmp_path / "points.ply", strategy="none")
     assert len(trainer.splats()) == 3
 
 
@@ -259,7 +260,8 @@ def test_cameras_of_photos_are_found(photos, tmp_path):
     assert [frame.name for frame in data.frames] == ["0.png", "1.png", "2.png"]
     assert len(data.points) == 8 and len(ewa.Dataset(tmp_path / "dataset")) == 3
     assert seen and all(isinstance(what, str) and 0 <= n <= all for what, n, all in seen)
-    trainer = ewa.Trainer(data, steps=1, strategy="none", train_frames=[0, 1, 2])
+    with pytest.warns(UserWarning, match="starts from 8 points"):
+        trainer = ewa.Trainer(data, steps=1, strategy="none", train_frames=[0, 1, 2])
     trainer.step()
 
 
@@ -278,3 +280,27 @@ def test_searches_that_fail(photos, tmp_path, monkeypatch):
     monkeypatch.setenv("FAIL", "feature_extractor")
     with pytest.raises(ewa.DeviceError, match="colmap feature_extractor failed"):
         ewa.find_cameras(photos, tmp_path / "out")
+
+
+def copy_of_still_life(folder):
+    shutil.copytree(STILL_LIFE, folder, symlinks=True)
+    return folder
+
+
+def test_what_is_not_used_is_a_warning(tmp_path):
+    data = copy_of_still_life(tmp_path / "a")
+    assert ewa.Dataset(data).used.startswith("48 of 48 photos"), ewa.Dataset(data).used
+    (data / "masks").mkdir(exist_ok=True)
+    photo = data / ewa.Dataset(data).frames[0].image_path.relative_to(data)
+    for name in ("other", "another"):
+        shutil.copy(photo, data / f"masks/{name}.png")
+    with pytest.warns(UserWarning, match="0 of 2 masks .masks/another.png"):
+        changed = ewa.Dataset(data)
+    assert "0 of 2 masks" in changed.used and isinstance(changed.notes, list)
+
+
+def test_what_makes_a_training_useless_is_a_warning(still_life):
+    away = make_splats()
+    away.means = away.means + np.float32(1e4)
+    with pytest.warns(UserWarning, match="none of the first splats of init is in view"):
+        ewa.Trainer(still_life, init=away, steps=1)

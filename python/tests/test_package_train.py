@@ -424,7 +424,7 @@ def test_robust_trainings_are_those_of_the_command_line(passers_by, program, tmp
 
 
 def test_short_robust_trainings_mask_nothing(passers_by, tmp_path):
-    with pytest.warns(UserWarning, match="robust: nothing is masked, since 6 steps show too little"):
+    with pytest.warns(UserWarning, match="robust: nothing is masked, since 6 steps are too few to find what only one image shows"):
         trainer = ewa.Trainer(passers_by, steps=6, robust=True, max_splats=3000)
     trainer.step()
     trainer.save_checkpoint(tmp_path / "short.ewa")

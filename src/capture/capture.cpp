@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <map>
 #include <memory>
@@ -46,12 +47,22 @@ bool is_video(const fs::path& path) {
     return is_file(path) && capture::is_film(path);
 }
 
-/// The folder in which an archive has everything: itself, or a folder that is alone in it.
+/// The folder in which an archive has everything: itself, or the only one in it that is a dataset with photos, or the only one that has
+/// cameras or photos.
 fs::path main_folder(fs::path folder) {
-    while (!io::is_dataset_folder(folder)) {
-        const auto first = fs::directory_iterator(folder);
-        if (std::distance(first, {}) != 1 || !fs::directory_iterator(folder)->is_directory()) break;
-        folder = fs::directory_iterator(folder)->path();
+    while (!io::is_dataset_folder(folder, false) && io::list_images(folder, false).empty() &&
+           !(io::has_photos_folder(folder) && io::is_dataset_folder(folder))) {
+        std::vector<fs::path> whole, some;
+        for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+            if (!entry.is_directory()) continue;
+            const bool cameras = io::is_dataset_folder(entry.path()),
+                       photos = !capture::photo_files(entry.path()).empty();
+            if (cameras && photos) whole.push_back(entry.path());
+            if (cameras || photos) some.push_back(entry.path());
+        }
+        if (whole.size() != 1) whole = some;
+        if (whole.size() != 1) break;
+        folder = whole[0];
     }
     return folder;
 }
@@ -67,12 +78,14 @@ fs::path folder_of_photos(const fs::path& folder) {
     return folder;
 }
 
-/// The videos that a dataset is made of: the input itself, or those of a folder without photos.
-std::vector<fs::path> videos_of(const fs::path& input) {
+/// The videos that a dataset is made of: the input itself, or those of a folder without photos. proxies: get those that are left out.
+std::vector<fs::path> videos_of(const fs::path& input, std::vector<fs::path>* proxies = nullptr) {
     if (is_video(input)) return {input};
-    std::vector<fs::path> videos;
-    if (is_folder(input) && capture::photo_files(folder_of_photos(input)).empty())
-        for (const fs::path& name : capture::films_in(input)) videos.push_back(input / name);
+    if (!is_folder(input) || !capture::photo_files(folder_of_photos(input)).empty()) return {};
+    std::vector<fs::path> videos = capture::films_in(input);
+    const std::vector<fs::path> copies = capture::take_proxies(videos);
+    if (proxies) *proxies = copies;
+    for (fs::path& video : videos) video = input / video;
     return videos;
 }
 
@@ -234,6 +247,7 @@ struct Making {
     const capture::ProgressFunction& progress;
     Json record, before;           // before: of what has begun; null: nothing has
     std::vector<fs::path> videos;  // none: the input is photos or an archive
+    std::vector<fs::path> proxies = {};
     std::unique_ptr<core::FolderLock> lock = nullptr;
 
     /// After all errors of the input: they leave no folder.
@@ -256,6 +270,10 @@ Capture make_of_video(Making& now) {
     require_programs(now.folder, true);
     now.begin();
     core::make_folder(work);
+    if (const size_t count = now.proxies.size(); count > 0)
+        say({std::to_string(count) + (count == 1 ? " proxy is" : " proxies are") +
+             " not used, by the name a small copy of a film: " + core::one_line(now.proxies[0].string())},
+            now.progress);
     if (!fs::exists(fs::symlink_status(images)))
         say(capture::extract_frames(now.videos, images, now.options.frames, work / "log.txt", now.progress),
             now.progress);
@@ -319,13 +337,9 @@ Capture make_of_photos(Making& now, const fs::path& photos, const fs::path& link
     now.begin();
     core::make_folder(now.folder / "colmap");
     convert(now, photos, link, chosen);
-    const size_t masked =
-        capture::copy_masks(photos, chosen.names, now.folder / "images", now.folder / "masks", now.progress);
-    if (masked > 0)
-        say({std::to_string(masked) + " of " + core::counted(chosen.names.size(), "photo") +
-             (masked == 1 ? " has a mask" : " have masks") +
-             ": what is black there is neither searched nor trained"},
-            now.progress);
+    const std::string masks = capture::copy_masks(photos, chosen.names, now.folder / "images",
+                                                  now.folder / "masks", now.input, now.progress);
+    if (!masks.empty()) say({masks}, now.progress);
     return search(now.folder, chosen, now.options, now.progress);
 }
 
@@ -381,9 +395,10 @@ Capture make_of_archive(Making& now) {
 
 Capture make(const fs::path& input, const fs::path& folder, const CaptureOptions& options,
              const capture::ProgressFunction& progress) {
-    const std::vector<fs::path> videos = videos_of(input);
+    std::vector<fs::path> proxies;
+    const std::vector<fs::path> videos = videos_of(input, &proxies);
     const bool video = !videos.empty();
-    Making now{input, folder, options, progress, record_of(input, options, video), {}, videos};
+    Making now{input, folder, options, progress, record_of(input, options, video), {}, videos, proxies};
     now.before = check_claim(folder, now.record, video);
     if (video) return make_of_video(now);
     if (is_archive(input)) return make_of_archive(now);
@@ -410,6 +425,19 @@ std::string splat_kind(const fs::path& file) try {
     return {};
 }
 
+/// Photos as the sensor has them, which have to be developed. Empty where the folder has none.
+std::string raw_photos_text(const fs::path& folder) {
+    constexpr std::array kRaw{".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw"};
+    uint64_t count = 0;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder_of_photos(folder)))
+        count += std::ranges::find(kRaw, extension_of(entry.path())) != kRaw.end();
+    return count == 0
+               ? std::string()
+               : ": " + core::counted(count, "raw photo") +
+                     ", which ewa does not develop; convert to JPEG, as darktable-cli does (Debian: apt "
+                     "install darktable)";
+}
+
 /// Throws what the path is instead of an input; `otherwise` if nothing is known.
 [[noreturn]] void refuse(const fs::path& path, const char* otherwise) {
     const std::string name = core::one_line(path.string());
@@ -420,6 +448,8 @@ std::string splat_kind(const fs::path& file) try {
         if (const std::string kind = splat_kind(path); !kind.empty())
             throw InputError(name + " is " + kind + ", not a folder of photos, a video or a dataset");
     }
+    if (is_folder(path))
+        if (const std::string raw = raw_photos_text(path); !raw.empty()) throw InputError(name + raw);
     throw InputError(name + ": " + otherwise);
 }
 
@@ -472,6 +502,12 @@ bool is_capture(const fs::path& path) {
 
 bool has_videos(const fs::path& path) {
     return !videos_of(path).empty();
+}
+
+std::string capture_text(const fs::path& path) {
+    if (const std::vector<fs::path> videos = videos_of(path); !videos.empty())
+        return core::counted(videos.size(), "video");
+    return core::counted(capture::photos_in(folder_of_photos(path)).size(), "photo");
 }
 
 ImageSize smallest_image(const fs::path& input) {

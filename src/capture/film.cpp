@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <regex>
 
@@ -240,10 +241,31 @@ std::string matrix_word(const FilmInfo& info) {
 }
 
 bool is_film(const fs::path& file) {
-    constexpr std::array kExtensions{".mp4", ".mov", ".m4v", ".mkv",  ".webm", ".avi", ".mts", ".m2ts",
-                                     ".ts",  ".3gp", ".3g2", ".wmv",  ".asf",  ".ogv", ".gif", ".mpg",
-                                     ".flv", ".mxf", ".lrv", ".mpeg", ".insv", ".360"};
+    constexpr std::array kExtensions{".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi",  ".mts", ".m2ts",
+                                     ".ts",  ".3gp", ".3g2", ".wmv", ".asf",  ".ogv",  ".gif", ".mpg",
+                                     ".flv", ".mxf", ".lrv", ".lrf", ".mpeg", ".insv", ".360"};
     return std::ranges::find(kExtensions, core::lower(file.extension().string())) != kExtensions.end();
+}
+
+std::vector<fs::path> take_proxies(std::vector<fs::path>& films) {
+    const auto is_proxy = [](const fs::path& film) {
+        // GoPro's and DJI's, Insta360's, Sony's, and those of editors.
+        const std::string extension = core::lower(film.extension().string()),
+                          stem = core::lower(film.stem().string());
+        const auto is_folder_of = [](const fs::path& part) {
+            const std::string name = core::lower(part.string());
+            return name == "proxy" || name == "proxies";
+        };
+        static const std::regex sony(".*[0-9]s0[0-9]"), editors("(.*[_. -])?proxy([_. -].*)?");
+        return extension == ".lrv" || extension == ".lrf" || stem.starts_with("lrv_") ||
+               std::regex_match(stem, sony) || std::regex_match(stem, editors) ||
+               std::ranges::any_of(film.parent_path(), is_folder_of);
+    };
+    std::vector<fs::path> proxies;
+    std::ranges::copy_if(films, std::back_inserter(proxies), is_proxy);
+    if (proxies.size() == films.size()) return {};
+    std::erase_if(films, is_proxy);
+    return proxies;
 }
 
 HdrTransfer hdr_transfer(const FilmInfo& info) {

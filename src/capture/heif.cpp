@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Photos of HEIF's family (HEIC, AVIF) become JPEG, by whatever program reads them here. It keeps EXIF, and turns the pixels.
+// Photos of HEIF's family (HEIC, AVIF) become JPEG, by whatever program or library reads them here. It keeps EXIF, and turns the
+// pixels.
 #include <algorithm>
 #include <array>
 
@@ -58,7 +59,9 @@ bool convert(const fs::path& photo, const fs::path& plain, const fs::path& jpeg,
                 return true;
             }
     }
-    return false;
+    if (!image::write_jpeg_of_heif(in, out)) return false;
+    fs::rename(out, jpeg);
+    return true;
 }
 
 }  // namespace
@@ -69,7 +72,7 @@ bool is_heif(const fs::path& file) {
 }
 
 bool converts_heif() {
-    return std::ranges::any_of(kConverters, is_here);
+    return std::ranges::any_of(kConverters, is_here) || image::reads_heif();
 }
 
 fs::path converted_name(const fs::path& name) {

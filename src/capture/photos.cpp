@@ -65,12 +65,15 @@ bool below_companions(const fs::path& file) {
     });
 }
 
-/// The photo's name of "IMG_1_mask.png", without the extension. Empty for other names.
+/// The photo's name of "IMG_1_mask.png" or "mask_IMG_1.png", without the extension. Empty for other names.
 std::string photo_of_companion(const fs::path& file) {
     const std::string stem = core::lower(file.stem().string());
     const size_t last = stem.find_last_of("_-.");
-    if (last == std::string::npos || !is_companion(stem.substr(last + 1))) return {};
-    return (file.parent_path() / fs::path(stem.substr(0, last)).stem()).string();
+    if (last != std::string::npos && (is_companion(stem.substr(last + 1)) || stem.ends_with("alpha")))
+        return (file.parent_path() / fs::path(stem.substr(0, last)).stem()).string();
+    const size_t first = stem.find_first_of("_-.");
+    if (first == std::string::npos || !is_companion(stem.substr(0, first))) return {};
+    return (file.parent_path() / stem.substr(first + 1)).string();
 }
 
 /// COLMAP takes the names as lines, without the blanks around them.
@@ -123,7 +126,8 @@ Pictures pictures_in(const fs::path& folder) {
     if (pictures.photos.empty()) std::swap(pictures.photos, pictures.others);
     std::erase_if(pictures.photos, [&](const fs::path& file) {
         // A telephone may leave a JPEG beside each photo.
-        const bool other = stems.contains(is_heif(file) ? stem_of(file) : photo_of_companion(file));
+        const bool of_all = core::lower(file.stem().string()) == "mask" && pictures.photos.size() > 1;
+        const bool other = of_all || stems.contains(is_heif(file) ? stem_of(file) : photo_of_companion(file));
         if (other) pictures.others.push_back(file);
         return other;
     });
@@ -156,7 +160,7 @@ std::vector<fs::path> photos_in(const fs::path& folder) {
     if (const auto heif = std::ranges::count_if(files, is_heif); heif > 0 && !converts_heif())
         throw InputError(name + ": " + core::counted(uint64_t(heif), "photo") + " " +
                          std::string(core::is_or_are(uint64_t(heif))) +
-                         " HEIC or AVIF, and no program here reads them; heif-convert does "
+                         " HEIC or AVIF, and nothing here reads them; heif-convert does "
                          "(Debian: apt install libheif-examples)");
     for (const fs::path& file : files)
         if (!core::links_stay_inside(folder, file))

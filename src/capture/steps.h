@@ -91,6 +91,8 @@ std::vector<std::filesystem::path> photos_in(const std::filesystem::path& folder
 bool is_film(const std::filesystem::path& file);
 /// The films of a folder and the folders below it, as the photos.
 std::vector<std::filesystem::path> films_in(const std::filesystem::path& folder);
+/// Takes out the small copies that cameras and editors write beside films, if there are other films. Returns them.
+std::vector<std::filesystem::path> take_proxies(std::vector<std::filesystem::path>& films);
 
 /// Whether the photo is of HEIF's family (HEIC, AVIF), which COLMAP does not read.
 bool is_heif(const std::filesystem::path& file);
@@ -104,12 +106,12 @@ void convert_photos(const std::filesystem::path& photos, const std::vector<std::
                     const std::filesystem::path& folder, const std::filesystem::path& log,
                     const ProgressFunction& progress);
 
-/// Copies the masks of photos into a folder as COLMAP wants them: NAME.png of the photo's name and size. Values of 0 and 1 become 0
-/// and 255. They lie among the photos, or in masks/ or mask/ beside their folder. names: of the photos in `images`. Newer copies
-/// stay. Returns the number of photos with masks. Throws InputError, RunError, Stopped.
-size_t copy_masks(const std::filesystem::path& photos, const std::vector<std::filesystem::path>& names,
-                  const std::filesystem::path& images, const std::filesystem::path& masks,
-                  const ProgressFunction& progress);
+/// Copies the masks of photos into a folder as COLMAP wants them: NAME.png of the photo's name and size. They are found as those of a
+/// dataset, and mean the same. names: of the photos in `images`. project: what the user named. Newer copies stay. Returns a line for
+/// the user; empty if there are no masks. Throws InputError, RunError, Stopped.
+std::string copy_masks(const std::filesystem::path& photos, const std::vector<std::filesystem::path>& names,
+                       const std::filesystem::path& images, const std::filesystem::path& masks,
+                       const std::filesystem::path& project, const ProgressFunction& progress);
 
 /// A photo that COLMAP does not get.
 struct Skipped {

@@ -269,11 +269,13 @@ void info_dataset(const fs::path& path, const fs::path& named, int test_every, b
     fmt::print("{}\nkind            {}\n", core::one_line(named.string()), dataset.format);
     if (!dataset.program.empty()) fmt::print("program         {}\n", core::one_line(dataset.program));
     for (const std::string& note : dataset.notes) fmt::print("note            {}\n", core::one_line(note));
-    fmt::print("used            {}\n", used_text(dataset));
+    if (!dataset.used.empty()) fmt::print("used            {}\n", used_text(dataset));
     for (const std::string& warning : warnings) fmt::print("warning         {}\n", core::one_line(warning));
-    if (dataset.frame_rate > 0) fmt::print("rate            {:.6g} frames per second\n", dataset.frame_rate);
-    fmt::print("frames          {} ({} train, {} test with --test-every {})\n", dataset.frames.size(),
-               split.train.size(), split.test.size(), test_every);
+    if (dataset.frame_rate > 0)  // a path, which is drawn and not trained on
+        fmt::print("frames          {}, {:.6g} per second\n", dataset.frames.size(), dataset.frame_rate);
+    else
+        fmt::print("frames          {} ({} train, {} test with --test-every {})\n", dataset.frames.size(),
+                   split.train.size(), split.test.size(), test_every);
     if (dataset.missing_images > 0)
         fmt::print("images          {} missing; their frames are skipped unless all images are missing\n",
                    dataset.missing_images);
@@ -369,12 +371,26 @@ void info_image(const fs::path& path, std::string_view format, bool json) {
         fmt::print("orientation     {} in EXIF: to be turned or mirrored when shown\n", size.orientation);
 }
 
+/// Photos or videos that have no cameras yet.
+void info_capture(const fs::path& path, bool json) {
+    const std::string text = capture_text(path);
+    const ImageSize size = smallest_image(path);
+    if (json)
+        return print_json(
+            {{"kind", "capture"}, {"contents", text}, {"width", size.width}, {"height", size.height}});
+    fmt::print("{}\nkind            {} without cameras; ewa train finds them first, ewa cameras alone\n",
+               core::one_line(path.string()), text);
+    if (size.width > 0) fmt::print("smallest image  {}x{}\n", size.width, size.height);
+}
+
 int run(const InfoArguments& arguments) {
     const fs::path& path = arguments.path;
     std::error_code error;
     if (!fs::exists(path, error)) throw InputError(path.string() + ": no such file or folder");
     if (const auto run = run_named(path))
         info_splats(splat_input(path).file, &*run, arguments);
+    else if (!is_archive(path) && is_capture(path))
+        info_capture(path, arguments.json);
     else if (fs::is_directory(path) || (path.extension() == ".json" && !is_sog(path)) ||
              io::find_importer(path))
         info_dataset(path, path, arguments.test_every, arguments.json);
@@ -403,7 +419,7 @@ Action add_info(CLI::App& app) {
                    ".gltf .usda "
                    ".usdz .rad), COLMAP folder, "
                    "transforms.json, cameras of another program, zip archive of one of these, "
-                   "glTF file of meshes, image, or folder of a training run")
+                   "glTF file of meshes, image, folder of photos, video, or folder of a training run")
         ->required();
     add_test_every_option(app, arguments->test_every);
     app.add_flag("--json", arguments->json, "Print JSON");

@@ -104,8 +104,17 @@ std::string FileReader::read_zero_terminated(size_t limit, std::string_view what
     return text;
 }
 
+void refuse_utf16(std::string_view text, const std::string& name) {
+    if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff"))
+        throw InputError(name + ": is UTF-16; save it as UTF-8");
+}
+
 bool FileReader::read_line(std::string& line, size_t limit) {
     line.clear();
+    if (offset_ == 0 && remaining() >= 2) {
+        fill(2);
+        refuse_utf16({reinterpret_cast<const char*>(buffer_.data()) + begin_, 2}, name_);
+    }
     if (offset_ == 0 && remaining() >= kByteOrderMark.size()) {
         fill(kByteOrderMark.size());
         if (std::memcmp(buffer_.data() + begin_, kByteOrderMark.data(), kByteOrderMark.size()) == 0)

@@ -71,6 +71,9 @@ class FileReader {
     size_t begin_ = 0, end_ = 0;  // the part of the buffer that was read from the file but not taken
 };
 
+/// Throws InputError for a text with the byte order mark of UTF-16, which Windows' programs write.
+void refuse_utf16(std::string_view text, const std::string& name);
+
 /// The whole file as text. Throws InputError.
 std::string read_text_file(const std::filesystem::path& path);
 

@@ -182,6 +182,7 @@ void check_size(uint64_t bytes, const std::string& name, const JsonLimits& limit
 template <class Json>
 Json parse_json(std::string_view text, const std::string& name, const JsonLimits& limits) {
     check_size(text.size(), name, limits);
+    refuse_utf16(text, name);
     Builder<Json> builder(name, limits);
     std::string marked;
     if (limits.not_finite && (text.find("NaN") != text.npos || text.find("Infinity") != text.npos))

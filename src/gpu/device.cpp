@@ -344,6 +344,12 @@ DeviceNeeds::DeviceNeeds(VkPhysicalDevice handle, uint32_t api_version) {
     if (subgroups.controlled) vulkan12.pNext = &subgroup_sizes;
 }
 
+void DeviceNeeds::use(VkPhysicalDeviceVulkan13Features& vulkan13) {
+    vulkan13.subgroupSizeControl |= subgroup_sizes.subgroupSizeControl;
+    vulkan13.computeFullSubgroups |= subgroup_sizes.computeFullSubgroups;
+    vulkan12.pNext = &vulkan13;
+}
+
 namespace {
 
 struct Found {

@@ -122,6 +122,23 @@ Image load_image(const fs::path& path) {
     return with_name(path.string(), [&] { return with_colour(read_file(path, true)); });
 }
 
+namespace image {
+
+bool reads_heif() try { return openimageio().reads_heif(); } catch (const RunError&) {
+    return false;  // there is no module
+}
+
+bool write_jpeg_of_heif(const fs::path& heif, const fs::path& jpeg) try {
+    const uint64_t bytes = fs::file_size(heif);
+    openimageio().jpeg_of_heif(heif.string(), jpeg.string(),
+                               [&](const ImageHeader& header) { check_limits(header, bytes); });
+    return true;
+} catch (const std::exception&) {
+    return false;
+}
+
+}  // namespace image
+
 namespace {
 
 constexpr int kJpegQuality = 95;

@@ -50,6 +50,11 @@ std::string image_fault(const std::filesystem::path& path);
 /// Whether a PNG or JPEG has its last bytes, without decoding it. True for other formats.
 bool ends_as_an_image(const std::filesystem::path& path);
 
+/// Whether OpenImageIO is here and has libheif.
+bool reads_heif();
+/// As OpenImageIO::jpeg_of_heif. Returns whether it has written the JPEG.
+bool write_jpeg_of_heif(const std::filesystem::path& heif, const std::filesystem::path& jpeg);
+
 /// What a JPEG's EXIF says of how it was taken. Empty for other files.
 struct Shot {
     std::string lens;  // text for the camera and its focal length: equal for photos of one lens at one zoom
@@ -158,12 +163,18 @@ struct OpenImageIO {
                         const std::function<void(const ImageHeader&)>& check);
     /// The bytes of an EXR file of 32-bit floats.
     std::vector<unsigned char> (*encode_exr)(const Image& image);
+    /// Whether this OpenImageIO has libheif.
+    bool (*reads_heif)();
+    /// Writes the first picture of a HEIF, HEIC or AVIF file as a JPEG of 8 bits with its EXIF and colour profile, upright. Calls
+    /// `check` before it takes memory for the pixels.
+    void (*jpeg_of_heif)(const std::string& heif, const std::string& jpeg,
+                         const std::function<void(const ImageHeader&)>& check);
 };
 constexpr const char* kModuleFile = "libewa_openimageio.so";
 /// Ends in the number of the layout. Count it up whenever a type above changes: a module of another layout
 /// then has no such entry, and is refused.
-constexpr const char* kModuleEntry = "ewa_openimageio_layout_1";
-static_assert(sizeof(void*) != 8 || (sizeof(OpenImageIO) == 32 && sizeof(StoredImage) == 48 &&
+constexpr const char* kModuleEntry = "ewa_openimageio_layout_2";
+static_assert(sizeof(void*) != 8 || (sizeof(OpenImageIO) == 48 && sizeof(StoredImage) == 48 &&
                                      sizeof(ImageHeader) == 32 && sizeof(Image) == 40));
 
 /// Loads the module at the first call, from its folder beside the program or libewa, and sets ewa's limits.

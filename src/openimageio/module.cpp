@@ -89,7 +89,32 @@ std::vector<unsigned char> encode_exr(const Image& image) {
     return bytes;
 }
 
+bool reads_heif() {
+    return OIIO::ImageInput::create("heif") != nullptr;
+}
+
+void jpeg_of_heif(const std::string& heif, const std::string& jpeg,
+                  const std::function<void(const ImageHeader&)>& check) {
+    constexpr int kQuality = 95;
+    const auto input = OIIO::ImageInput::create("heif");
+    OIIO::ImageSpec spec;
+    if (!input) fail(OIIO::geterror());
+    if (!input->open(heif, spec)) fail(input->geterror());
+    check({uint64_t(spec.width), uint64_t(spec.height), uint64_t(spec.nchannels), spec.format.size()});
+    const int channels = spec.nchannels < 3 ? 1 : 3;
+    std::vector<uint8_t> pixels(size_t(spec.width) * size_t(spec.height) * size_t(channels));
+    if (!input->read_image(0, 0, 0, channels, OIIO::TypeDesc::UINT8, pixels.data())) fail(input->geterror());
+    spec.nchannels = channels;
+    spec.alpha_channel = -1;
+    spec.set_format(OIIO::TypeDesc::UINT8);
+    spec.attribute("Compression", "jpeg:" + std::to_string(kQuality));
+    const auto output = OIIO::ImageOutput::create(jpeg);
+    if (!output) fail(OIIO::geterror());
+    if (!output->open(jpeg, spec) || !output->write_image(spec.format, pixels.data()) || !output->close())
+        fail(output->geterror());
+}
+
 }  // namespace
 
-extern "C" __attribute__((visibility("default"))) const OpenImageIO ewa_openimageio_layout_1;
-const OpenImageIO ewa_openimageio_layout_1 = {EWA_VERSION, limit, read, encode_exr};
+extern "C" __attribute__((visibility("default"))) const OpenImageIO ewa_openimageio_layout_2;
+const OpenImageIO ewa_openimageio_layout_2 = {EWA_VERSION, limit, read, encode_exr, reads_heif, jpeg_of_heif};

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <glm/matrix.hpp>
+#include <map>
 #include <optional>
 
 #include "core/parallel.h"
@@ -15,6 +16,7 @@
 #include "image/image_files.h"
 #include "scene/frame_images.h"
 #include "scene/frustum.h"
+#include "scene/mask.h"
 #include "scene/native_lens.h"
 #include "scene/readout.h"
 
@@ -43,7 +45,7 @@ bool shows_something(const Image& image) {
 /// The same of a frame, whose image is read only where it may have alpha.
 bool shows_something(const Frame& frame) {
     if (frame.masks == MaskUse::none || !frame.image_exists) return true;
-    if (!frame.mask_path.empty()) return has_value(load_image(frame.mask_path), 0);
+    if (!frame.mask_path.empty()) return has_value(scene::load_mask(frame.mask_path), 0);
     return image::format_name(frame.image_path) == "jpeg" ||
            shows_something(load_frame_image(as_stored(frame)));
 }
@@ -90,6 +92,38 @@ std::optional<Finding> damaged_files(const Dataset& dataset) {
             faults.push_back(core::one_line(frame.name) +
                              " cannot be read: " + std::string(core::trim(fault)));
     }
+    if (faults.empty()) return std::nullopt;
+    return Finding{faults[0] + and_more(faults.size()), true};
+}
+
+/// Masks of another shape than their images, and those that cannot be read. Of many, one is decoded.
+std::optional<Finding> bad_masks(const Dataset& dataset) {
+    constexpr size_t kMostPixels = 20'000'000;
+    std::map<std::filesystem::path, ImageSize> sizes;
+    std::vector<std::string> faults;
+    const auto try_mask = [&](const std::function<void()>& work) {
+        try {
+            work();
+        } catch (const InputError& error) {
+            faults.emplace_back(error.what());
+        }
+    };
+    size_t pixels = 0;
+    for (const Frame& frame : dataset.frames)
+        if (frame.masks != MaskUse::none && !frame.mask_path.empty() && frame.image_exists)
+            try_mask([&] {
+                const auto [at, is_new] = sizes.try_emplace(frame.mask_path);
+                if (is_new) at->second = read_image_size(frame.mask_path);
+                if (at->second.width > 0)
+                    scene::mask_turn(frame.mask_path, at->second, read_image_size(frame.image_path));
+                pixels += is_new ? size_t(at->second.width) * size_t(at->second.height) : 0;
+            });
+    size_t decoded = pixels > kMostPixels ? 1 : sizes.size();
+    for (const auto& [path, size] : sizes)
+        if (size.width > 0 && decoded > 0) {
+            try_mask([&] { scene::load_mask(path); });
+            --decoded;
+        }
     if (faults.empty()) return std::nullopt;
     return Finding{faults[0] + and_more(faults.size()), true};
 }
@@ -185,7 +219,8 @@ std::string nothing_to_train_on(const Dataset& dataset, const Split& split) {
     return fmt::format("{} {} held out, and none is left to train on{}; {}",
                        core::counted(dataset.frames.size(), "image"), core::is_or_are(dataset.frames.size()),
                        dataset.missing_images > 0 ? fmt::format(" ({} missing)", dataset.missing_images) : "",
-                       own ? "the dataset itself says so" : "--test-every 0 holds none out");
+                       own ? "the dataset itself says so; --test-every 0 trains on all of them"
+                           : "--test-every 0 holds none out");
 }
 
 std::vector<Finding> check_images(const Dataset& dataset, const Split& split, bool decode) try {
@@ -193,7 +228,7 @@ std::vector<Finding> check_images(const Dataset& dataset, const Split& split, bo
     for (const int i : split.test)
         if (dataset.frames[size_t(i)].alpha_weighs()) weighed.push_back(i);
     if (weighed.size() < split.test.size()) weighed.clear();
-    return found({decode ? damaged_held_out(dataset, split.test) : damaged_files(dataset),
+    return found({bad_masks(dataset), decode ? damaged_held_out(dataset, split.test) : damaged_files(dataset),
                   nothing_shown(dataset, split.train, "training image", "nothing is learned from them"),
                   nothing_shown(dataset, weighed, "held-out image", "no figure is measured")});
 } catch (const InputError& error) {

@@ -192,8 +192,8 @@ std::string leave_out_passers_by(const std::shared_ptr<gpu::Device>& device, Run
     const int enough = scout_options(input).steps / 2, steps = input.options.train.steps;
     if (scouts && steps < enough)
         return fmt::format(
-            "robust: nothing is masked, since {} show too little of what single images have; "
-            "{} or more search for it",
+            "robust: nothing is masked, since {} are too few to find what only one image shows; {} are "
+            "enough",
             core::counted(uint64_t(steps), "step"), enough);
     const Masks own = scouts ? scouted_masks(device, input, observer) : known.value_or(Masks());
     const Masks masks = unpacked(portions::from_rank_0(ranks, packed(own)));

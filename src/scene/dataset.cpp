@@ -43,13 +43,7 @@ Image load_file(const Frame& frame) {
     Image image = scene::load_finite_image(frame.image_path);
     if (frame.masks == MaskUse::none) return image.channels == 3 ? image : channels_of(image, 0, 3);
     if (frame.mask_path.empty()) return image;
-    const Image mask = scene::load_mask(frame.mask_path);
-    if (!same_aspect(image.width, image.height, mask.width, mask.height))
-        throw InputError(core::one_line(frame.mask_path.string()) + ": the mask is " +
-                         std::to_string(mask.width) + " x " + std::to_string(mask.height) +
-                         " pixels, its image " + std::to_string(image.width) + " x " +
-                         std::to_string(image.height));
-    return with_mask(image, mask);
+    return with_mask(image, scene::load_mask(frame.mask_path, read_image_size(frame.image_path)));
 }
 
 /// The image with the weights of its pixels as alpha. frame: with left_out.
@@ -90,6 +84,7 @@ Split split_frames(const Dataset& dataset, int test_every) {
         const bool test = own != 0 ? own == 2 : test_every > 0 && i % test_every == 0;
         (test ? split.test : split.train).push_back(i);
     }
+    if (test_every == 0 && split.train.empty()) std::swap(split.train, split.test);
     return split;
 }
 

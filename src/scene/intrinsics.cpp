@@ -73,6 +73,12 @@ std::string intrinsics_fault(const Camera& camera, const Distortion& lens) {
     const bool parallel = lens.lens == Lens::orthographic;
     const double least = parallel ? kLeastUnit : kLeastFocal * side,
                  most = parallel ? kMostUnit : kMostFocal * side;
+    constexpr double kFraction = 2, kSmallest = 32;  // px
+    for (const double focal : {camera.fx, camera.fy})
+        if (!parallel && focal < kFraction && side >= kSmallest)
+            return "a focal length of " + core::shown_number(focal) +
+                   " px looks like a fraction of the width; " + image_of(camera) +
+                   " needs it in pixels, and the principal point too";
     for (const double focal : {camera.fx, camera.fy})
         if (!(focal >= least && focal <= most))
             return "a focal length of " + core::shown_number(focal) +

@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "core/text.h"
 #include "ewa/error.h"
 #include "image/image_files.h"
+#include "scene/camera.h"
 
 namespace ewa::scene {
 
@@ -50,6 +53,49 @@ bool is_grey(const Image& image) {
     return true;
 }
 
+/// What a mask's pixels are, as levels of the file.
+struct Levels {
+    std::vector<char> there, flat;  // by level above 0: some pixel has it, and one with equal neighbours
+    size_t near = 0, far = 0;       // neighbours whose levels differ by one level, and by more
+};
+
+Levels levels_of(const Image& mask, float levels) {
+    Levels found{std::vector<char>(size_t(levels) + 1), std::vector<char>(size_t(levels) + 1)};
+    const auto level = [&](int x, int y) {
+        return size_t(std::clamp(std::round(*mask.at(x, y) * levels), 0.0f, levels));
+    };
+    for (int y = 0; y < mask.height; ++y)
+        for (int x = 0; x < mask.width; ++x) {
+            const size_t here = level(x, y);
+            bool flat = mask.width > 1 && mask.height > 1;
+            for (const auto& [i, k] : {std::pair(x - 1, y), {x, y - 1}, {x + 1, y}, {x, y + 1}}) {
+                if (i < 0 || k < 0 || i >= mask.width || k >= mask.height) continue;
+                const size_t other = level(i, k);
+                if (other == here) continue;
+                flat = false;
+                ++((std::max(here, other) - std::min(here, other) == 1) ? found.near : found.far);
+            }
+            found.there[here] = 1;
+            if (flat) found.flat[here] = 1;
+        }
+    found.there[0] = found.flat[0] = 0;
+    return found;
+}
+
+/// Whether the values number objects: most of them fill regions, whose borders are hard. A soft mask has values that are only at
+/// borders, or it changes slowly. One value is a weight if it is a half, or nearly white. white: the largest level. large: of a part of
+/// the image that is no rest of a border.
+bool numbers_objects(const Image& mask, float levels, float white, bool large) {
+    constexpr float kSlow = 32, kNearWhite = 200.0f / 255;
+    constexpr std::ptrdiff_t kMany = 4;  // regions
+    const Levels found = levels_of(mask, levels);
+    const auto there = std::ranges::count(found.there, 1), flat = std::ranges::count(found.flat, 1);
+    const float half = std::floor(levels / 2);
+    if (2 * flat <= there || (there == 1 && (white == half || white == half + 1))) return false;
+    if (white >= kNearWhite * levels && flat < kMany) return false;
+    return (large && white < kSlow) || found.near < found.far;
+}
+
 /// Programs that number objects write 1 where others write white.
 void stretch(Image& mask, const std::filesystem::path& path) {
     constexpr float kEight = 255, kSixteen = 65535, kFewest = 16;  // levels
@@ -58,16 +104,23 @@ void stretch(Image& mask, const std::filesystem::path& path) {
     // Lossy files have noise, and floating-point ones are exact.
     if (format != "png" && format != "tiff" && format != "bmp" && format != "pnm") return;
     const float largest = *std::ranges::max_element(mask.pixels);
-    const float levels = read_image_size(path).eight_bit ? kEight : kSixteen;
+    float levels = read_image_size(path).eight_bit ? kEight : kSixteen;
     const float white = std::round(largest * levels);
-    if (white > kEight || white < 1 || (levels == kEight && white >= kFewest)) return;
+    if (white < 1) return;
+    const float scale = white == 1 ? levels : white >= kFewest && white <= kEight ? levels / kEight : 1;
+    for (float& value : mask.pixels) value *= scale;
+    levels /= scale;
+    if (white >= levels) return;
     const auto seen = std::ranges::count_if(mask.pixels, [](float value) { return value > 0; });
-    if (white > 1 && white<kFewest&& double(seen)> kObject * double(mask.pixels.size()))
-        throw InputError(core::one_line(path.string()) + ": the mask's largest value is " +
-                         std::to_string(int(white)) +
-                         ", which is almost black; a mask is white where its image counts");
-    if (white > 1 && white < kFewest) return;
-    for (float& value : mask.pixels) value *= levels / (white == 1 ? 1 : kEight);
+    const bool large = double(seen) > kObject * double(mask.pixels.size());
+    const std::string largest_value =
+        core::one_line(path.string()) + ": the mask's largest value is " + std::to_string(int(white));
+    if (large && white < kFewest)
+        throw InputError(largest_value + ", which is almost black; a mask is white where its image counts");
+    if (numbers_objects(mask, levels, white, large))
+        throw InputError(largest_value +
+                         ", and its values seem to number objects; a mask is white (255) where "
+                         "its image counts, and --masks none uses none");
 }
 
 }  // namespace
@@ -99,6 +152,23 @@ Image load_mask(const std::filesystem::path& path) {
         throw InputError(core::one_line(path.string()) +
                          ": the mask has colours; a mask is grey, and white where its image counts");
     return mask;
+}
+
+int mask_turn(const std::filesystem::path& path, const ImageSize& mask, const ImageSize& image) {
+    if (same_aspect(image.width, image.height, mask.width, mask.height)) return 1;
+    constexpr int kTransposed = 5, kRight = 6, kLeft = 8;
+    if (image.orientation >= kTransposed && same_aspect(image.width, image.height, mask.height, mask.width))
+        return image.orientation == kRight ? kLeft : image.orientation == kLeft ? kRight : image.orientation;
+    const auto size = [](const ImageSize& of) {
+        return std::to_string(of.width) + " x " + std::to_string(of.height);
+    };
+    throw InputError(core::one_line(path.string()) + ": the mask is " + size(mask) + " pixels, its image " +
+                     size(image));
+}
+
+Image load_mask(const std::filesystem::path& path, const ImageSize& image) {
+    Image mask = load_mask(path);
+    return oriented(mask, mask_turn(path, {mask.width, mask.height}, image));
 }
 
 }  // namespace ewa::scene

@@ -165,6 +165,30 @@ TEST_F(FirstChecks, MasksThatLeaveNoPixel) {
     EXPECT_EQ(train().out.find("nothing is learned"), std::string::npos);
 }
 
+/// What a mask means is what counts, and not its red.
+TEST_F(FirstChecks, MasksThatSayItInAlpha) {
+    fs::create_directories(data + "/masks");
+    ewa::Image mask(48, 32, 4);
+    for (int x = 0; x < 24; ++x) mask.at(x, 3)[3] = 1;
+    for (const char* name : {"0", "1", "2", "3"}) save_image(data + "/masks/" + name + ".png", mask);
+    EXPECT_EQ(info().find("warning"), std::string::npos) << info();
+    EXPECT_EQ(train().out.find("masked or transparent"), std::string::npos);
+}
+
+TEST_F(FirstChecks, MasksThatTheTrainingRefuses) {
+    const auto refused = [&](const std::string& text) {
+        EXPECT_NE(info().find("warning         " + data + "/masks/" + text), std::string::npos) << info();
+        expect_failure(train(), 2, text);
+    };
+    add_masks({"0.png", "1.png", "2.png", "3.png"}, 1);
+    save_image(data + "/masks/2.png", ewa::Image(32, 48, 1));
+    refused("2.png: the mask is 32 x 48 pixels, its image 48 x 32");
+    add_masks({"2.png"}, 20.0f / 255);
+    refused("2.png: the mask's largest value is 20, and its values seem to number objects");
+    write_file(data + "/masks/2.png", read_file(data + "/masks/1.png").substr(0, 60));
+    refused("2.png");
+}
+
 TEST_F(FirstChecks, TransparentImages) {
     for (int i = 1; i < 4; ++i)
         save_image(data + "/images/" + std::to_string(i) + ".png", ewa::Image(48, 32, 4));

@@ -82,6 +82,7 @@ TEST_F(PhotoFolders, OfMasksAloneArePhotos) {
     fs::remove_all(folder_ / "models");
     make_model("0", {"masks/0.png", "masks/1.png", "masks/2.png", "masks/3.png"});
     ASSERT_EQ(find("carnival").status, 0);
+    EXPECT_FALSE(fs::exists(folder_ / "dataset/masks"));
     expect_searched("masks/0.png\nmasks/1.png\nmasks/2.png\nmasks/3.png\n");
 }
 
@@ -119,6 +120,61 @@ TEST_F(PhotoFolders, WithMasksAreSearchedAndTrainedWithThem) {
     EXPECT_EQ(*ewa::load_image(masks + "/1.png.png").at(5, 5), 0.0f);
 }
 
+/// Two cameras give their photos the same names. Masks of one are none of the other, and are found as those of datasets.
+TEST_F(PhotoFolders, HaveTheMasksOfTheirFolder) {
+    const std::string project = folder_ / "project";
+    for (const char* camera : {"/images/a", "/images/b"}) fs::create_directories(project + camera);
+    for (const std::string name : {"0.png", "1.png"})
+        for (const char* camera : {"a/", "b/"})
+            fs::copy_file(folder_ / ("photos/" + name), project + "/images/" + camera + name);
+    fs::remove_all(folder_ / "models");
+    make_model("0", {"a/0.png", "a/1.png", "b/0.png", "b/1.png"});
+    ewa::Image alpha(48, 32, 4);  // black, and white where its alpha is
+    for (int y = 0; y < 32; ++y)
+        for (int x = 0; x < 24; ++x) alpha.at(x, y)[3] = 1;
+    fs::create_directories(project + "/masks/a");
+    save_image(project + "/masks/a/0.png", alpha);
+    write_mask(project + "/masks/a/mask_1.png");
+    const auto said = [&](const std::string& line) {
+        fs::remove_all(folder_ / "dataset");
+        const Outcome outcome = find("project");
+        ASSERT_EQ(outcome.status, 0) << outcome.err;
+        EXPECT_NE(outcome.out.find(line), std::string::npos) << outcome.out;
+    };
+    said("2 of 4 photos have masks: ");
+    expect_half(folder_ / "dataset/masks/a/0.png.png");
+    expect_half(folder_ / "dataset/masks/a/1.png.png");
+    EXPECT_FALSE(fs::exists(folder_ / "dataset/masks/b"));
+    fs::remove_all(project + "/masks");
+    write_mask(project + "/mask.png");
+    said("4 of 4 photos have masks: ");
+    expect_half(folder_ / "dataset/masks/b/1.png.png");
+    fs::remove(project + "/mask.png");
+    write_mask(project + "/masks/7.png");
+    write_mask(project + "/masks/8.png");
+    said("2 masks are not used (masks/7.png matches no photo)");
+    EXPECT_FALSE(fs::exists(folder_ / "dataset/masks"));
+    fs::remove_all(project + "/masks");
+    fs::create_directories(project + "/masks/a");
+    save_image(project + "/masks/a/0.png", ewa::Image(32, 48, 1));
+    fs::remove_all(folder_ / "dataset");
+    expect_failure(find("project"), 2, "a/0.png: the mask is 32 x 48 pixels, its image 48 x 32");
+}
+
+/// Depth maps are no masks, and a folder of photos may have any name.
+TEST_F(PhotoFolders, OfAnyNameHaveNoMasksByIt) {
+    fs::create_directories(folder_ / "rides");
+    fs::rename(folder_ / "photos", folder_ / "rides/segment_01");
+    for (const char* name : {"0", "1", "2", "3"})
+        write_mask(folder_ / "rides/segment_01/depth/" + name + ".png");
+    fs::remove_all(folder_ / "models");
+    make_model("0", {"segment_01/0.png", "segment_01/1.png", "segment_01/2.png", "segment_01/3.png"});
+    const Outcome outcome = find("rides");
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(outcome.out.find(" masks"), std::string::npos) << outcome.out;
+    EXPECT_FALSE(fs::exists(folder_ / "dataset/masks"));
+}
+
 /// heif-convert's stand-in gives PNG photos as JPEG; a real one is not needed.
 TEST_F(PhotoFolders, InHeicAreConverted) {
     const std::string jpegs = folder_ / "jpegs";
@@ -132,11 +188,13 @@ TEST_F(PhotoFolders, InHeicAreConverted) {
     write_file(folder_ / "photos/3.heic", "a copy of 3.png");
     fs::remove_all(folder_ / "models");
     make_model("0", {"0.jpg", "1.jpg", "2.jpg", "3.png"});
-    const Circumstances nothing{.environment = {{"PATH", folder_ / "bin"}, {"CALLS", folder_ / "calls"}}};
-    expect_failure(
-        run_ewa({"cameras", folder_ / "photos", "-o", folder_ / "dataset"}, nothing), 2,
-        "4 photos are HEIC or AVIF, and no program here reads them; heif-convert does (Debian: apt "
-        "install libheif-examples)");
+    // Without ewa's modules, too.
+    fs::copy_file(EWA_PROGRAM, folder_ / "bin/ewa");
+    const Circumstances nothing{.program = folder_ / "bin/ewa",
+                                .environment = {{"PATH", folder_ / "bin"}, {"CALLS", folder_ / "calls"}}};
+    expect_failure(run_ewa({"cameras", folder_ / "photos", "-o", folder_ / "dataset"}, nothing), 2,
+                   "4 photos are HEIC or AVIF, and nothing here reads them; heif-convert does (Debian: apt "
+                   "install libheif-examples)");
     make_program(folder_ / "bin/heif-dec", R"sh(
 [ "$1 $2" = "-q 95" ] || exit 2
 for jpeg in "$JPEGS"/*.jpg; do
@@ -256,7 +314,7 @@ exit 1
 /// What an interrupted search has done does not count for its pace.
 TEST_F(PhotoFolders, AContinuedSearchHasItsOwnPace) {
     std::vector<DatabaseImage> images;
-    for (const char* name : {"0.png", "1.png"})
+    for (const std::string name : {"0.png", "1.png"})
         images.push_back({name, std::vector<std::uint8_t>(128, 1), {1.0f}});
     write_colmap_database(folder_ / "features.db", images);
     make_program(folder_ / "bin/colmap", R"sh(

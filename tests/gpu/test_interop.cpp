@@ -33,8 +33,9 @@ VKAPI_ATTR VkBool32 VKAPI_CALL hear(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDe
 /// A program with a device of its own.
 class Engine {
   public:
-    /// all: with everything that DeviceNeeds names; else with what kernels cannot do without.
-    explicit Engine(bool all = true) {
+    /// all: with everything that DeviceNeeds names; else with what kernels cannot do without. own: features of Vulkan 1.3 that
+    /// the program uses itself.
+    explicit Engine(bool all = true, VkPhysicalDeviceVulkan13Features* own = nullptr) {
         heard.clear();
         const vk::ApplicationInfo application("engine", 1, nullptr, 0, VK_API_VERSION_1_3);
         const char* layer = "VK_LAYER_KHRONOS_validation";
@@ -57,6 +58,7 @@ class Engine {
             needs_->features.features = {};
             needs_->vulkan12.pNext = nullptr;
         }
+        if (own) needs_->use(*own);
         family_ = device()->queue_family();
         queue_info_.setQueueFamilyIndex(family_).setQueueCount(1).setPQueuePriorities(&priority_);
         info_.setQueueCreateInfos(queue_info_)
@@ -378,6 +380,21 @@ TEST(Interop, WhatADeviceLacksIsNamed) {
     scalar.scalarBlockLayout = VK_FALSE;
     refused(own, {"scalarBlockLayout, which is not enabled"});
     expect_error<InputError>([] { const DeviceNeeds needs(VK_NULL_HANDLE); }, {"no physical device"});
+    expect_silence();
+}
+
+TEST(Interop, AProgramHasFeaturesOfVulkan13) {
+    const Drawn drawn;
+    VkPhysicalDeviceVulkan13Features own{};
+    own.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES;
+    own.dynamicRendering = own.synchronization2 = VK_TRUE;
+    const Engine engine(true, &own);
+    const DeviceNeeds needs(engine.handles().physical);
+    EXPECT_EQ(own.subgroupSizeControl, needs.subgroup_sizes.subgroupSizeControl);
+    EXPECT_EQ(own.computeFullSubgroups, needs.subgroup_sizes.computeFullSubgroups);
+    Renderer renderer(engine.borrowed(), drawn.scene.gaussians, drawn.scene.options);
+    const Picture picture(engine, vk::Format::eR8G8B8A8Unorm, kDrawnWidth, kDrawnHeight);
+    render_to(renderer, drawn.scene.camera, drawn.options, std::vector<DeviceTarget>{picture.target(0, 0)});
     expect_silence();
 }
 

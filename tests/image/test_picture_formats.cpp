@@ -4,8 +4,10 @@
 #include <OpenImageIO/imageio.h>
 
 #include <cmath>
+#include <fstream>
 
 #include "ewa/image.h"
+#include "image/image_files.h"
 #include "support/png_bytes.h"
 #include "support/temp_folder.h"
 
@@ -373,6 +375,34 @@ TEST(PictureFiles, PngsOfEveryKind) {
                              little(3, 2) + little(1) + little(8);
     folder.write("a.png", png(png_chunk("eXIf", exif), text_of("\0\1\2\0\3\4", 6)));
     EXPECT_EQ(read_image_size(path).orientation, 8);
+}
+
+/// As phones write them: with EXIF, and turned by the file's own transformation.
+TEST(Heif, BecomesJpegWithItsExif) {
+    const TempFolder folder;
+    OIIO::ImageSpec spec(64, 48, 3, kByte);
+    spec.attribute("Make", "Apple");
+    spec.attribute("Exif:FocalLength", 4.25f);
+    spec.attribute("Exif:FocalLengthIn35mmFilm", 26);
+    const std::string heif = folder / "a.heic", jpeg = folder / "a.jpg";
+    const auto output = OIIO::ImageOutput::create(heif);
+    if (!output || !output->open(heif, spec)) GTEST_SKIP() << "OpenImageIO writes no HEIC here";
+    std::vector<uint8_t> pixels(64 * 48 * 3);
+    for (size_t i = 0; i < pixels.size(); ++i) pixels[i] = i / 3 % 64 < 32 ? 200 : uint8_t(40 * (i % 3));
+    ASSERT_TRUE(output->write_image(kByte, pixels.data()) && output->close()) << output->geterror();
+    ASSERT_TRUE(image::reads_heif());
+    ASSERT_TRUE(image::write_jpeg_of_heif(heif, jpeg));
+    const Image image = load_image(jpeg);
+    ASSERT_EQ(image.width, 64);
+    ASSERT_EQ(image.height, 48);
+    for (int c = 0; c < 3; ++c) {
+        EXPECT_NEAR(image.at(10, 20)[c], 200 / 255.0, 0.03) << c;
+        EXPECT_NEAR(image.at(54, 20)[c], 40 * c / 255.0, 0.03) << c;
+    }
+    EXPECT_EQ(image::shot_of(jpeg).lens, "Apple//425/100/26");
+    std::ofstream(folder / "damaged.heic") << "no photo";
+    EXPECT_FALSE(image::write_jpeg_of_heif(folder / "damaged.heic", jpeg));
+    EXPECT_FALSE(image::write_jpeg_of_heif(folder / "missing.heic", jpeg));
 }
 
 }  // namespace

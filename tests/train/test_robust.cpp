@@ -218,11 +218,11 @@ TEST(Robust, AShortRunHasNoScout) {
     run_training(plain);
     Notes notes;
     run_training(robust, notes);
-    EXPECT_EQ(
-        std::ranges::count(notes.lines,
-                           "robust: nothing is masked, since 149 steps show too little of what single images "
-                           "have; 150 or more search for it"),
-        1);
+    EXPECT_EQ(std::ranges::count(
+                  notes.lines,
+                  "robust: nothing is masked, since 149 steps are too few to find what only one image "
+                  "shows; 150 are enough"),
+              1);
     EXPECT_EQ(file_bytes(folder / "robust/splats.ply"), file_bytes(folder / "plain/splats.ply"));
 }
 

@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "capture/steps.h"
+#include "image/image_files.h"
 #include "support/temp_folder.h"
 
 namespace {
@@ -105,6 +106,7 @@ TEST(CapturePhotos, AreTheImagesOfAFolder) {
         },
         {"has 2 photos", "at least 3", "1 photo cannot be used: c.jpg (it is empty)"});
     folder.write("c.HEIC", "anything");
+    if (image::reads_heif()) return;
     // This machine may have a program that converts them.
     const std::string path = getenv("PATH");
     setenv("PATH", folder.path().c_str(), 1);

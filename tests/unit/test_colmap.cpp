@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "ewa/dataset.h"
+#include "io/datasets/colmap_lens.h"
 #include "io/datasets/image_records.h"
 #include "scene/native_lens.h"
 #include "support/temp_folder.h"
@@ -241,6 +242,11 @@ TEST(Colmap, LensModels) {
     model.write();
     EXPECT_EQ(model.load().frames[0].camera.fy, 10);
     EXPECT_EQ(model.load().frames[0].camera.cy, 3);
+}
+
+TEST(Colmap, LensNamesInAnyCase) {
+    EXPECT_EQ(io::colmap_lens("pinhole"), io::colmap_lens("PINHOLE"));
+    EXPECT_NE(io::colmap_lens("Simple_Radial"), nullptr);
 }
 
 TEST(Colmap, RefusesImpossibleCameras) {

@@ -417,4 +417,20 @@ TEST(FilmColours, HaveAMatrixAlsoWhereTheFilmNamesNone) {
     EXPECT_EQ(capture::matrix_word(info), "bt601");
 }
 
+/// Small copies of films are no further films.
+TEST(FilmFolders, ProxiesAreLeftOut) {
+    const std::vector<fs::path> films{"CLIP/C0001.MP4", "DJI_0001.MP4",    "GX010001.MP4",
+                                      "sub/S03E01.mp4", "VID_1_00_1.insv", "approximate.mov"},
+        proxies{"DJI_0001.LRF",    "GL010001.LRV",     "LRV_1_11_1.insv",
+                "Proxy/C0001.MP4", "SUB/C0001S03.MP4", "a_Proxy.mov"};
+    std::vector<fs::path> all = films;
+    all.insert(all.end(), proxies.begin(), proxies.end());
+    EXPECT_EQ(capture::take_proxies(all), proxies);
+    EXPECT_EQ(all, films);
+    all = proxies;
+    EXPECT_TRUE(capture::take_proxies(all).empty());
+    EXPECT_EQ(all, proxies) << "they are all that there is";
+    EXPECT_TRUE(capture::is_film("DJI_0001.LRF"));
+}
+
 }  // namespace

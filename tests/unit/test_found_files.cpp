@@ -2,6 +2,7 @@
 // Datasets as people have them: images, masks, depth maps and points under other names and in other places than usual.
 #include <algorithm>
 
+#include "core/text.h"
 #include "ewa/dataset.h"
 #include "io/datasets/dataset_folders.h"
 #include "io/datasets/image_records.h"
@@ -191,6 +192,111 @@ TEST(FoundFiles, TransformsUnderOtherNames) {
     }
 }
 
+TEST(FoundFiles, TransformsFilesOfOtherNames) {
+    for (const char* name : {"Transforms.json", "transforms_undistorted.json", "transforms_val.json",
+                             "TRANSFORMS_TRAIN.JSON", "nerf/transforms.json", "a/b/transforms_x.json"}) {
+        SCOPED_TRACE(name);
+        const test::TransformsScene scene;
+        scene.folder.write("transforms_notes.json", "{}");
+        fs::create_directories((scene.folder / name).parent_path());
+        scene.write(name);
+        EXPECT_TRUE(io::is_dataset_folder(scene.folder.path()));
+        const Dataset dataset = load_dataset(scene.folder.path(), {});
+        EXPECT_EQ(dataset.frames.size(), 2u);
+        if (core::lower(name) != "transforms_train.json") {
+            ASSERT_EQ(dataset.notes.size(), 1u);
+            EXPECT_EQ(dataset.notes[0], std::string("the cameras are in ") + name);
+        }
+    }
+    test::TransformsScene scene;
+    scene.model["frames"] = {test::transforms_frame("../images/a.png")};
+    fs::create_directories(scene.folder / "nerf");
+    scene.write("nerf/transforms.json");
+    EXPECT_EQ(load_dataset(scene.folder.path(), {}).frames.size(), 1u);
+    const Dataset named = load_dataset(scene.folder / "nerf", {});
+    EXPECT_EQ(named.notes, std::vector<std::string>{"photos are outside the dataset, in " +
+                                                    (scene.folder / "images").string()});
+}
+
+TEST(FoundFiles, CamerasOfTwoProgramsAreNoted) {
+    const test::TransformsScene scene;
+    scene.write();
+    scene.write("transforms_train.json");
+    scene.folder.write("colmap/sparse/0/cameras.txt", kCameras);
+    scene.folder.write("colmap/sparse/0/images.txt", lines_of({"a.png"}));
+    using Notes = std::vector<std::string>;
+    const std::string instead = " has cameras, too: name it to use it in place of ";
+    EXPECT_EQ(load_dataset(scene.folder.path(), {}).notes,
+              (Notes{"transforms_train.json" + instead + "transforms.json",
+                     "colmap/sparse/0" + instead + "transforms.json"}));
+    scene.folder.write("sparse/0/cameras.txt", kCameras);
+    scene.folder.write("sparse/0/images.txt", lines_of({"a.png"}));
+    EXPECT_EQ(load_dataset(scene.folder.path(), {}).notes, Notes{"transforms.json" + instead + "sparse/0"});
+}
+
+TEST(FoundFiles, PointsBesideTheCameras) {
+    const PointCloud cloud{{{7, 8, 9}}, {{1, 2, 3}}};
+    for (const char* place : {"sparse/points3D.ply", "sparse_pc.ply", "input.ply", "sparse/0/points.ply",
+                              "dense/fused.ply", "init.ply", "Cloud.PLY"}) {
+        SCOPED_TRACE(place);
+        const Colmap data;
+        data.model("sparse/0", {"0.png"});
+        fs::remove(data.folder / "sparse/0/points3D.txt");
+        data.photos({"images/0.png"});
+        fs::create_directories((data.folder / place).parent_path());
+        io::write_points_ply(data.folder / place, cloud);
+        EXPECT_EQ(data.load().points.positions, cloud.positions);
+        test::TransformsScene scene;
+        scene.write();
+        fs::create_directories((scene.folder / place).parent_path());
+        io::write_points_ply(scene.folder / place, cloud);
+        const bool beside = fs::path(place).parent_path().empty() || fs::path(place).parent_path() == "dense";
+        EXPECT_EQ(scene.load().points.positions.size(), beside ? 1u : 0u);
+    }
+    test::TransformsScene scene;
+    scene.model["ply_file_path"] = "Cloud.ply";
+    io::write_points_ply(scene.folder / "cloud.PLY", cloud);
+    EXPECT_EQ(scene.load().points.positions, cloud.positions);
+    // Neither splats nor a mesh.
+    const std::string head =
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n";
+    for (const std::string rest :
+         {"property float scale_0\nend_header\n1 2 3 4\n",
+          "element tristrips 1\nproperty list int int vertex_indices\nend_header\n1 2 3\n0\n"})
+        EXPECT_FALSE(io::is_point_cloud(scene.folder.write("other.ply", head + rest)));
+}
+
+TEST(FoundFiles, Utf16IsNamed) {
+    const auto wide = [](const std::string& text) {
+        std::string out = "\xff\xfe";
+        for (const char c : text) (out += c) += '\0';
+        return out;
+    };
+    const Colmap data;
+    data.model("sparse/0", {"0.png"});
+    data.photos({"images/0.png"});
+    data.folder.write("sparse/0/images.txt", wide(lines_of({"0.png"})));
+    expect_error<InputError>([&] { data.load(); }, {"images.txt: is UTF-16; save it as UTF-8"});
+    const test::TransformsScene scene;
+    scene.folder.write("transforms_a.json", wide(scene.model.dump()));
+    expect_error<InputError>([&] { load_dataset(scene.folder.path(), {}); },
+                             {"transforms_a.json: is UTF-16; save it as UTF-8"});
+    const TempFolder table;
+    save(table / "0.png");
+    table.write("a.csv", wide("#name,x,y,alt,heading,pitch,roll,f\n0.png,1,2,3,0,0,0,36\n"));
+    expect_error<InputError>([&] { load_dataset(table.path(), {}); }, {"a.csv: is UTF-16"});
+}
+
+TEST(FoundFiles, IntrinsicsAsFractions) {
+    test::TransformsScene scene;
+    for (const char* name : {"a.png", "b.png"}) save(scene.folder / "images" / name, Image(64, 48, 3));
+    scene.model.update({{"w", 64}, {"h", 48}, {"fl_x", 0.9}, {"fl_y", 0.9}, {"cx", 0.5}, {"cy", 0.5}});
+    scene.refuse({"focal length of 0.9 px looks like a fraction of the width"});
+    scene.model.update({{"fl_x", 60}, {"fl_y", 60}, {"cx", 0}, {"cy", 0}, {"camera_model", "pinhole"}});
+    ASSERT_EQ(scene.load().notes.size(), 1u);
+    EXPECT_NE(scene.load().notes[0].find("is the corner of the image"), std::string::npos);
+}
+
 /// Who removes a photo does not want another one of its name.
 TEST(FoundFiles, RemovedPhotosAreNotReplaced) {
     const Colmap data;
@@ -204,6 +310,96 @@ TEST(FoundFiles, RemovedPhotosAreNotReplaced) {
     for (const char* file : {"train/1.png", "test/0.png", "val/0.png"}) save(blender.folder / file);
     blender.model["frames"] = {test::transforms_frame("./train/0"), test::transforms_frame("./train/1")};
     EXPECT_EQ(image_names(blender.load()), std::vector<std::string>{"train/1.png"});
+}
+
+/// Nor one that is another record's.
+TEST(FoundFiles, AnImageIsNotTakenForAnotherOfItsStem) {
+    const Colmap data;
+    data.model("sparse/0", {"0.png", "0.jpg", "1.png", "1"});
+    data.photos({"images/0.png", "images/1.png"});
+    EXPECT_EQ(image_names(data.load()), (std::vector<std::string>{"0.png", "1.png"}));
+    EXPECT_EQ(data.load().missing_images, 2);
+    data.model("sparse/0", {"/gone/a/0.png", "/gone/a/0.jpg"});
+    EXPECT_EQ(image_names(data.load()), std::vector<std::string>{"0.png"});
+    data.photos({"images/0.jpg"});
+    EXPECT_EQ(image_names(data.load()), (std::vector<std::string>{"0.jpg", "0.png"}));
+    test::TransformsScene scene;
+    fs::remove_all(scene.folder / "images");
+    save(scene.folder / "images/0.png");
+    scene.model["frames"] = {test::transforms_frame("images/0.png"), test::transforms_frame("images/0.JPG")};
+    EXPECT_EQ(image_names(scene.load()), std::vector<std::string>{"images/0.png"});
+}
+
+/// Photos beside a folder of any name may be those of something else.
+TEST(FoundFiles, PhotosOutsideOfTheDataset) {
+    for (const char* model : {"scene", "scene/deeper", "x/sparse_0/scene"}) {
+        SCOPED_TRACE(model);
+        const Colmap data;
+        data.model(model, {"0.png"});
+        data.photos({"images/0.png", "scene.png"});
+        expect_error<InputError>([&] { load_dataset(data.folder / model, {}); },
+                                 {"none of the 1 images exists", "images/0.png"});
+    }
+    for (const char* model : {"sparse", "0", "distorted/sparse", "colmap_text", "dense/0"}) {
+        SCOPED_TRACE(model);
+        const Colmap data;
+        data.model(model, {"0.png"});
+        data.photos({"images/0.png"});
+        const Dataset dataset = load_dataset(data.folder / model, {});
+        EXPECT_EQ(dataset.frames.size(), 1u);
+        ASSERT_EQ(dataset.notes.size(), 1u);
+        EXPECT_EQ(dataset.notes[0],
+                  "photos are outside the dataset, in " + (data.folder / "images").string());
+    }
+    // ewa has made this folder, whatever its name is.
+    const Colmap made;
+    made.model("sparse", {"0.png"});
+    made.folder.write("sparse/capture.json", "{}");
+    made.photos({"images/0.png"});
+    EXPECT_THROW(load_dataset(made.folder / "sparse", {}), InputError);
+}
+
+TEST(FoundFiles, ModelsOfOtherPlaces) {
+    for (const char* place : {"colmap_text", "colmap/sparse_txt", "colmap/text", "colmap/dense/0/sparse",
+                              "colmap/dense/sparse", "sparse/geo", "sparse/0_aligned", "sparse_undistorted/0",
+                              "sparse_pc", "dslr_calibration_undistorted", "model/0", "output/sparse/0",
+                              "export", "exports/colmap", "Hloc/sparse", "a/b/c"}) {
+        SCOPED_TRACE(place);
+        const Colmap data;
+        data.model(place, {"0.png"});
+        data.photos({"images/0.png"});
+        EXPECT_TRUE(io::is_dataset_folder(data.folder.path()));
+        EXPECT_FALSE(io::is_dataset_folder(data.folder.path(), false));
+        EXPECT_EQ(data.used(), "1 of 1 photo, 2 points");
+        EXPECT_EQ(data.load().notes, std::vector<std::string>{std::string("the cameras are in ") + place});
+        // What ewa has made is complete, and what is deeper is something else.
+        data.folder.write("capture.json", "{}");
+        EXPECT_FALSE(io::is_dataset_folder(data.folder.path()));
+    }
+    const Colmap both;
+    both.photos({"images/0.png", "images/1.png"});
+    both.model("colmap_text", {"0.png"});
+    both.model("output/sparse/0", {"0.png", "1.png"});
+    EXPECT_EQ(
+        both.used(),
+        "2 of 2 photos, 2 points, 1 of 2 models (output/sparse/0 with 2 images as text, not colmap_text "
+        "with 1 image as text)");
+    // Images of the workspace's own are the undistorted ones.
+    both.photos({"output/images/0.png", "output/images/1.png"});
+    EXPECT_EQ(both.used().substr(0, 30), "2 of 2 photos in output/images");
+    // Several datasets in a folder are several.
+    const Colmap scenes;
+    for (const std::string scene : {"a", "b"}) {
+        scenes.model(scene + "/sparse/0", {"0.png"});
+        scenes.photos({scene + "/images/0.png"});
+    }
+    EXPECT_FALSE(io::is_dataset_folder(scenes.folder.path()));
+    for (const char* place : {"masks/sparse", "a/b/c/d/e", ".trash/sparse"}) {
+        SCOPED_TRACE(place);
+        const Colmap data;
+        data.model(place, {"0.png"});
+        EXPECT_FALSE(io::is_dataset_folder(data.folder.path()));
+    }
 }
 
 TEST(FoundFiles, ImagesThatCannotBeTold) {
@@ -310,7 +506,20 @@ TEST(FoundFiles, MasksUnderOtherNames) {
         {{"mask.png"}, "1 of 1 mask (for all photos)", "mask.png"},
         {{"masks/a.png"}, "1 of 1 mask (1 photo has none: b.jpg)", "masks/a.png"},
         {{"masks/1.png", "masks/2.png"}, "0 of 2 masks (masks/1.png matches no photo)", ""},
-        {{"masks/x/a.png", "masks/y/a.png"}, "0 of 2 masks (masks/x/a.png matches no photo)", ""},
+        {{"masks/x/a.png", "masks/y/a.png"},
+         "0 of 2 masks (masks/x/a.png and masks/y/a.png have one name, and neither folder is that of a "
+         "photo)",
+         ""},
+        {{"masks/a.webp.png", "masks/b.HEIC.png"}, "2 of 2 masks", "masks/a.webp.png"},
+        {{"segmentation/a.png", "segmentation/b.png"}, "2 of 2 masks", "segmentation/a.png"},
+        {{"images/mattes/a.png"}, "1 of 1 mask (1 photo has none: b.jpg)", "images/mattes/a.png"},
+        {{"Alpha/a.png", "Alpha/b.png"}, "2 of 2 masks", "Alpha/a.png"},
+        {{"labels/a.png", "labels/b.png"}, "0 of 2 masks (labels/ is none of masks/ and mask/)", ""},
+        {{"images/a_alpha.png", "images/b_seg.png"}, "2 of 2 masks", "images/a_alpha.png"},
+        {{"images/mask_a.png", "images/mask_b.png"}, "2 of 2 masks", "images/mask_a.png"},
+        {{"images/mask.png"}, "1 of 1 mask (for all photos)", "images/mask.png"},
+        {{"static_mask.png"}, "1 of 1 mask (for all photos)", "static_mask.png"},
+        {{"poster_mask.png"}, "0 of 1 mask (poster_mask.png matches no photo)", ""},
         {{"sam_masks/a.png", "sam_masks/b.png"}, "0 of 2 masks (sam_masks/ is none of masks/ and mask/)", ""},
         {{"masks/c.png"}, "0 of 1 mask (masks/c.png matches no photo)", ""}};
     for (const auto& [files, used, mask] : cases) {
@@ -355,6 +564,30 @@ TEST(FoundFiles, MasksOfFolders) {
               "3 of 3 photos, 0 of 3 masks (--masks none), 2 points");
 }
 
+TEST(FoundFiles, MasksOfOtherContents) {
+    const Colmap data;
+    data.model("sparse/0", {"c0/images/a.jpg", "c1/images/a.jpg"});
+    data.photos({"images/c0/images/a.jpg", "images/c1/images/a.jpg"});
+    // Of one camera, beside its photos.
+    save(data.folder / "images/c1/masks/a.png", half());
+    EXPECT_EQ(data.used(), "2 of 2 photos, 1 of 1 mask (1 photo has none: c0/images/a.jpg), 2 points");
+    EXPECT_EQ(data.load().frames[1].mask_path, data.folder / "images/c1/masks/a.png");
+    fs::remove_all(data.folder / "images/c1/masks");
+    data.folder.write("masks/c0/a.gif", "GIF89a");
+    EXPECT_EQ(data.used(),
+              "2 of 2 photos, 0 of 1 mask (masks/c0/a.gif is of a format that ewa does not read), 2 points");
+    fs::remove_all(data.folder / "masks");
+    Image colours(8, 6, 3);
+    for (size_t i = 0; i < colours.pixels.size(); i += 2) colours.pixels[i] = float(i % 5) / 4;
+    save(data.folder / "segmentation/c0/a.png", colours);
+    EXPECT_EQ(data.used(),
+              "2 of 2 photos, 0 of 1 mask (segmentation/c0/a.png seems to be no mask), 2 points");
+    // Servers and desktops leave pictures, too.
+    for (const char* file : {"images/@eaDir/a.jpg", "images/__MACOSX/a.jpg", "images/.thumbnails/a.jpg"})
+        data.photos({file});
+    EXPECT_TRUE(data.used().starts_with("2 of 2 photos,")) << data.used();
+}
+
 TEST(FoundFiles, MasksThatTheCamerasFileNames) {
     test::TransformsScene scene;
     scene.model["frames"][0]["mask_path"] = "/other/machine/m0.png";
@@ -386,9 +619,12 @@ TEST(FoundFiles, DepthMaps) {
     EXPECT_EQ(used("depth/b.png", sixteen),
               "1 of 1 photo, 0 of 1 depth map (depth/b.png matches no photo), 2 points");
     fs::remove(data.folder / "depth/b.png");
-    save(data.folder / "depth/a_depth.png");  // a picture to look at
-    EXPECT_EQ(data.used(),
-              "1 of 1 photo, 0 of 1 depth map (depth/a_depth.png is no .exr or .png of 16 bits), 2 points");
+    for (const char* name : {"a_depth.png", "a.png"}) {  // pictures to look at
+        fs::remove_all(data.folder / "depth");
+        save(data.folder / "depth" / name);
+        EXPECT_EQ(data.used(), std::string("1 of 1 photo, 0 of 1 depth map (depth/") + name +
+                                   " is no .exr or .png of 16 bits), 2 points");
+    }
 }
 
 }  // namespace

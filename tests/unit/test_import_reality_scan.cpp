@@ -221,6 +221,24 @@ TEST(ImportRealityScan, CsvLooksDownWithoutTurns) {
     }
 }
 
+TEST(ImportRealityScan, CsvOfASpreadsheetHasDecimalCommas) {
+    const TempFolder folder;
+    write_scene_images(folder);
+    folder.write("a.csv", "#name;x;y;alt;heading;pitch;roll;f\nc.png;1,5;2;-3,25;0;0;0;36,0\n");
+    const Dataset dataset = load_dataset(folder.path(), {});
+    ASSERT_EQ(dataset.frames.size(), 1u);
+    EXPECT_NEAR(glm::length(dataset.frames[0].camera.position() - glm::dvec3(1.5, 2, -3.25)), 0, 1e-12);
+}
+
+/// Photos in a folder that a workspace's pictures usually are in.
+TEST(ImportRealityScan, PhotosAreInUndistorted) {
+    const TempFolder folder;
+    write_scene_images(folder);
+    std::filesystem::rename(folder / "images", folder / "undistorted");
+    folder.write("a.csv", csv());
+    EXPECT_EQ(load_dataset(folder.path(), {}).missing_images, 0);
+}
+
 TEST(ImportRealityScan, MalformedCsvIsOneLine) {
     const auto changed = [](const std::string& from, const std::string& to) {
         std::string text = csv();

@@ -64,6 +64,23 @@ TEST_F(NamedSplits, TheRestDependsOnWhichListsThereAre) {
     EXPECT_EQ(split_frames(scene_.load(), 3).test, (std::vector<int>{0, 3}));
 }
 
+/// Lists for the evaluation of what was trained name all images twice.
+TEST_F(NamedSplits, NamesInBothListsTrainWhereNothingElseDoes) {
+    const json all = {"images/0.png", "images/1.png", "images/2.png",
+                      "images/3.png", "images/4.png", "images/5.png"};
+    scene_.model["train_filenames"] = scene_.model["test_filenames"] = all;
+    expect_split({0, 1, 2, 3, 4, 5}, {});
+    expect_note("6 images of train_filenames are held out by another list, too");
+    // One that trains alone is enough to believe the lists.
+    scene_.model["test_filenames"].erase(0);
+    expect_split({0}, {1, 2, 3, 4, 5});
+    // Who wants to train on held-out images can.
+    scene_.model.erase("train_filenames");
+    scene_.model["test_filenames"] = all;
+    EXPECT_TRUE(split_frames(scene_.load(), 8).train.empty());
+    EXPECT_EQ(split_frames(scene_.load(), 0).train.size(), 6u);
+}
+
 TEST_F(NamedSplits, NamesMayBeWrittenElsewhere) {
     scene_.model["train_filenames"] = {"/home/me/scene/images/0.png", "images\\2.png", "./images/3", "5.JPG"};
     scene_.model["test_filenames"] = {"images_2/1.jpeg", "elsewhere/4.png", "images/9.png"};

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/datasets/colmap_lens.h"
 
+#include <algorithm>
 #include <iterator>
+
+#include "core/text.h"
 
 namespace ewa::io {
 namespace {
@@ -50,8 +53,8 @@ const ColmapLens* colmap_lens(int64_t id) {
 }
 
 const ColmapLens* colmap_lens(std::string_view name) {
-    const auto* found =
-        std::find_if(std::begin(kLenses), std::end(kLenses), [&](auto& lens) { return lens.name == name; });
+    const auto* found = std::find_if(std::begin(kLenses), std::end(kLenses),
+                                     [&](auto& lens) { return core::lower(lens.name) == core::lower(name); });
     return found == std::end(kLenses) ? nullptr : found;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/file_reader.h"
@@ -60,6 +61,33 @@ std::vector<ColmapModel> by_size(std::vector<ColmapModel> models) {
     return models;
 }
 
+bool is_number(const fs::path& folder) {
+    return core::parse_integer<uint32_t>(folder.filename().string()).has_value();
+}
+
+/// Whether programs give folders of models and of their workspaces such a name.
+bool is_part_of_workspace(const fs::path& folder) {
+    constexpr std::string_view kWords[] = {"sparse",    "dense", "colmap", "glomap",
+                                           "distorted", "model", "sfm",    "calibration",
+                                           "geo",       "text",  "txt",    "aligned"};
+    const std::string name = core::lower(folder.filename().string());
+    return is_number(folder) || std::ranges::any_of(kWords, [&](std::string_view word) {
+               return name.find(word) != std::string::npos;
+           });
+}
+
+/// The models of the folders below. Those of a folder that has some are not searched.
+std::vector<ColmapModel> models_below(const fs::path& root) {
+    std::vector<ColmapModel> models;
+    visit_folders_below(root, [&](const fs::path& folder) {
+        std::vector<ColmapModel> found = models_in(folder);
+        for (ColmapModel& model : found) model.originals = root;
+        std::ranges::move(found, std::back_inserter(models));
+        return found.empty();
+    });
+    return models;
+}
+
 }  // namespace
 
 std::vector<ColmapModel> colmap_models(const fs::path& root) {
@@ -78,13 +106,21 @@ std::vector<ColmapModel> colmap_workspaces(const fs::path& root) {
     for (const fs::path& folder : folders) {
         if (!is_folder(folder)) continue;
         std::vector<ColmapModel> models = models_in(folder);
-        // Undistorted images are the workspace's own. Others may lie where they were.
-        const std::string name = core::lower(folder.filename().string());
-        if (name == "distorted" || name == "colmap")
-            for (ColmapModel& model : models) model.originals = root;
+        for (ColmapModel& model : models) model.originals = root;
         if (!models.empty()) return by_size(std::move(models));
     }
     return {};
+}
+
+std::vector<ColmapModel> colmap_models_below(const fs::path& root) {
+    std::vector<ColmapModel> models = models_below(root);
+    // Folders with photos of their own are datasets, one of which the user has to name.
+    std::set<fs::path> datasets;
+    for (const ColmapModel& model : models)
+        if (has_photos_folder(model.dataset))
+            datasets.insert(is_number(model.dataset) ? model.dataset.parent_path() : model.dataset);
+    if (datasets.size() > 1) return {};
+    return by_size(std::move(models));
 }
 
 ImageFinder image_finder(const ColmapModel& model) {
@@ -98,21 +134,27 @@ ImageFinder image_finder(const ColmapModel& model) {
         add(base, true, below);
     };
     add_all(model.dataset, true);
-    if (!model.originals.empty()) {
-        for (const char* name : {"input", "images"}) add(entry_in(model.originals, name), false, true);
-        add(model.originals, true, false);
+    // Undistorted images are the workspace's own. Others may lie where they were.
+    for (fs::path folder = model.dataset;
+         !model.originals.empty() && folder != model.originals && folder.has_relative_path();) {
+        folder = folder.parent_path();
+        for (const char* name : {"input", "images"}) add(entry_in(folder, name), false, true);
+        add(folder, true, folder == model.originals);
     }
     if (model.folder != model.dataset) add_all(model.folder, false);
-    // A path of the model's own folder, or of the sparse/ that it is in, means the images beside that.
-    const fs::path sparse = entry_in(model.dataset, "sparse");
-    if (model.folder != sparse && model.folder.parent_path() != sparse) {
-        const fs::path whole = fs::absolute(model.dataset / "x").lexically_normal().parent_path();
-        for (const fs::path& above : {whole.parent_path(), whole.parent_path().parent_path()})
-            add_all(above, false);
+    // The path of a workspace's folder means the images beside it, too.
+    fs::path whole = fs::absolute(model.dataset / "x").lexically_normal().parent_path();
+    for (int level = 0; level < 2 && is_part_of_workspace(whole) && has_outside(whole); ++level) {
+        whole = whole.parent_path();
+        add_all(whole, false);
     }
     // What is missing is said of the usual folder.
     if (places.empty() || places[0].own) places.insert(places.begin(), {model.dataset / "images"});
-    return ImageFinder(std::move(places));
+    ImageFinder finder(std::move(places));
+    // A workspace's images are those of its own model.
+    const fs::path& root = model.originals.empty() ? model.dataset : model.originals;
+    if (colmap_workspaces(root).empty()) finder.add_last(root);
+    return finder;
 }
 
 }  // namespace ewa::io

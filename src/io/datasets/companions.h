@@ -11,7 +11,7 @@
 
 namespace ewa::io {
 
-/// The masks or the depth maps of a dataset.
+/// The masks or the depth maps of a dataset, or of photos whose cameras are not known yet.
 class Companions {
   public:
     enum class Kind { masks, depth_maps };
@@ -32,11 +32,19 @@ class Companions {
     struct File {
         std::filesystem::path folder, name;  // name: relative to the folder
         int rank = 0;                        // of the folder: the least counts
-        bool readable = true;
+        std::string above = {};              // the key of the folder of its image, if it has that one
+        std::string fault = {};              // why it cannot be used, after its name
     };
-    void list(const std::filesystem::path& folder, int rank);
+    /// images: the folder that the folder belongs to, relative to folder_.
+    void list(const std::filesystem::path& folder, int rank, const std::filesystem::path& images = {});
+    void list_folders(int downscale);
+    void list_loose(int rank);
     void list_beside(const std::vector<ImageRecord>& images);
-    bool has_readable_depths(const File& file) const;
+    /// Finds what cannot be used.
+    void examine();
+    std::string why_unused(const File& file) const;
+    /// A folder that is not looked into, by its name.
+    void note_folder(UsedOf& result) const;
     /// The file of an image in a folder of rank `from` to `to`.
     const File* look(const std::filesystem::path& image, int from, int to) const;
     std::filesystem::path take(const File& file);
@@ -45,7 +53,9 @@ class Companions {
     Kind kind_;
     std::filesystem::path dataset_, folder_, root_;  // root_: that the images' folder is in
     int downscale_;
+    bool apart_;  // root_ is outside the dataset, which is the images' folder
     std::vector<File> files_;
+    std::set<std::filesystem::path> of_photos_, listed_;  // folders; of_photos: down to theirs
     std::map<std::string, std::vector<const File*>> by_name_, by_word_;
     std::map<std::string, int> images_;               // the keys of their stems, and how many have each
     std::set<std::filesystem::path> used_, missing_;  // missing: what the model names

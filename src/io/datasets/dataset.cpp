@@ -16,6 +16,7 @@
 #include "io/datasets/image_records.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/importer.h"
+#include "io/datasets/transforms_files.h"
 #include "scene/camera.h"
 #include "scene/intrinsics.h"
 #include "scene/lens.h"
@@ -260,34 +261,30 @@ void append(io::ImageRecords& all, io::ImageRecords more) {
 
 /// In Blender's scenes, the file name states the split.
 int split_of(const fs::path& path) {
-    const std::string stem = path.stem().string();
+    const std::string stem = core::lower(path.stem().string());
     return stem == "transforms_train" ? 1 : stem == "transforms_test" ? 2 : 0;
 }
 
-io::ImageRecords read_transforms_at(const fs::path& file, const DatasetOptions& options) {
-    return io::read_transforms(file, split_of(file), options.need_points);
-}
-
-/// The transforms_train.json of a folder and what is held out: transforms_test.json, or else transforms_val.json. Empty if it has
-/// none of them.
-std::optional<io::ImageRecords> read_split_transforms(const fs::path& path, const DatasetOptions& options) {
-    std::optional<io::ImageRecords> all;
-    const fs::path train = path / "transforms_train.json", test = path / "transforms_test.json",
-                   val = path / "transforms_val.json";
-    if (!is_file(train) && !is_file(test)) return all;
-    for (const auto& [file, split] : {std::pair(train, 1), std::pair(is_file(test) ? test : val, 2)})
-        if (is_file(file)) {
-            io::ImageRecords records = io::read_transforms(file, split, options.need_points);
-            if (all)
-                append(*all, std::move(records));
-            else
-                all = std::move(records);
-        }
-    if (!all) return all;
-    all->folder = path / "images";
-    if (is_file(test) && is_file(val))
-        all->notes.emplace_back(
+/// The first of the files. transforms_train.json has the held-out images of transforms_test.json, or else of transforms_val.json.
+std::optional<io::ImageRecords> read_transforms_at(const fs::path& root, const std::vector<fs::path>& files,
+                                                   const DatasetOptions& options) {
+    if (files.empty()) return std::nullopt;
+    const auto stem = [&](size_t i) {
+        return i < files.size() ? core::lower(files[i].stem().string()) : std::string();
+    };
+    const std::string first = stem(0), second = stem(1);
+    const bool both =
+        first == "transforms_train" && (second == "transforms_test" || second == "transforms_val");
+    io::ImageRecords all = io::read_transforms(files[0], split_of(files[0]), options.need_points, root);
+    if (both) append(all, io::read_transforms(files[1], 2, options.need_points, root));
+    if (split_of(files[0]) != 0) all.folder = files[0].parent_path() / "images";
+    if (second == "transforms_test" ? stem(2) == "transforms_val"
+                                    : first == "transforms_test" && second == "transforms_val")
+        all.notes.emplace_back(
             "transforms_val.json is not used: transforms_test.json has the held-out images");
+    const fs::path place = files[0].lexically_proximate(root);
+    if (split_of(files[0]) == 0 && place != "transforms.json")
+        all.notes.push_back("the cameras are in " + core::one_line(place.string()));
     return all;
 }
 
@@ -295,9 +292,12 @@ std::optional<io::ImageRecords> read_split_transforms(const fs::path& path, cons
 std::optional<io::ImageRecords> read_colmap_at(const fs::path& root,
                                                const std::vector<io::ColmapModel>& models) {
     if (models.empty()) return std::nullopt;
+    const auto place_of = [&](const io::ColmapModel& model) {
+        return model.folder.lexically_proximate(root).string();
+    };
     const auto shown = [&](const io::ColmapModel& model) {
-        return model.folder.lexically_proximate(root).string() + " with " +
-               core::counted(model.images, "image") + (model.extension == ".txt" ? " as text" : "");
+        return place_of(model) + " with " + core::counted(model.images, "image") +
+               (model.extension == ".txt" ? " as text" : "");
     };
     const io::ImageFinder finder = io::image_finder(models[0]);
     io::ImageRecords records = io::read_colmap(models[0], &finder);
@@ -306,6 +306,8 @@ std::optional<io::ImageRecords> read_colmap_at(const fs::path& root,
                           .used = 1,
                           .found = models.size(),
                           .why = shown(models[0]) + ", not " + shown(models[1])};
+    else if (!models[0].originals.empty())
+        records.notes.push_back("the cameras are in " + core::one_line(place_of(models[0])));
     return records;
 }
 
@@ -343,11 +345,51 @@ std::optional<io::ImageRecords> import_model(const fs::path& path, const Dataset
         std::string(io::kImportedFrom) + "; the folder of a training run has config.json");
 }
 
-io::ImageRecords read_model(const fs::path& path, const DatasetOptions& options) {
+/// Cameras of other programs in the folder are named.
+void note_other_cameras(const fs::path& path, io::ImageRecords& records) {
+    if (records.files.empty()) return;
+    const fs::path used = records.files[0];
+    const bool is_colmap = records.format == "COLMAP";
+    const auto note = [&](const fs::path& other) {
+        records.notes.push_back(core::one_line(
+            other.lexically_proximate(path).string() + " has cameras, too: name it to use it in place of " +
+            (is_colmap ? used.parent_path() : used).lexically_proximate(path).string()));
+    };
+    for (const fs::path& file : io::transforms_files(path)) {
+        if (std::ranges::find(records.files, file) != records.files.end()) continue;
+        if (split_of(used) != 0 && core::lower(file.filename().string()) == "transforms_val.json") continue;
+        note(file);
+        break;
+    }
+    if (const auto found = io::find_importer(path); found && (is_colmap || records.format == "transforms"))
+        note(found->source.file);
+    if (is_colmap) return;
+    for (const auto& models :
+         {io::colmap_models(path), io::colmap_workspaces(path), io::colmap_models_below(path)})
+        if (!models.empty()) return note(models[0].folder);
+}
+
+/// Points that the cameras' file does not name: a PLY that is alone beside the cameras, in a folder above them, or beside dense images.
+void add_points_found(const fs::path& path, const DatasetOptions& options, io::ImageRecords& records) {
+    const bool named = std::ranges::any_of(
+        records.files, [](const fs::path& file) { return core::lower(file.extension().string()) == ".ply"; });
+    if (named || records.files.empty() || records.frame_rate > 0) return;
+    const fs::path root = is_file(path) ? path.parent_path() : path;
+    std::vector<fs::path> places{records.files[0].parent_path()};
+    while (places.back() != root && places.back().has_relative_path())
+        places.push_back(places.back().parent_path());
+    places.push_back(io::entry_in(root, "dense"));
+    const size_t before = records.files.size();
+    for (const fs::path& place : places)
+        if (records.files.size() == before)
+            io::add_points_beside(place.empty() ? "." : place, options.need_points, records);
+}
+
+io::ImageRecords read_cameras(const fs::path& path, const DatasetOptions& options) {
     if (is_file(path)) {
         if (auto imported = import_model(path, options)) return std::move(*imported);
         if (core::lower(path.extension().string()) != ".json") refuse_model(path);
-        return read_transforms_at(path, options);
+        return io::read_transforms(path, split_of(path), options.need_points);
     }
     if (!is_folder(path))
         throw InputError(core::one_line(path.string()) + ": there is no such file or folder");
@@ -357,11 +399,48 @@ io::ImageRecords read_model(const fs::path& path, const DatasetOptions& options)
     std::optional<io::ImageRecords> workspace;
     if (colmap) workspace = read_colmap_at(path, io::colmap_workspaces(path));
     if (colmap) return std::move(has_images(workspace) ? *workspace : *colmap);
-    if (is_file(path / "transforms.json")) return read_transforms_at(path / "transforms.json", options);
-    if (auto records = read_split_transforms(path, options)) return std::move(*records);
+    if (auto records = read_transforms_at(path, io::transforms_files(path), options))
+        return std::move(*records);
     if (auto records = import_model(path, options)) return std::move(*records);
     if (auto records = read_colmap_at(path, io::colmap_workspaces(path))) return std::move(*records);
+    if (auto records = read_transforms_at(path, io::transforms_files_below(path), options))
+        return std::move(*records);
+    if (auto records = read_colmap_at(path, io::colmap_models_below(path))) return std::move(*records);
     refuse_model(path);
+}
+
+io::ImageRecords read_model(const fs::path& path, const DatasetOptions& options) {
+    io::ImageRecords records = read_cameras(path, options);
+    if (is_folder(path)) note_other_cameras(path, records);
+    if (records.format == "COLMAP" || records.format == "transforms")
+        add_points_found(path, options, records);
+    return records;
+}
+
+/// Few lenses look at the corner of their images.
+void note_corner(const io::ImageRecords& records, std::vector<std::string>& notes) {
+    const auto image = std::ranges::find_if(records.images, [](const io::ImageRecord& each) {
+        const Camera& c = each.camera;
+        return c.width > 1 && c.height > 1 && std::abs(c.cx) <= 1 && std::abs(c.cy) <= 1 &&
+               each.distortion.lens != Lens::orthographic;
+    });
+    if (image != records.images.end())
+        notes.push_back("the principal point of " + core::one_line(image->name) +
+                        " is the corner of the image; cx and cy, in pixels, are usually half of its size");
+}
+
+/// Photos of another folder may be those of something else.
+void note_photos_outside(Dataset& dataset) {
+    const auto frame = std::ranges::find_if(dataset.frames, &Frame::image_exists);
+    if (frame == dataset.frames.end()) return;
+    std::error_code error;
+    const fs::path place =
+        fs::absolute(frame->image_path, error)
+            .lexically_normal()
+            .lexically_relative(fs::absolute(dataset.root / "x", error).lexically_normal().parent_path());
+    if (!place.empty() && *place.begin() == "..")
+        dataset.notes.push_back("photos are outside the dataset, in " +
+                                core::one_line(frame->image_path.parent_path().lexically_normal().string()));
 }
 
 [[noreturn]] void refuse_without_images(const std::string& name, const io::ImageRecords& model) {
@@ -380,7 +459,8 @@ io::ImageRecords read_model(const fs::path& path, const DatasetOptions& options)
 
 }  // namespace
 
-Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options) {
+Dataset load_dataset(const std::filesystem::path& given, const DatasetOptions& options) {
+    const fs::path path = given.has_filename() ? given : given.parent_path();
     if (options.downscale < 1) throw InputError("the downscale factor must be 1 or more");
     io::ImageRecords model = read_model(path, options);
     const std::string name = core::one_line(path.string());
@@ -419,8 +499,12 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
         frame.depth_unit = image.depth_unit;
         if (!image.seen.empty()) frame.seen = std::make_shared<const std::vector<uint32_t>>(image.seen);
     }
-    dataset.used.push_back(io::used_photos(model, dataset));
-    add_companions(model, records, options, dataset);
+    if (dataset.format == "COLMAP" || dataset.format == "transforms") note_photos_outside(dataset);
+    note_corner(model, dataset.notes);
+    if (!path_of_cameras) {
+        add_companions(model, records, options, dataset);
+        dataset.used.insert(dataset.used.begin(), io::used_photos(model, dataset));
+    }
     if (const uint64_t points = dataset.points.positions.size() + uint64_t(dataset.dropped_points);
         points > 0)
         dataset.used.push_back({.what = "point",

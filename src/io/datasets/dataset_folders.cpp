@@ -11,6 +11,7 @@
 #include "ewa/error.h"
 #include "io/datasets/image_records.h"
 #include "io/datasets/importers/importer.h"
+#include "io/datasets/transforms_files.h"
 
 namespace ewa::io {
 namespace {
@@ -40,7 +41,7 @@ bool is_part_of_dataset(const fs::path& real) {
     const std::string name = real.filename().string();
     constexpr std::array<std::string_view, 6> kParts{"masks", "mask", "sparse", "depth", "depths", "input"};
     const bool part = name == "images" || name.starts_with("images_") || std::ranges::count(kParts, name) > 0;
-    return part && is_dataset_folder(real.parent_path());
+    return part && is_dataset_folder(real.parent_path(), false);
 }
 
 std::set<fs::path> image_folders(const Dataset& dataset) {
@@ -54,11 +55,10 @@ std::set<fs::path> image_folders(const Dataset& dataset) {
 
 }  // namespace
 
-bool is_dataset_folder(const fs::path& folder) {
-    for (const char* name : {"transforms.json", "transforms_train.json", "transforms_test.json"})
-        if (core::is_file(folder / name)) return true;
-    return !colmap_models(folder).empty() || find_importer(folder).has_value() ||
-           !colmap_workspaces(folder).empty();
+bool is_dataset_folder(const fs::path& folder, bool below) {
+    return !transforms_files(folder).empty() || !colmap_models(folder).empty() ||
+           find_importer(folder).has_value() || !colmap_workspaces(folder).empty() ||
+           (below && (!transforms_files_below(folder).empty() || !colmap_models_below(folder).empty()));
 }
 
 void check_not_inside_dataset(const std::string& option, const fs::path& folder) {
@@ -66,7 +66,7 @@ void check_not_inside_dataset(const std::string& option, const fs::path& folder)
 }
 
 void check_output_folder(const std::string& option, const fs::path& folder) {
-    if (is_dataset_folder(real_path(folder))) refuse_output(option, folder, "is a dataset");
+    if (is_dataset_folder(real_path(folder), false)) refuse_output(option, folder, "is a dataset");
     check_not_inside_dataset(option, folder);
 }
 

@@ -8,8 +8,8 @@
 
 namespace ewa::io {
 
-/// Whether load_dataset finds cameras in the folder.
-bool is_dataset_folder(const std::filesystem::path& folder);
+/// Whether load_dataset finds cameras in the folder. below false: in its usual places alone, and not elsewhere below it.
+bool is_dataset_folder(const std::filesystem::path& folder, bool below = true);
 
 /// For a command that names the files in its output folder itself. Throws InputError if the folder is a dataset, or one of
 /// a dataset's folders of images, masks or cameras. option: how the user names the folder.

@@ -78,11 +78,13 @@ bool is_point_cloud(const std::filesystem::path& path) {
     const PlyElement* vertex = nullptr;
     for (const PlyElement& element : table.elements()) {
         // Compressed splats have chunks. Faces make a mesh.
-        if (element.name == "chunk" || (element.name == "face" && element.count > 0)) return false;
+        if (element.name == "chunk" ||
+            ((element.name == "face" || element.name == "tristrips") && element.count > 0))
+            return false;
         if (element.name == "vertex") vertex = &element;
     }
     return vertex && vertex->find_number("x") && vertex->find_number("y") && vertex->find_number("z") &&
-           !vertex->find("opacity") && !vertex->find("f_dc_0");
+           !vertex->find("opacity") && !vertex->find("f_dc_0") && !vertex->find("scale_0");
 }
 
 PlyPoints read_points_ply(const std::filesystem::path& path, size_t most) {

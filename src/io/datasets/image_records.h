@@ -81,7 +81,7 @@ struct ColmapModel {
     std::filesystem::path folder;        // of the files
     std::filesystem::path dataset = {};  // the folder that the images are in or below
     std::filesystem::path originals =
-        {};  // also has them, where they are not undistorted; empty: no other folder has
+        {};  // above that folder: it and those between also may have them; empty: no other folder has
     std::string extension = ".bin";  // or .txt
     uint64_t images = 0;             // only counted where there are several models
 };
@@ -93,6 +93,8 @@ std::vector<ColmapModel> colmap_models(const std::filesystem::path& root);
 ColmapModel colmap_model_in(const std::filesystem::path& folder);
 /// Those of a workspace that is in the folder: dense/0 and so on, dense, undistorted, distorted or colmap.
 std::vector<ColmapModel> colmap_workspaces(const std::filesystem::path& root);
+/// Those of other folders, up to three levels below. Empty if several of these folders are datasets.
+std::vector<ColmapModel> colmap_models_below(const std::filesystem::path& root);
 /// The number of images in the model's file; 0 if it cannot be read.
 uint64_t count_images(const ColmapModel& model);
 /// Searches the images of the model.
@@ -115,8 +117,10 @@ void write_colmap(const std::filesystem::path& model, const std::vector<ImageRec
 /// Reads the file. Cameras get OpenCV's axes; the world frame stays the file's. nerfstudio's
 /// applied_transform is ignored, because it already applies to cameras and points alike. A rotation with a
 /// uniform factor or a little noise becomes orthonormal. `split` becomes each image's. with_points false
-/// skips the points. Throws InputError that names the file and the byte or frame.
-ImageRecords read_transforms(const std::filesystem::path& path, int split, bool with_points);
+/// skips the points. root: the dataset's folder, which may be above the file's; empty: it is not.
+/// Throws InputError that names the file and the byte or frame.
+ImageRecords read_transforms(const std::filesystem::path& path, int split, bool with_points,
+                             const std::filesystem::path& root = {});
 
 struct TransformsFrame {
     std::string image, depth;  // relative to the file's folder, with / between the parts

@@ -6,6 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "core/text.h"
@@ -69,10 +70,12 @@ constexpr std::array kLists{NameList{"train_filenames", 1}, NameList{"val_filena
                             NameList{"test_filenames", 2}};
 constexpr size_t kNoList = kLists.size();
 
-/// Sets of[i] to the list that names image i. The last one wins: what is held out does not train. Returns the names of no image.
+/// Sets of[i] to the list that names image i. The last one wins: what is held out does not train, unless that leaves nothing. Then
+/// `both` counts what trains. Returns the names of no image.
 std::vector<std::string> read_name_lists(const JsonField& top, const std::vector<ImageRecord>& images,
-                                         std::vector<size_t>& of) {
+                                         std::vector<size_t>& of, size_t& both) {
     const NamedImages named(images);
+    std::set<size_t> trained;
     std::vector<std::string> unknown;
     for (size_t list = 0; list < kLists.size(); ++list) {
         const char* const key = kLists[list].key;
@@ -84,6 +87,7 @@ std::vector<std::string> read_name_lists(const JsonField& top, const std::vector
             const std::vector<size_t> found = named.find(name);
             if (found.empty()) unknown.push_back(name.substr(0, kShownEntry));
             for (const size_t i : found) {
+                if (list == 0) trained.insert(i);
                 if (images[i].name != images[found[0]].name)
                     top.fail(std::string("\"") + key + "\": \"" + name.substr(0, kShownEntry) +
                              "\" is one of " + std::to_string(found.size()) + " frames");
@@ -91,6 +95,12 @@ std::vector<std::string> read_name_lists(const JsonField& top, const std::vector
             }
         }
     }
+    // Who evaluates what was trained names the same images twice, and means to train.
+    if (!trained.empty() && std::ranges::count(of, size_t(0)) == 0)
+        for (const size_t i : trained) {
+            of[i] = 0;
+            ++both;
+        }
     return unknown;
 }
 
@@ -100,7 +110,8 @@ void split_by_names(const nlohmann::json& top, const std::string& where, ImageRe
     const JsonField field(top, where);
     std::vector<ImageRecord>& images = records.images;
     std::vector<size_t> of(images.size(), kNoList);
-    const std::vector<std::string> unknown = read_name_lists(field, images, of);
+    size_t both = 0;
+    const std::vector<std::string> unknown = read_name_lists(field, images, of, both);
     const auto count = [&](size_t list) { return size_t(std::ranges::count(of, list)); };
     if (count(kNoList) == images.size()) {
         if (!unknown.empty())
@@ -119,6 +130,10 @@ void split_by_names(const nlohmann::json& top, const std::string& where, ImageRe
         " of test_filenames held out";
     if (rest == 2) note += ", and " + std::to_string(count(kNoList)) + " of no list";
     records.notes.push_back(note);
+    if (both > 0)
+        records.notes.push_back(core::counted(both, "image") + " of train_filenames " +
+                                std::string(core::is_or_are(both)) +
+                                " held out by another list, too, which leaves none to train; they train");
     if (rest == 0 && count(kNoList) > 0) {
         records.notes.push_back(core::counted(count(kNoList), "image") + " of no list of the split " +
                                 std::string(core::is_or_are(count(kNoList))) + " skipped");

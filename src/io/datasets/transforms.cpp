@@ -20,6 +20,7 @@
 //   view_dependent                 at the top: false if no colour depends on the direction of view
 //   train_filenames val_filenames test_filenames   at the top: the split, see named_splits.h
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <glm/matrix.hpp>
 #include <nlohmann/json.hpp>
@@ -154,7 +155,8 @@ Distortion read_lens(const Entry& entry) {
     const auto holds = [](auto& list, const std::string& name) {
         return std::find(std::begin(list), std::end(list), name) != std::end(list);
     };
-    const std::string model = entry.text("camera_model");
+    std::string model = entry.text("camera_model");
+    std::ranges::transform(model, model.begin(), [](unsigned char c) { return char(std::toupper(c)); });
     if (model == "EQUIRECTANGULAR") return {.lens = Lens::equirectangular};
     if (model == "ORTHOGRAPHIC" || model == "ORTHOPHOTO") return {.lens = Lens::orthographic};
     if (model == "FISHEYE624") return read_fisheye624(entry);
@@ -196,28 +198,60 @@ void add_notes(const json& top, ImageRecords& records) {
             "readout");
 }
 
-/// The file that the entry names under this key, relative to `folder`: a path of another machine is searched by name. Empty if it
-/// names none.
-std::filesystem::path named_file(const Entry& entry, const char* key, const std::filesystem::path& folder) {
+/// The folders of a dataset that a path of the file may be relative to: its own, and those above it up to the dataset's.
+using Bases = std::vector<std::filesystem::path>;
+
+Bases bases_of(const std::filesystem::path& folder, const std::filesystem::path& root) {
+    Bases bases{folder};
+    while (!root.empty() && bases.back() != root && bases.back().has_relative_path())
+        bases.push_back(bases.back().parent_path());
+    return bases;
+}
+
+/// The file that the entry names under this key: a path of another machine is searched by name, in any case. Empty if it names none.
+std::filesystem::path named_file(const Entry& entry, const char* key, const Bases& bases) {
     const std::string name = entry.text(key);
     if (name.empty()) return {};
     const std::string what = std::string("\"") + key + "\" " + name.substr(0, kLongestName);
-    std::filesystem::path inside = named_path(name);
+    const std::filesystem::path inside = named_path(name);
     if (inside.empty()) entry.fail(what + " names no file");
-    if (!core::is_file(folder / inside) && core::is_file(folder / inside.filename()))
-        inside = inside.filename();
-    if (!core::links_stay_with_images(folder, inside))
+    std::filesystem::path folder = bases[0], chosen = inside;
+    const auto choose = [&] {
+        for (const std::filesystem::path& base : bases)
+            for (const std::filesystem::path& path : {inside, inside.filename()})
+                if (const auto file = entry_in(base / path.parent_path(), path.filename().string());
+                    core::is_file(file)) {
+                    folder = base;
+                    chosen = path.parent_path() / file.filename();
+                    return;
+                }
+    };
+    choose();
+    if (!core::links_stay_with_images(folder, chosen))
         entry.fail(what + " is a link out of the file's folder; " + core::kLinkAdvice);
-    return inside;
+    return folder / chosen;
 }
 
-/// Finds the images of all frames in and below the folder.
-ImageFinder image_finder(const json& frames, const std::filesystem::path& folder) {
-    ImageFinder finder({{folder, true}});
+/// Finds the images of all frames in and below the folder, or else in the folders above it.
+ImageFinder image_finder(const json& frames, const Bases& bases) {
+    std::vector<ImageFinder::Place> places;
+    for (const std::filesystem::path& base : bases) places.push_back({base, true});
     std::vector<std::string> names;
+    bool beside = false;
     for (const json& frame : frames)
-        if (const auto name = frame.find("file_path"); name != frame.end() && name->is_string())
+        if (const auto name = frame.find("file_path"); name != frame.end() && name->is_string()) {
             names.push_back(name->get<std::string>());
+            beside = beside || names.back().starts_with("../") || names.back().starts_with("..\\");
+        }
+    // The file may be of another folder of the dataset than the images.
+    const std::filesystem::path whole =
+        std::filesystem::absolute(bases.back() / "x").lexically_normal().parent_path();
+    if (beside && has_outside(whole))
+        for (const char* name : {"images", "input"})
+            if (std::filesystem::path folder = entry_in(whole.parent_path(), name); core::is_folder(folder))
+                places.push_back({std::move(folder)});
+    ImageFinder finder(std::move(places));
+    finder.add_last(bases.back());
     finder.settle(names);
     return finder;
 }
@@ -230,9 +264,8 @@ void find_image(const Entry& entry, const ImageFinder& finder, ImageRecord& imag
     image.path = std::move(found.path);
 }
 
-void read_depth(const Entry& entry, const std::filesystem::path& folder, ImageRecord& image) {
-    if (const auto depth = named_file(entry, "depth_file_path", folder); !depth.empty())
-        image.depth = folder / depth;
+void read_depth(const Entry& entry, const Bases& bases, ImageRecord& image) {
+    image.depth = named_file(entry, "depth_file_path", bases);
     image.depth_unit = entry.number("depth_unit_scale_factor").value_or(image.depth_unit);
     if (!(image.depth_unit > 0)) entry.fail("\"depth_unit_scale_factor\" is not above 0");
 }
@@ -343,7 +376,8 @@ Json matrix_of(const Camera& camera) {
 
 }  // namespace
 
-ImageRecords read_transforms(const std::filesystem::path& path, int split, bool with_points) {
+ImageRecords read_transforms(const std::filesystem::path& path, int split, bool with_points,
+                             const std::filesystem::path& root) {
     const std::string name = core::one_line(path.string());
     const json top = core::read_json_file<json>(
         path, {.comments = true, .not_finite = true});  // as instant-ngp and Python write them
@@ -352,14 +386,14 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
     if (frames == top.end() || !frames->is_array())
         throw InputError(name + ": the list \"frames\" is missing");
     ImageRecords result;
-    const std::filesystem::path folder = path.parent_path();
-    result.folder = folder / "images";
+    const Bases bases = bases_of(path.parent_path(), root);
     result.files = {path};
     result.format = "transforms";
     result.program = program_of(top);
     add_notes(top, result);
     bool unused_poses = false;
-    const ImageFinder finder = image_finder(*frames, folder);
+    const ImageFinder finder = image_finder(*frames, bases);
+    result.folder = finder.folder();
     for (size_t i = 0; i < frames->size(); ++i) {
         const Entry entry(name + ": frame " + std::to_string(i), top, (*frames)[i]);
         if (!(*frames)[i].is_object()) entry.fail("is not a JSON object");
@@ -367,9 +401,8 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
         image.split = split;
         image.distortion = read_lens(entry);
         find_image(entry, finder, image);
-        if (const auto mask = named_file(entry, "mask_path", folder); !mask.empty())
-            image.mask = folder / mask;
-        read_depth(entry, folder, image);
+        image.mask = named_file(entry, "mask_path", bases);
+        read_depth(entry, bases, image);
         read_poses(entry, image.camera);
         unused_poses =
             unused_poses || (entry.find("transform_matrix_start") && !entry.find("rolling_shutter"));
@@ -385,10 +418,10 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
         result.color_depends_on_view = view->get<bool>();
     }
     const json empty = json::object();
-    const auto points_name = named_file(Entry(name, top, empty), "ply_file_path", folder);
-    if (!points_name.empty()) result.files.push_back(folder / points_name);
-    if (with_points && !points_name.empty()) {
-        PlyPoints points = read_points_ply(folder / points_name);
+    const auto cloud = named_file(Entry(name, top, empty), "ply_file_path", bases);
+    if (!cloud.empty()) result.files.push_back(cloud);
+    if (with_points && !cloud.empty()) {
+        PlyPoints points = read_points_ply(cloud);
         result.points = std::move(points.points);
         result.dropped = std::move(points.dropped);
     }

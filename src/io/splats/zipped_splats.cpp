@@ -41,6 +41,22 @@ std::vector<ZipFiles::Entry> all_splats(const ZipFiles& zip) {
     return found;
 }
 
+std::string without_splats(const ZipFiles& zip) {
+    const auto named = [&](std::string_view end) {
+        const auto entry = std::ranges::find_if(zip.entries(), [&](const ZipFiles::Entry& each) {
+            return core::lower(each.name.filename().string()).ends_with(end);
+        });
+        return entry == zip.entries().end() ? std::string() : core::one_line(entry->name.string());
+    };
+    if (!named("data.pkl").empty())
+        return "a checkpoint of PyTorch, which ewa does not read; export a PLY with the program that wrote "
+               "it, as "
+               "ns-export gaussian-splat does";
+    if (const std::string inner = named(".zip"); !inner.empty())
+        return "an archive with another one, " + inner + "; unpack it, and name that";
+    return "an archive without splats; if they are in a file inside of it, unpack that";
+}
+
 }  // namespace
 
 bool has_splats(const ZipFiles& zip) {
@@ -53,7 +69,7 @@ ZipFiles::Entry zipped_splats(const std::filesystem::path& path, const ZipFiles&
     const auto fail = [&](const std::string& text) {
         throw InputError(core::one_line(path.string()) + ": " + text);
     };
-    if (found.empty()) fail("an archive without splats; if they are in a file inside of it, unpack that");
+    if (found.empty()) fail(without_splats(zip));
     for (const ZipFiles::Entry& entry : found)
         if (entry.name.filename() == kLevelsName)
             fail("a streamed SOG is read from its folder; unpack the archive, and name the " +

@@ -77,6 +77,47 @@ bool is_made_by_ewa(const fs::path& folder) {
     return core::is_file(folder / "capture.json") || is_run_folder(folder);
 }
 
+bool has_outside(const fs::path& folder) {
+    std::error_code error;
+    return !is_made_by_ewa(folder) &&
+           !fs::equivalent(folder.parent_path(), fs::temp_directory_path(error), error);
+}
+
+bool has_photos_folder(const fs::path& folder) {
+    return core::is_folder(entry_in(folder, "images")) || core::is_folder(entry_in(folder, "input"));
+}
+
+void visit_folders_below(const fs::path& root, const std::function<bool(const fs::path&)>& visit) {
+    constexpr size_t kMostFolders = 2000, kMostEntries = 100000;
+    constexpr int kLevels = 3;
+    constexpr std::string_view kPictures[] = {"images", "input", "mask", "depth", "."};
+    const auto is_searched = [&](const fs::directory_entry& entry) {
+        const std::string name = core::lower(entry.path().filename().string());
+        std::error_code error;
+        return entry.is_directory(error) && !entry.is_symlink(error) && !is_made_by_ewa(entry.path()) &&
+               std::ranges::none_of(kPictures, [&](std::string_view word) { return name.starts_with(word); });
+    };
+    if (is_made_by_ewa(root)) return;
+    std::vector<fs::path> level{root};
+    size_t folders = 0, entries = 0;
+    for (int depth = 0; depth < kLevels; ++depth) {
+        std::vector<fs::path> below;
+        for (const fs::path& folder : level) {
+            std::error_code error;
+            for (fs::directory_iterator at(folder, error), end;
+                 !error && at != end && folders < kMostFolders && ++entries < kMostEntries;
+                 at.increment(error))
+                if (is_searched(*at)) {
+                    ++folders;
+                    below.push_back(at->path());
+                }
+        }
+        std::ranges::sort(below);
+        std::erase_if(below, [&](const fs::path& folder) { return !visit(folder); });
+        level = std::move(below);
+    }
+}
+
 bool is_named_as_image(const fs::path& file) {
     static constexpr std::array kExtensions{".jpg",  ".jpeg", ".png", ".tif", ".tiff",
                                             ".webp", ".bmp",  ".exr", ".ppm", ".pgm"};
@@ -109,9 +150,9 @@ std::vector<fs::path> list_images(const fs::path& folder, bool below, bool (*nam
         if (++files > kMostFiles || names.size() > kMostImages)
             throw InputError(core::one_line(folder.string()) + ": holds more than 200000 images");
         if (at->is_directory(error) && (!below || is_of_others(at->path()))) at.disable_recursion_pending();
-        if (named(at->path()) && !at->path().filename().string().starts_with("._") &&
-            core::is_file(at->path()))
-            names.push_back(at->path().lexically_relative(folder));
+        if (fs::path name = at->path().lexically_relative(folder);
+            named(name) && !core::is_of_desktop(name) && core::is_file(at->path()))
+            names.push_back(std::move(name));
     }
     std::sort(names.begin(), names.end());
     return names;
@@ -124,6 +165,13 @@ ImageFinder::ImageFinder(const fs::path& dataset, const std::vector<std::string>
         if (const fs::path folder = entry_in(dataset, name); core::is_folder(folder))
             places_.push_back({folder});
     places_.push_back({dataset, true});
+    if (listing(places_.size() - 1).names.empty()) add_last(dataset);
+}
+
+void ImageFinder::add_last(const fs::path& dataset) {
+    for (const char* name : {"undistorted", "dense"})
+        if (fs::path folder = entry_in(dataset, name); core::is_folder(folder))
+            places_.push_back({std::move(folder), false, true, true});
 }
 
 fs::path ImageFinder::folder() const {
@@ -142,31 +190,52 @@ const ImageFinder::Listing& ImageFinder::listing(size_t place) const {
     return list;
 }
 
-std::vector<fs::path> ImageFinder::matches(size_t place, const fs::path& name, bool strict) const {
-    const fs::path& folder = places_[place].folder;
-    if (const auto there = exact(folder, name)) return {*there};
-    const Listing& list = listing(place);
+std::vector<fs::path> ImageFinder::listed(const std::map<std::string, std::vector<size_t>>& map, size_t place,
+                                          const fs::path& key, const fs::path& name, bool strict) const {
     const fs::path above = name.parent_path();
     // An image that was removed from its folder is not replaced by one of the same name from elsewhere.
-    const bool there = strict || (!above.empty() && core::is_folder(folder / above));
-    const auto look = [&](const auto& map, const fs::path& key) {
-        std::vector<fs::path> found;
-        const auto at = map.find(name_key(key));
-        if (at == map.end()) return found;
-        size_t most = 0;
-        for (const size_t i : at->second) found.push_back(list.names[i]);
-        for (const fs::path& each : found) most = std::max(most, common_parts(each.parent_path(), above));
-        std::erase_if(found, [&](const fs::path& each) {
-            const fs::path parent = each.parent_path();
-            return there ? name_key(parent) != name_key(above) : common_parts(parent, above) < most;
-        });
-        if (found.size() > 1 && std::ranges::any_of(found, is_below_images))
-            std::erase_if(found, [](const fs::path& each) { return !is_below_images(each); });
-        return found;
-    };
-    std::vector<fs::path> found = look(list.by_name, name.filename());
-    if (found.empty()) found = look(list.by_stem, name.filename());
-    if (found.empty()) found = look(list.by_stem, name.stem());
+    const bool there = strict || (!above.empty() && core::is_folder(places_[place].folder / above));
+    std::vector<fs::path> found;
+    const auto at = map.find(name_key(key));
+    if (at == map.end()) return found;
+    size_t most = 0;
+    for (const size_t i : at->second) found.push_back(listing(place).names[i]);
+    for (const fs::path& each : found) most = std::max(most, common_parts(each.parent_path(), above));
+    std::erase_if(found, [&](const fs::path& each) {
+        const fs::path parent = each.parent_path();
+        return there ? name_key(parent) != name_key(above) : common_parts(parent, above) < most;
+    });
+    if (found.size() > 1 && std::ranges::any_of(found, is_below_images))
+        std::erase_if(found, [](const fs::path& each) { return !is_below_images(each); });
+    return found;
+}
+
+std::vector<fs::path> ImageFinder::named(size_t place, const fs::path& name, bool strict) const {
+    if (core::is_file(places_[place].folder / name)) return {name};
+    return listed(listing(place).by_name, place, name.filename(), name, strict);
+}
+
+const std::set<fs::path>& ImageFinder::claimed(size_t place, bool strict) const {
+    const auto [at, is_new] = claimed_.try_emplace(place);
+    if (is_new)
+        for (const fs::path& name : names_)
+            for (fs::path& image : named(place, name, strict)) at->second.insert(std::move(image));
+    return at->second;
+}
+
+std::vector<fs::path> ImageFinder::matches(size_t place, const fs::path& name, bool strict) const {
+    const fs::path& folder = places_[place].folder;
+    if (core::is_file(folder / name)) return {name};
+    if (const auto there = exact(folder, name); there && !claimed(place, strict).contains(*there))
+        return {*there};
+    std::vector<fs::path> found = named(place, name, strict);
+    for (const fs::path& key : {name.filename(), name.stem()}) {
+        if (!found.empty()) break;
+        found = listed(listing(place).by_stem, place, key, name, strict);
+        // What another name is the name of is that one's image.
+        if (!found.empty())
+            std::erase_if(found, [&](const fs::path& each) { return claimed(place, strict).contains(each); });
+    }
     return found;
 }
 
@@ -174,9 +243,11 @@ void ImageFinder::settle(const std::vector<std::string>& names) const {
     std::vector<fs::path> paths;
     for (const std::string& name : names)
         if (fs::path path = named_path(name); !path.empty()) paths.push_back(std::move(path));
+    names_ = paths;
     size_t most = 0;
     for (size_t place = 0; place < places_.size(); ++place) {
         const fs::path& folder = places_[place].folder;
+        if (places_[place].last && most > 0) return;
         const auto at_path = std::ranges::count_if(
             paths, [&](const fs::path& path) { return exact(folder, path).has_value(); });
         const auto found = 2 * size_t(at_path) >= paths.size()
@@ -194,7 +265,7 @@ void ImageFinder::settle(const std::vector<std::string>& names) const {
 
 std::optional<ImageFinder::Found> ImageFinder::find_in(size_t place, const fs::path& name,
                                                        const std::string& where) const {
-    const auto& [folder, own, below] = places_[place];
+    const auto& [folder, own, below, last] = places_[place];
     const std::vector<fs::path> found = matches(place, name, strict_);
     if (found.size() > 1)
         throw InputError(where + "is one of " + std::to_string(found.size()) + " images in " +

@@ -3,8 +3,10 @@
 // with another extension or in another case, or by a label without an extension.
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -17,16 +19,20 @@ class ImageFinder {
         std::filesystem::path folder;
         bool own = false;   // it holds other things too, such as the images' folder
         bool below = true;  // also in the folders below it
+        bool last = false;  // only where no other place has any of them
     };
 
     /// The places, the likeliest first. All images are in one of them.
     explicit ImageFinder(std::vector<Place> places);
-    /// These folders of the dataset, as far as they exist, and then its own.
+    /// These folders of the dataset, as far as they exist, then its own, and undistorted/ and dense/ where it has no images.
     ImageFinder(const std::filesystem::path& dataset, const std::vector<std::string>& folders);
 
     /// Chooses the place by all names of the cameras' file. Without it, the place of the first image that is found counts. Then only
     /// names without a path that exists are searched in other folders of the place.
     void settle(const std::vector<std::string>& names) const;
+
+    /// Adds the folders of the dataset whose pictures usually are those of a workspace.
+    void add_last(const std::filesystem::path& dataset);
 
     struct Found {
         std::filesystem::path path;
@@ -49,7 +55,16 @@ class ImageFinder {
     };
     const Place& settled() const { return places_[place_.value_or(0)]; }
     const Listing& listing(size_t place) const;
-    /// The images of a place that have the name.
+    /// Those of a place's images by name or stem whose key is this, and whose path has most in common with the name.
+    std::vector<std::filesystem::path> listed(const std::map<std::string, std::vector<size_t>>& map,
+                                              size_t place, const std::filesystem::path& key,
+                                              const std::filesystem::path& name, bool strict) const;
+    /// The images of a place with this very name; case does not count.
+    std::vector<std::filesystem::path> named(size_t place, const std::filesystem::path& name,
+                                             bool strict) const;
+    /// Those images of the place that a name of settle() is the name of.
+    const std::set<std::filesystem::path>& claimed(size_t place, bool strict) const;
+    /// The images of a place that the name may mean.
     std::vector<std::filesystem::path> matches(size_t place, const std::filesystem::path& name,
                                                bool strict) const;
     std::optional<Found> find_in(size_t place, const std::filesystem::path& name,
@@ -58,6 +73,8 @@ class ImageFinder {
     std::vector<Place> places_;
     mutable std::map<size_t, Listing> listings_;  // by index of the place
     mutable std::optional<size_t> place_;
+    mutable std::vector<std::filesystem::path> names_;                   // of settle()
+    mutable std::map<size_t, std::set<std::filesystem::path>> claimed_;  // by index of the place
     mutable bool strict_ = false;  // the place has images at the paths that the file names
 };
 
@@ -69,6 +86,17 @@ bool is_run_folder(const std::filesystem::path& folder);
 
 /// Whether ewa has made the folder: a training run, or a dataset of photos. Its pictures are no photos.
 bool is_made_by_ewa(const std::filesystem::path& folder);
+
+/// Whether files beside the folder may belong to it: neither has ewa made it, nor is it an archive's.
+bool has_outside(const std::filesystem::path& folder);
+
+/// Whether the folder has one for photos: images/ or input/.
+bool has_photos_folder(const std::filesystem::path& folder);
+
+/// Visits the folders below, level after level, three in all and in the order of names, but for those of pictures, links, and results of
+/// ewa. What is in a folder is visited where `visit` returns true. A result of ewa has none.
+void visit_folders_below(const std::filesystem::path& root,
+                         const std::function<bool(const std::filesystem::path&)>& visit);
 
 /// Whether the file's name is that of an image that ewa reads.
 bool is_named_as_image(const std::filesystem::path& file);

@@ -101,16 +101,6 @@ bool begins_as_open_mvg(std::string_view head) {
     return holds(head, "\"sfm_data_version\"");
 }
 
-std::string head_of(const fs::path& file) try {
-    core::FileReader reader(file);
-    const size_t size = size_t(std::min<uint64_t>(reader.size(), kHeadBytes));
-    const std::string_view head(reinterpret_cast<const char*>(reader.take(size, "the beginning")), size);
-    constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";  // of Windows' editors
-    return std::string(head.substr(head.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0));
-} catch (const InputError&) {
-    return {};
-}
-
 bool is_usual(const CameraImporter& importer, const fs::path& name) {
     return importer.named(name) && name.string().starts_with(importer.usual);
 }
@@ -183,6 +173,31 @@ constexpr std::array kOther{
 
 }  // namespace
 
+bool is_named_transforms(const fs::path& name) {
+    const std::string text = core::lower(name.filename().string());
+    return text.starts_with("transforms") && text.ends_with(".json");
+}
+
+bool begins_as_transforms(std::string_view head) {
+    return head.find("\"frames\"") != std::string_view::npos;
+}
+
+std::string head_of(const fs::path& file) try {
+    core::FileReader reader(file);
+    const size_t size = size_t(std::min<uint64_t>(reader.size(), kHeadBytes));
+    std::string head(reinterpret_cast<const char*>(reader.take(size, "the beginning")), size);
+    constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";  // of Windows' editors
+    if (head.starts_with(kByteOrderMark)) head.erase(0, kByteOrderMark.size());
+    // The reader of the format says that it is none of UTF-8.
+    if (head.starts_with("\xff\xfe") || head.starts_with("\xfe\xff")) {
+        head.erase(0, 2);
+        std::erase(head, '\0');
+    }
+    return head;
+} catch (const InputError&) {
+    return {};
+}
+
 const std::vector<CameraImporter>& camera_importers() {
     static const std::vector<CameraImporter> importers{
         {"OpenSfM reconstruction",
@@ -254,6 +269,7 @@ fs::path other_cameras(const fs::path& dataset, const FoundImporter& found,
 
 bool is_imported(const fs::path& entry, const std::function<std::string()>& head) {
     std::optional<std::string> read;
+    if (is_named_transforms(entry) && begins_as_transforms(*(read = head()))) return true;
     return std::ranges::any_of(camera_importers(), [&](const CameraImporter& importer) {
         if (importer.places.empty() || !is_usual(importer, entry.filename())) return false;
         if (!read) read = head();
@@ -318,6 +334,7 @@ void finish_record(ImageRecord& record, const std::string& where) {
 
 void add_points_beside(const fs::path& folder, bool with_points, ImageRecords& records) {
     std::vector<fs::path> found;
+    if (!records.points.positions.empty() || records.dropped.count > 0) return;
     for (const fs::path& file : files_of_folder(folder)) try {
             if (extension_in_lower_case(file) == ".ply" && core::is_file(file) && is_point_cloud(file))
                 found.push_back(file);

@@ -54,7 +54,7 @@ struct FoundImporter {
 /// The importer of a dataset's folder, or of a file that the user names. Empty if none reads it.
 std::optional<FoundImporter> find_importer(const std::filesystem::path& path);
 
-/// Whether an entry of an archive has cameras. head: gives the entry's first bytes, and is only called for names that fit.
+/// Whether an entry of an archive has cameras, or may be a transforms.json. head: gives the entry's first bytes, and is only called for names that fit.
 bool is_imported(const std::filesystem::path& entry, const std::function<std::string()>& head);
 /// Another file of the dataset's folder that has cameras and is not among the files that were read. Empty: none.
 std::filesystem::path other_cameras(const std::filesystem::path& dataset, const FoundImporter& found,
@@ -63,6 +63,15 @@ std::filesystem::path other_cameras(const std::filesystem::path& dataset, const 
 /// What to export, for a folder or file with the cameras of a program in a form that is not read, such as its own project. Or why
 /// a file is not the one that its name promises. Empty if there is nothing to say.
 std::string export_advice(const std::filesystem::path& path);
+
+/// Whether a file may be a transforms.json by its name: one that begins with "transforms", in any case.
+bool is_named_transforms(const std::filesystem::path& name);
+
+/// Whether these first bytes are of a file with frames.
+bool begins_as_transforms(std::string_view head);
+
+/// The first kHeadBytes of a file as text, without a byte order mark. ASCII in UTF-16 is ASCII. Empty if it cannot be read.
+std::string head_of(const std::filesystem::path& file);
 
 /// The folder's files in the order of names.
 std::vector<std::filesystem::path> files_of_folder(const std::filesystem::path& folder);
@@ -73,7 +82,7 @@ ImageRecord begin_record(const ImageFinder& images, const std::string& name, con
 /// Checks the intrinsics and the rotation of a record. `where` begins the errors.
 void finish_record(ImageRecord& record, const std::string& where);
 
-/// Adds the points of the PLY of points that is alone in the folder.
+/// Adds the points of the PLY of points that is alone in the folder, unless there are points.
 void add_points_beside(const std::filesystem::path& folder, bool with_points, ImageRecords& records);
 
 /// A note about `count` images of the file without a pose, if there are any.

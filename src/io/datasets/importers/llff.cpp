@@ -68,11 +68,14 @@ ImageRecords import_llff(const ImportSource& source) {
     const std::string name = core::one_line(source.file.string());
     const auto rows = read_pose_rows(source.file);
     const ImageFinder images(source.dataset, {"images"});
-    if (images.names().size() != rows.size())
+    std::vector<std::filesystem::path> names = images.names();
+    // Smaller copies have the names, too.
+    for (const char* copies : {"images_2", "images_4", "images_8"})
+        if (names.empty()) names = list_images(source.dataset / copies, true);
+    if (names.size() != rows.size())
         throw InputError(name + ": has " + core::counted(rows.size(), "pose") + ", and " +
                          core::one_line(images.folder().string()) + " has " +
-                         core::counted(images.names().size(), "image") +
-                         "; keep only the images that have poses");
+                         core::counted(names.size(), "image") + "; keep only the images that have poses");
     ImageRecords records;
     records.files = {source.file};
     records.folder = images.folder();
@@ -80,7 +83,7 @@ ImageRecords import_llff(const ImportSource& source) {
         const auto at = [&](int row, int column) { return rows[i][size_t(5 * row + column)]; };
         const std::string where = name + ": image " + std::to_string(i);
         ImageRecord record;
-        const auto found = images.find(images.names()[i].string(), where);
+        const auto found = images.find(names[i].string(), where);
         record.name = found.name;
         record.path = found.path;
         Camera& camera = record.camera;

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The table "Internal/External camera parameters" of RealityScan (once RealityCapture), a CSV file.
 //
-// #name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2 in any order; what follows roll may be missing, but for f. A line
+// #name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2 in any order; what follows roll may be missing, but for f. Without a comma between columns, numbers may have decimal commas. A line
 // "#cameras N" may be before it, and yaw stand for heading.
 // The camera (x right, y up, z back) is turned by Rz(-heading) Rx(pitch) Ry(roll), in degrees: without turns it looks straight down,
 // and z is up. RealityScanCalibration has the other units.
+#include <algorithm>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 #include <map>
@@ -45,12 +46,14 @@ struct CsvRow {
     const CsvColumns& columns;
     std::vector<std::string> cells;
     std::string where;
+    bool commas = false;  // whether numbers may have decimal commas
 
     [[noreturn]] void fail(const std::string& text) const {
         throw InputError(where + ": " + core::one_line(text));
     }
     double number(const char* column) const {
-        const std::string& cell = cells[columns.at(column)];
+        std::string cell = cells[columns.at(column)];
+        if (commas && std::ranges::count(cell, ',') == 1) std::ranges::replace(cell, ',', '.');
         const std::optional<double> value = core::parse_number(cell);
         if (!value || !std::isfinite(*value))
             fail(std::string(column) + ": \"" + cell.substr(0, 60) + "\" is not a finite number");
@@ -147,7 +150,7 @@ ImageRecords import_reality_scan_csv(const ImportSource& source) {
             continue;
         }
         if (line.starts_with("#")) continue;
-        const CsvRow row{columns, cells_of(line, separator), where};
+        const CsvRow row{columns, cells_of(line, separator), where, separator != ','};
         if (row.cells.size() < width)
             row.fail("has " + std::to_string(row.cells.size()) + " of " + std::to_string(width) + " values");
         records.images.push_back(record_of(row, images));
