@@ -27,10 +27,10 @@ Outcome run(const std::string& command) {
             ewa::test::file_bytes(err)};
 }
 
-/// Ranks on this machine, which may have more of them than cores.
+/// Ranks on this machine, which may have more of them than cores, and whose other networks may not lead back to it.
 Outcome start(int ranks, const std::string& command, const std::string& options = "") {
     return run("OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 " EWA_MPIRUN
-               " --oversubscribe --bind-to none " +
+               " --oversubscribe --bind-to none --mca btl_tcp_if_include lo " +
                options + " -n " + std::to_string(ranks) + " " + command);
 }
 
