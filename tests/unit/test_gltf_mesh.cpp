@@ -254,6 +254,12 @@ TEST(GltfMesh, LightsAndSky) {
     EXPECT_EQ(scene.sky.ground, scene::Sky().ground);
     gltf.top["scenes"][0]["extras"]["sky"]["zenith"] = {1, 2};
     gltf.refused({"\"sky\"", "\"zenith\""});
+    for (const json& light : {json(1), json(-1), json("a"), json()}) {
+        gltf.node()["extensions"]["KHR_lights_punctual"]["light"] = light;
+        gltf.refused({"node 0: KHR_lights_punctual: \"light\""});
+    }
+    gltf.node()["extensions"]["KHR_lights_punctual"] = json::array();
+    gltf.refused({"node 0: KHR_lights_punctual: \"light\""});
 }
 
 TEST(GltfMesh, ContentsThatARenderDoesNotShowAreRemarked) {

@@ -100,8 +100,32 @@ json parse(const std::string& name, const Chunks& chunks, GltfContent content) {
     return core::parse_json<json>(chunks.json, name, limits);
 }
 
+/// Leaves of the nodes' extensions what the content needs: newer releases of tinygltf refuse files for others, and do not name the
+/// node whose light is missing.
+void keep_needed_extensions(const GltfDocument& document, json& nodes, const json& top, GltfContent content) {
+    constexpr const char* kLights = "KHR_lights_punctual";
+    if (!nodes.is_array()) return;
+    const json::json_pointer list("/extensions/KHR_lights_punctual/lights");
+    const size_t lights = top.contains(list) && top[list].is_array() ? top[list].size() : 0;
+    size_t index = 0;
+    for (json& node : nodes) {
+        const size_t at = index++;
+        if (!node.is_object()) continue;
+        const json extensions = node.value("extensions", json());
+        node.erase("extensions");
+        if (content != GltfContent::meshes || !extensions.is_object() || !extensions.contains(kLights))
+            continue;
+        const json& reference = extensions[kLights];
+        const auto light = reference.is_object() ? reference.find("light") : reference.end();
+        if (light == reference.end() || !light->is_number_unsigned() || *light >= lights)
+            document.fail("node " + std::to_string(at) + ": " + kLights +
+                          ": \"light\" is missing or there is none of this number");
+        node["extensions"][kLights] = reference;
+    }
+}
+
 /// The sections that the content needs, as text. Images are excluded, because tinygltf would open them.
-std::string needed_sections(const json& top, GltfContent content) {
+std::string needed_sections(const GltfDocument& document, const json& top, GltfContent content) {
     json kept = json::object();
     const auto keep = [&](std::initializer_list<const char*> keys) {
         for (const char* key : keys)
@@ -110,6 +134,8 @@ std::string needed_sections(const json& top, GltfContent content) {
     keep({"asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferViews", "extensionsUsed",
           "extensionsRequired"});
     if (content == GltfContent::meshes) keep({"materials", "textures", "samplers", "cameras", "extensions"});
+    if (const auto nodes = kept.find("nodes"); nodes != kept.end())
+        keep_needed_extensions(document, *nodes, top, content);
     // Strings are names here, so bytes that are not UTF-8 may be replaced.
     return kept.dump(-1, ' ', false, json::error_handler_t::replace);
 }
@@ -275,7 +301,7 @@ GltfDocument::GltfDocument(const std::filesystem::path& path, GltfContent conten
     if (const auto list = top.find("images"); list != top.end() && content == GltfContent::meshes)
         add_images(&*list);
     if (const auto list = top.find("animations"); list != top.end()) animated_ = !list->empty();
-    const std::string text = needed_sections(top, content);
+    const std::string text = needed_sections(*this, top, content);
     top = nullptr;
     tinygltf::TinyGLTF loader;
     std::string error, warning;

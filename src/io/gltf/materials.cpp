@@ -230,10 +230,8 @@ void add_light(const GltfDocument& document, int node, const glm::dmat4& matrix,
         extension(document.model().nodes[size_t(node)].extensions, "KHR_lights_punctual");
     if (!reference) return;
     const std::string what = "node " + std::to_string(node) + ": KHR_lights_punctual";
-    const double index = number(reference, "light", -1);
-    if (!(index >= 0 && index < double(document.model().lights.size())))
-        document.fail(what + ": \"light\" is missing or there is none of this number");
-    const tinygltf::Light& source = document.model().lights[size_t(index)];
+    const tinygltf::Light& source =
+        document.model().lights.at(size_t(reference->Get("light").GetNumberAsInt()));
     scene::Light light;
     if (source.type == "directional")
         light.kind = shared::LIGHT_DIRECTIONAL;
