@@ -150,6 +150,7 @@ TEST(Ply, ReadsAsciiAndBigEndian) {
     std::string windows;
     for (char c : text) windows += c == '\n' ? std::string("\r\n") : std::string(1, c);
     expect_counting_splat(load_splats(folder.write("windows.ply", windows + "\r\n")));
+    expect_counting_splat(load_splats(folder.write("marked.ply", "\xEF\xBB\xBF" + text)));
 }
 
 TEST(Ply, ReadsEveryScalarType) {

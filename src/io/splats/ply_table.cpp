@@ -114,8 +114,12 @@ PlyTable::PlyTable(const std::filesystem::path& path) : reader_(path) {
 void PlyTable::parse_header() {
     std::string line;
     // Checked before a line is read: the first line of another kind of file may have any length.
-    if (reader_.remaining() < 4 || std::memcmp(reader_.take(3, "the header"), "ply", 3) != 0)
-        fail("this is not a PLY file (it does not start with \"ply\")");
+    const auto begins = [&](const char* bytes) {
+        return reader_.remaining() >= 4 && std::memcmp(reader_.take(3, "the header"), bytes, 3) == 0;
+    };
+    const uint64_t begin = reader_.offset();
+    if (!begins("\xEF\xBB\xBF")) reader_.go_to(begin, "the header");  // a byte order mark, of a text editor
+    if (!begins("ply")) fail("this is not a PLY file (it does not start with \"ply\")");
     if (!reader_.read_line(line, kMaxHeaderLine) || !core::trim(line).empty())
         fail("this is not a PLY file (the first line is not \"ply\")");
     bool has_format = false;
