@@ -243,7 +243,8 @@ std::string matrix_word(const FilmInfo& info) {
 bool is_film(const fs::path& file) {
     constexpr std::array kExtensions{".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi",  ".mts", ".m2ts",
                                      ".ts",  ".3gp", ".3g2", ".wmv", ".asf",  ".ogv",  ".gif", ".mpg",
-                                     ".flv", ".mxf", ".lrv", ".lrf", ".mpeg", ".insv", ".360"};
+                                     ".flv", ".mxf", ".lrv", ".lrf", ".mpeg", ".insv", ".360", ".vob",
+                                     ".m2v", ".mod", ".f4v", ".qt",  ".divx"};
     return std::ranges::find(kExtensions, core::lower(file.extension().string())) != kExtensions.end();
 }
 

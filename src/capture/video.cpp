@@ -271,7 +271,7 @@ std::vector<std::string> film_input(const fs::path& video) {
     return {"-protocol_whitelist",
             "file",
             "-format_whitelist",
-            "mov,matroska,avi,mpegts,mpeg,asf,ogg,gif,flv,mxf",
+            "mov,matroska,avi,mpegts,mpeg,mpegvideo,asf,ogg,gif,flv,mxf",
             "-i",
             "file:" + video.string()};
 }
