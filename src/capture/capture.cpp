@@ -78,7 +78,7 @@ fs::path folder_of_photos(const fs::path& folder) {
     return folder;
 }
 
-/// The videos that a dataset is made of: the input itself, or those of a folder without photos. proxies: get those that are left out.
+/// The videos that a dataset is made of: the input itself, or those of a folder without photos. proxies: get those that are skipped.
 std::vector<fs::path> videos_of(const fs::path& input, std::vector<fs::path>* proxies = nullptr) {
     if (is_video(input)) return {input};
     if (!is_folder(input) || !capture::photo_files(folder_of_photos(input)).empty()) return {};
@@ -532,7 +532,7 @@ ImageSize smallest_image(const fs::path& input) {
 }
 
 fs::path dataset_of_images(const fs::path& folder) try {
-    if (!is_folder(folder)) return {};
+    if (!is_folder(folder) || io::is_dataset_folder(folder)) return {};
     const fs::path images = fs::canonical(folder), dataset = images.parent_path();
     if (!io::is_dataset_folder(dataset)) return {};
     const Dataset known = load_dataset(dataset, {.need_images = false, .need_points = false});
