@@ -96,7 +96,7 @@ std::optional<Finding> damaged_files(const Dataset& dataset) {
     return Finding{faults[0] + and_more(faults.size()), true};
 }
 
-/// Masks of another shape than their images, and those that cannot be read. Of many, one is decoded.
+/// Masks of another shape than their images, and those that cannot be read. One is decoded where there are many.
 std::optional<Finding> bad_masks(const Dataset& dataset) {
     constexpr size_t kMostPixels = 20'000'000;
     std::map<std::filesystem::path, ImageSize> sizes;

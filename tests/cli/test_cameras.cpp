@@ -272,7 +272,6 @@ TEST_F(Cameras, OptionsAreCheckedBeforeTheSearch) {
     refused({"--init", folder_ / "damaged.ply"}, "damaged.ply");
     refused({"--downscale", "1000"}, "--downscale 1000 leaves 1x1 pixels of the smallest image");
     refused({"--test-every", "1"}, "--test-every 1 holds every image out");
-    refused({"--max-splats", "1"}, "--max-splats 1: training starts with a splat for each point");
     refused({"--frames", "5"}, "--frames 5: " + folder_ / "photos" + " has photos, of which all are used");
     refused({"--frames", "2"}, "--frames: '2' is not a number of frames", "film.mp4");
     refused({"--init", "random", "--dense-start", "on"}, "--dense-start on");
