@@ -55,8 +55,12 @@ bool is_capture(const std::filesystem::path& path);
 /// Whether the dataset is made of frames: the path is a video by its extension, or a folder with videos and no photos.
 bool has_videos(const std::filesystem::path& path);
 
-/// The photos or videos that make_dataset would take of a folder or video: "8 photos". Throws InputError.
-std::string capture_text(const std::filesystem::path& path);
+struct CaptureContents {
+    std::string text;   // "8 photos"
+    std::string masks;  // a line on the photos' masks; empty if there are none
+};
+/// The photos or videos that make_dataset would take of a folder or video. Throws InputError.
+CaptureContents capture_contents(const std::filesystem::path& path);
 
 /// Whether the path is a zip archive by its extension and its first bytes.
 bool is_archive(const std::filesystem::path& path);

@@ -504,10 +504,12 @@ bool has_videos(const fs::path& path) {
     return !videos_of(path).empty();
 }
 
-std::string capture_text(const fs::path& path) {
+CaptureContents capture_contents(const fs::path& path) {
     if (const std::vector<fs::path> videos = videos_of(path); !videos.empty())
-        return core::counted(videos.size(), "video");
-    return core::counted(capture::photos_in(folder_of_photos(path)).size(), "photo");
+        return {core::counted(videos.size(), "video"), {}};
+    const fs::path folder = folder_of_photos(path);
+    const std::vector<fs::path> photos = capture::photos_in(folder);
+    return {core::counted(photos.size(), "photo"), capture::find_masks(folder, photos, path).text};
 }
 
 ImageSize smallest_image(const fs::path& input) {

@@ -47,8 +47,7 @@ std::string masks_text(size_t masked, size_t photos, const UsedOf& used) {
 
 }  // namespace
 
-std::string copy_masks(const fs::path& photos, const std::vector<fs::path>& names, const fs::path& images,
-                       const fs::path& masks, const fs::path& project, const ProgressFunction& progress) {
+FoundMasks find_masks(const fs::path& photos, const std::vector<fs::path>& names, const fs::path& project) {
     io::ImageRecords records;
     records.folder = fs::canonical(photos);
     for (const fs::path& name : names) {
@@ -57,21 +56,28 @@ std::string copy_masks(const fs::path& photos, const std::vector<fs::path>& name
     }
     io::Companions files(io::Companions::Kind::masks, records,
                          core::is_folder(project) ? fs::canonical(project) : records.folder, 1);
-    std::vector<fs::path> found;
-    for (const io::ImageRecord& photo : records.images) found.push_back(files.find(photo));
-    if (const fs::path of_all = files.of_all(); !of_all.empty()) std::ranges::fill(found, of_all);
+    FoundMasks found;
+    for (const io::ImageRecord& photo : records.images) found.files.push_back(files.find(photo));
+    if (const fs::path of_all = files.of_all(); !of_all.empty()) std::ranges::fill(found.files, of_all);
+    const auto bare = std::ranges::count_if(found.files, [](const fs::path& mask) { return mask.empty(); });
+    found.text = masks_text(names.size() - size_t(bare), names.size(), files.used({}));
+    return found;
+}
+
+std::string copy_masks(const fs::path& photos, const std::vector<fs::path>& names, const fs::path& images,
+                       const fs::path& masks, const fs::path& project, const ProgressFunction& progress) {
+    const FoundMasks found = find_masks(photos, names, project);
     std::vector<size_t> newer;
     const auto copy_of = [&](size_t i) { return masks / (names[i].string() + ".png"); };
     for (size_t i = 0; i < names.size(); ++i)
-        if (!found[i].empty() && is_newer(found[i], copy_of(i))) newer.push_back(i);
+        if (!found.files[i].empty() && is_newer(found.files[i], copy_of(i))) newer.push_back(i);
     if (!newer.empty())
         on_all_cores({CapturePhase::photos, "copied", "masks", 0, int(newer.size()), {}}, progress,
                      [&](size_t k) {
                          const size_t i = newer[k];
-                         write_mask(found[i], read_image_size(images / names[i]), copy_of(i));
+                         write_mask(found.files[i], read_image_size(images / names[i]), copy_of(i));
                      });
-    const auto bare = std::ranges::count_if(found, [](const fs::path& mask) { return mask.empty(); });
-    return masks_text(names.size() - size_t(bare), names.size(), files.used({}));
+    return found.text;
 }
 
 }  // namespace ewa::capture

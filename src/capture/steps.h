@@ -106,9 +106,15 @@ void convert_photos(const std::filesystem::path& photos, const std::vector<std::
                     const std::filesystem::path& folder, const std::filesystem::path& log,
                     const ProgressFunction& progress);
 
-/// Copies the masks of photos into a folder as COLMAP wants them: NAME.png of the photo's name and size. They are found as those of a
-/// dataset, and mean the same. names: of the photos in `images`. project: what the user named. Newer copies stay. Returns a line for
-/// the user; empty if there are no masks. Throws InputError, RunError, Stopped.
+struct FoundMasks {
+    std::vector<std::filesystem::path> files;  // of each photo; empty if it has none
+    std::string text;                          // a line for the user; empty if there are no masks
+};
+/// The masks of photos by these names, found as those of a dataset. project: what the user named. Throws InputError.
+FoundMasks find_masks(const std::filesystem::path& photos, const std::vector<std::filesystem::path>& names,
+                      const std::filesystem::path& project);
+/// Copies them into a folder as COLMAP wants them: NAME.png of the photo's name and size. images: the folder with the photos by
+/// their names. Newer copies stay. Returns FoundMasks::text. Throws InputError, RunError, Stopped.
 std::string copy_masks(const std::filesystem::path& photos, const std::vector<std::filesystem::path>& names,
                        const std::filesystem::path& images, const std::filesystem::path& masks,
                        const std::filesystem::path& project, const ProgressFunction& progress);

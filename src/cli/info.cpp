@@ -373,13 +373,17 @@ void info_image(const fs::path& path, std::string_view format, bool json) {
 
 /// Photos or videos that have no cameras yet.
 void info_capture(const fs::path& path, bool json) {
-    const std::string text = capture_text(path);
+    const CaptureContents contents = capture_contents(path);
     const ImageSize size = smallest_image(path);
     if (json)
-        return print_json(
-            {{"kind", "capture"}, {"contents", text}, {"width", size.width}, {"height", size.height}});
+        return print_json({{"kind", "capture"},
+                           {"contents", contents.text},
+                           {"masks", contents.masks},
+                           {"width", size.width},
+                           {"height", size.height}});
     fmt::print("{}\nkind            {} without cameras; ewa train finds them first, ewa cameras alone\n",
-               core::one_line(path.string()), text);
+               core::one_line(path.string()), contents.text);
+    if (!contents.masks.empty()) fmt::print("masks           {}\n", contents.masks);
     if (size.width > 0) fmt::print("smallest image  {}x{}\n", size.width, size.height);
 }
 

@@ -140,6 +140,9 @@ TEST_F(PhotoFolders, HaveTheMasksOfTheirFolder) {
         const Outcome outcome = find("project");
         ASSERT_EQ(outcome.status, 0) << outcome.err;
         EXPECT_NE(outcome.out.find(line), std::string::npos) << outcome.out;
+        const Outcome info = run_ewa({"info", project});
+        EXPECT_NE(info.out.find("kind            4 photos without cameras"), std::string::npos) << info.out;
+        EXPECT_NE(info.out.find("\nmasks           " + line), std::string::npos) << info.out;
     };
     said("2 of 4 photos have masks: ");
     expect_half(folder_ / "dataset/masks/a/0.png.png");
