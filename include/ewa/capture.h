@@ -92,8 +92,8 @@ void check_training_input(const std::filesystem::path& path);
 /// unpacked into unpacked/. If it holds a dataset, that becomes the folder's, and nothing is searched.
 /// - images: the frames of the videos, or a link to the photos' folder, or the photos with those that were converted.
 /// - masks: those that lie among the photos, or in masks/ beside their folder.
-/// - sparse/0: COLMAP's model, made last. The lens has OpenCV's radial and tangential terms if all images have one size,
-///   else one radial term per image. 360° photos get the lens of all directions.
+/// - sparse/0: COLMAP's model, made last. A lens has one radial term, or OpenCV's radial and tangential terms where many photos
+///   share it and determine them. 360° photos get the lens of all directions.
 /// - colmap/: what COLMAP needs to continue, and log.txt with what the programs print.
 /// - capture.json: input, options, and what distinguishes the contents of the photos or the video. A folder with the
 ///   same ones is continued; what is done is kept.

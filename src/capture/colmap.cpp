@@ -2,12 +2,17 @@
 // Cameras by COLMAP: features, matches, then a model. Each program's output is in log.txt, and gives the progress.
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <optional>
 #include <regex>
 #include <set>
 
+#include "capture/colmap_program.h"
 #include "capture/comparing.h"
+#include "capture/doubts.h"
 #include "capture/feature_database.h"
+#include "capture/lens_refinement.h"
+#include "capture/mapping.h"
 #include "capture/panoramas.h"
 #include "capture/steps.h"
 #include "core/atomic_file.h"
@@ -15,116 +20,47 @@
 #include "core/folders.h"
 #include "core/process.h"
 #include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/image.h"
-#include "io/datasets/image_records.h"
 
 namespace ewa::capture {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMostLine = 4096;  // bytes; COLMAP's own are shorter
-constexpr int kBlock = 1225;        // pairs that COLMAP verifies before it says so
+constexpr int kBlock = 1225;  // pairs that COLMAP verifies before it says so
 constexpr int kMostCompared =
     200;  // photos, the rest of which are compared with all where looks have not placed them
 constexpr int kMostPanoramas = 50;  // 360° photos, all pairs of which are compared
 constexpr int kNext = 2;            // photos that follow, which are compared whatever they look like
 constexpr const char* kMostFeatures = "3000";  // of a view; a 360° photo has six
 constexpr int kRounds = 2;                     // of a rig's bundle adjustment, each with new points
-// COLMAP adjusts all cameras and points after each growth to 1.4 times, not to 1.1 times. The last adjustment gives as small
-// errors: docs/capture.md has the figures. Models of few images count.
-constexpr const char* kGlobalRatio = "1.4";
-constexpr const char* kImagesRatio = "Mapper.ba_global_images_ratio";  // COLMAP 3.12 has frames
-constexpr std::array kMapping{"--Mapper.min_model_size",
-                              "3",
-                              "--Mapper.ba_global_points_ratio",
-                              kGlobalRatio,
-                              "--Mapper.ba_global_max_num_iterations",
-                              "25",
-                              "--Mapper.ba_global_max_refinements",
-                              "2",
-                              "--Mapper.ba_local_max_num_iterations",
-                              "15"};
 constexpr std::array kKnownLens{"--Mapper.ba_refine_focal_length", "0", "--Mapper.ba_refine_extra_params",
                                 "0"};
+constexpr size_t kSamePairs = 2000;  // that one thread verifies, so that the same ones pass each time
+constexpr double kNearlyAll = 0.9;   // of the photos that a surer way places
 constexpr const char* kOverlap =
     "photos need two thirds of their content in common with a neighbour, from another place";
 
-/// COLMAP with its log and the meaning of its lines.
-class Colmap {
+/// A part of the search, whose file says that it is done, and how long it took.
+class Part {
   public:
-    Colmap(const fs::path& work, const ProgressFunction& progress) : work_(work), progress_(progress) {}
-
-    fs::path log() const { return work_ / "log.txt"; }
-    std::string log_name() const { return core::one_line(log().string()); }
-
-    /// The help of a command: names of options differ between releases.
-    bool has_option(const std::string& command, const std::string& option) const {
-        const core::Answer help = core::ask_program(
-            {.command = {"colmap", command, "--help"}, .environment = {kNoDisplay}, .log = log()},
-            [&] { return progress_({}); });
-        if (help.ended == core::Ended::stopped) throw Stopped();
-        if (help.cut && help.text.empty()) throw RunError("colmap " + command + " --help gives no answer");
-        return help.text.find("--" + option + " ") != std::string::npos;
+    explicit Part(fs::path file) : file_(std::move(file)) {}
+    bool is_done() const { return core::is_file(file_); }
+    void mark() const {
+        const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start_;
+        core::write_text_file(file_, std::to_string(taken.count()) + "\n");
     }
-
-    /// The option that has a matcher use a GPU, which COLMAP 3.13 has renamed.
-    std::string gpu_of_matching(const std::string& command) const {
-        return has_option(command, "FeatureMatching.use_gpu") ? "--FeatureMatching.use_gpu"
-                                                              : "--SiftMatching.use_gpu";
-    }
-
-    /// Runs a program. done(line): the number of finished units after this line of the output, if it says so.
-    void run(std::vector<std::string> command, const CaptureProgress& start,
-             const std::function<std::optional<int>(const std::string&)>& done) const {
-        CaptureProgress now = start;
-        std::string rest;
-        const std::string name = command[0] + (command[0] == "colmap" ? " " + command[1] : "");
-        const core::Ended ended = core::run_program(
-            {.command = std::move(command),
-             .environment = {kNoDisplay},
-             .log = log(),
-             .output_to_log = true,
-             .joined = true},  // COLMAP 3.9 reports on standard error
-            [&](std::string_view piece) {
-                for (size_t end; (end = piece.find('\n')) != std::string::npos;
-                     piece.remove_prefix(end + 1)) {
-                    rest += piece.substr(0, end);
-                    now.done = std::max(now.done, std::min(done(rest).value_or(0), now.total));
-                    rest.clear();
-                }
-                if (rest.size() < kMostLine) rest += piece;
-                return progress_(now);
-            });
-        if (ended == core::Ended::stopped) throw Stopped();
-        if (ended == core::Ended::failed) throw RunError(name + " failed; " + log_name() + " has its reason");
+    /// 0 where it is not known.
+    double seconds() const {
+        return is_done() ? core::parse_number(core::trim(core::read_text_file(file_))).value_or(0) : 0;
     }
 
   private:
-    static constexpr const char* kNoDisplay = "QT_QPA_PLATFORM=offscreen";
-    fs::path work_;
-    const ProgressFunction& progress_;
+    fs::path file_;
+    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
-
-/// Reads two numbers of a line, such as those of "Matching image [3/50]".
-std::optional<std::pair<int, int>> numbers_in(const std::string& line, const std::regex& pattern) {
-    std::smatch found;
-    if (!std::regex_search(line, found, pattern)) return {};
-    const auto number = [&](size_t i) {
-        return found[i].matched ? core::parse_integer<int>(found[i].str()).value_or(0) : 0;
-    };
-    return std::pair(number(1), number(2));
-}
-
-void mark(const fs::path& file) {
-    core::write_text_file(file, "");
-}
-
-/// A path that no program takes for an option.
-std::string argument(const fs::path& path) {
-    return fs::absolute(path).string();
-}
 
 const char* units(const PanoramaViews* views) {
     return views ? "views" : "photos";
@@ -161,8 +97,7 @@ std::vector<LensWords> lens_words(const Photos& photos, const PanoramaViews* vie
     else
         for (LensGroup& group : lenses_of(photos.folder, photos.names)) {
             std::vector<std::string> words{"--ImageReader.single_camera", group.shared ? "1" : "0",
-                                           "--ImageReader.camera_model",
-                                           group.tangential ? "OPENCV" : "SIMPLE_RADIAL"};
+                                           "--ImageReader.camera_model", "SIMPLE_RADIAL"};
             if (are_large(photos.folder, group.photos))
                 words.insert(words.end(), {"--SiftExtraction.first_octave", "0"});
             all.push_back({std::move(group.photos), std::move(words)});
@@ -174,7 +109,8 @@ std::vector<LensWords> lens_words(const Photos& photos, const PanoramaViews* vie
 /// they are none.
 void extract_features(const Colmap& colmap, const Photos& photos, const PanoramaViews* views,
                       const fs::path& work) {
-    if (core::is_file(work / "features.done")) return;
+    const Part part(work / "features.done");
+    if (part.is_done()) return;
     // COLMAP 3.13 has moved the option.
     const std::string gpu = colmap.has_option("feature_extractor", "FeatureExtraction.use_gpu")
                                 ? "--FeatureExtraction.use_gpu"
@@ -212,7 +148,12 @@ void extract_features(const Colmap& colmap, const Photos& photos, const Panorama
                    });
         before += int(group.photos.size());
     }
-    mark(work / "features.done");
+    if (FeatureDatabase database(work / "database.db");
+        photos.names.size() <= kSameEachTime && database.is_known() && database.has_plain_images()) {
+        database.number_by_name();
+        database.commit();
+    }
+    part.mark();
 }
 
 /// A list of COLMAP separates names by spaces.
@@ -223,10 +164,12 @@ bool has_white_space(const fs::path& name) {
 /// COLMAP verifies the matches of these pairs. listed: no name has white space; otherwise all others are passed over.
 void verify(const Colmap& colmap, const Photos& photos, const std::vector<ImagePair>& pairs, bool listed,
             const fs::path& work) {
-    const std::string command = listed ? "matches_importer" : "exhaustive_matcher";
+    const std::string command = listed ? "matches_importer" : "exhaustive_matcher",
+                      option = colmap.options_of_matching(command);
     std::vector<std::string> words{
-        "colmap", command, "--database_path", argument(work / "database.db"), colmap.gpu_of_matching(command),
-        "0"};
+        "colmap", command, "--database_path", argument(work / "database.db"), option + "use_gpu", "0"};
+    // Several threads share the pairs, and so the random numbers, in another way each time.
+    if (pairs.size() <= kSamePairs) words.insert(words.end(), {option + "num_threads", "1"});
     if (listed) {
         std::string text;
         for (const auto& [a, b] : pairs)
@@ -264,82 +207,15 @@ Comparison first_comparison(const Photos& photos, bool panoramas) {
 /// done: the file that says so.
 void match(const Colmap& colmap, const Photos& photos, Comparison comparison, const fs::path& work,
            const fs::path& done, const ProgressFunction& progress) {
-    if (core::is_file(done)) return;
+    const Part part(done);
+    if (part.is_done()) return;
     comparison.pass_over_others = std::ranges::any_of(photos.names, has_white_space);
     const auto compared = compare_photos(work / "database.db", photos.names, comparison, progress);
     verify(colmap, photos, compared.value_or(comparison.pairs), !comparison.pass_over_others, work);
-    mark(done);
+    part.mark();
 }
 
-struct Model {
-    fs::path folder;
-    uint64_t images = 0;
-};
-
-/// The models that a mapper has written, the largest first.
-std::vector<Model> models_in(const fs::path& folder) {
-    std::vector<Model> models;
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-        const fs::path images = entry.path() / "images.bin";
-        if (!core::is_file(images)) continue;
-        core::FileReader reader(images);
-        models.push_back({entry.path(), reader.read<uint64_t>("number of images")});
-    }
-    std::sort(models.begin(), models.end(), [](const Model& a, const Model& b) {
-        return a.images != b.images ? a.images > b.images : a.folder < b.folder;
-    });
-    return models;
-}
-
-/// views: the photos are such, whose lens is known.
-std::vector<Model> map(const Colmap& colmap, const Photos& photos, const PanoramaViews* views,
-                       const fs::path& work) {
-    const fs::path folder = work / "models";
-    fs::remove_all(folder);
-    core::make_folder(folder);
-    const bool glomap = !core::find_program("glomap").empty();
-    std::vector<std::string> words{glomap ? "glomap" : "colmap",
-                                   "mapper",
-                                   "--database_path",
-                                   argument(work / "database.db"),
-                                   "--image_path",
-                                   argument(photos.folder),
-                                   "--output_path",
-                                   argument(folder)};
-    if (!glomap) words.insert(words.end(), kMapping.begin(), kMapping.end());
-    if (!glomap && colmap.has_option("mapper", kImagesRatio))
-        words.insert(words.end(), {"--" + std::string(kImagesRatio), kGlobalRatio});
-    if (!glomap && views) words.insert(words.end(), kKnownLens.begin(), kKnownLens.end());
-    static const std::regex pattern(R"(Registering image #\d+ \((\d+)\)|num_reg_frames=(\d+))");
-    colmap.run(std::move(words),
-               {CapturePhase::cameras, "placed", units(views), 0, int(photos.names.size()), {}},
-               [](const std::string& line) -> std::optional<int> {
-                   const auto numbers = numbers_in(line, pattern);
-                   return numbers ? std::optional(std::max(numbers->first, numbers->second)) : std::nullopt;
-               });
-    return models_in(folder);
-}
-
-/// The models that a mapper makes. None where it finds no pair of images to begin with, which COLMAP's takes for a failure.
-std::vector<Model> map_if_possible(const Colmap& colmap, const Photos& photos, const PanoramaViews* views,
-                                   const fs::path& work) try {
-    return map(colmap, photos, views, work);
-} catch (const RunError&) {
-    if (!core::is_folder(work / "models") || !models_in(work / "models").empty()) throw;
-    return {};
-}
-
-/// The images in the largest model.
-std::set<std::string> names_in(const std::vector<Model>& models) {
-    std::set<std::string> names;
-    if (!models.empty())
-        for (const io::ImageRecord& image :
-             io::read_colmap(io::colmap_model_in(models.front().folder)).images)
-            names.insert(image.name);
-    return names;
-}
-
-std::string sizes_text(const std::vector<Model>& models) {
+std::string sizes_text(const std::vector<MappedModel>& models) {
     std::string text;
     for (size_t i = 0; i < models.size(); ++i) {
         if (i > 0) text += i + 1 == models.size() ? " and " : ", ";
@@ -407,6 +283,107 @@ std::vector<std::string> model_of_panoramas(const Colmap& colmap, const Photos& 
     return remarks;
 }
 
+/// A way as a file keeps it: its name, what it changes, and a word in each line.
+void write_way(const fs::path& file, const Way& way) {
+    std::string text = way.name + "\n" + (way.own_lenses ? "own lenses" : "") + "\n";
+    for (const std::string& word : way.words) text += word + "\n";
+    core::write_text_file(file, text);
+}
+
+Way read_way(const fs::path& file) {
+    Way way;
+    if (!core::is_file(file)) return way;  // of an older search
+    constexpr size_t kMostLine = 4096;
+    core::FileReader reader(file);
+    std::string line;
+    reader.read_line(way.name, kMostLine);
+    reader.read_line(line, kMostLine);
+    way.own_lenses = !line.empty();
+    while (reader.read_line(line, kMostLine)) way.words.push_back(line);
+    return way;
+}
+
+/// The pairs of photos that have been compared by looks alone, of which one has no camera.
+Comparison other_pairs(const Photos& photos, const Placing& placing) {
+    std::set<std::string> placed;
+    if (!placing.models.empty())
+        for (const auto& [id, image] : read_sparse(placing.models.front().folder).images)
+            placed.insert(image.name);
+    Comparison others;
+    for (const ImagePair& pair : pairs_of(int(photos.names.size()), Pairing::all))
+        if (!placed.contains(photos.names[size_t(pair.first)].string()) ||
+            !placed.contains(photos.names[size_t(pair.second)].string()))
+            others.pairs.push_back(pair);
+    return others;
+}
+
+/// Places the photos by the first comparisons, then by those that seemed needless if these left some out.
+Placing place_by_matches(const Colmap& colmap, const Mapping& mapping, const Photos& photos, bool views,
+                         const fs::path& work, const ProgressFunction& progress) {
+    const double seconds = Part(work / "features.done").seconds() + Part(work / "matches.done").seconds();
+    // Models from before a search was interrupted in the other comparisons.
+    const fs::path before = work / "models_by_look";
+    const bool resumed = core::is_folder(before);
+    Placing placing =
+        resumed ? mapping.placed_in(read_way(before / "way"), before) : mapping.place_enough({}, seconds);
+    if (views || photos.pairing != Pairing::by_look || int(photos.names.size()) > kMostCompared)
+        return placing;
+    const Comparison others = other_pairs(photos, placing);
+    if (others.pairs.empty()) return placing;
+    if (!resumed) {
+        write_way(work / "models" / "way", placing.way);
+        fs::rename(work / "models", before);
+    }
+    match(colmap, photos, others, work, work / "other_matches.done", progress);
+    Placing again = is_enough(placing.grade, photos.names.size())
+                        ? mapping.place(placing.way, work / "models")
+                        : mapping.place_enough(placing.way, seconds);
+    return is_better(placing.grade, again.grade) ? mapping.placed_in(placing.way, before) : again;
+}
+
+/// Whether photos that follow each other are among those whose matches contradict their cameras.
+bool neighbours_contradict(const std::vector<Contradiction>& contradictions) {
+    return std::ranges::any_of(contradictions, &Contradiction::follows);
+}
+
+/// Things that look alike have matches, too. Where these have parted photos that follow each other, the matches of neighbours alone
+/// are tried.
+void part_lookalikes(const Mapping& mapping, Placing& placing, const FeatureDatabase& database,
+                     const fs::path& work) {
+    if (!neighbours_contradict(contradictions_in(read_sparse(placing.models.front().folder), database)))
+        return;
+    const Way way{.name = "by the matches of neighbours", .neighbours = true};
+    Placing tried = mapping.place(with(placing.way, way), work / "models_of_neighbours");
+    mapping.say(tried);
+    if (tried.models.empty() || double(tried.grade.sound) < kNearlyAll * placing.grade.sound) return;
+    if (!neighbours_contradict(contradictions_in(read_sparse(tried.models.front().folder), database)))
+        placing = std::move(tried);
+}
+
+/// Completes the model of photos: a full lens where the photos determine it. Returns remarks on what may be wrong.
+std::vector<std::string> complete(const Colmap& colmap, const Mapping& mapping, const Placing& placing,
+                                  const FeatureDatabase& database, const fs::path& work,
+                                  const fs::path& model) {
+    std::vector<std::string> remarks;
+    Grade grade = placing.grade;
+    if (placing.way.own_lenses && grade.sound >= int(kLeastPhotos) && !grade.is_sound()) {
+        std::set<std::string> names;
+        for (const auto& [name, fault] : grade.faults) names.insert(name);
+        remove_views(model, names);
+        remarks.push_back(core::counted(names.size(), "photo") + " of " + std::to_string(grade.placed) +
+                          " got a camera that cannot be right, and " +
+                          std::string(core::is_or_are(names.size())) + " not used");
+    }
+    refine_lens(colmap, model, mapping.expected(), work);
+    const SparseModel found = read_sparse(model);
+    const std::vector<Station> stations = stations_of(found);
+    const std::vector<std::string> doubts =
+        doubts_of(grade_of(found, mapping.expected()), contradictions_in(found, database),
+                  strays_among(stations), jumps_among(stations, matches_along(stations, database)));
+    remarks.insert(remarks.end(), doubts.begin(), doubts.end());
+    return remarks;
+}
+
 }  // namespace
 
 void require_colmap() {
@@ -428,29 +405,17 @@ std::vector<std::string> place_photos(const Photos& given, const fs::path& work,
     const Photos& photos = views ? views->photos : given;
     extract_features(colmap, photos, views, work);
     match(colmap, photos, first_comparison(given, views != nullptr), work, work / "matches.done", progress);
-    // Models from before a search was interrupted in the other comparisons.
-    const fs::path before = work / "models_by_look";
-    const bool resumed = core::is_folder(before);
-    std::vector<Model> models = resumed ? models_in(before) : map_if_possible(colmap, photos, views, work);
-    const std::set<std::string> placed = names_in(models);
-    if (!views && given.pairing == Pairing::by_look && int(given.names.size()) <= kMostCompared) {
-        // The comparisons that seemed needless may place the others.
-        Comparison others;
-        for (const ImagePair& pair : pairs_of(int(given.names.size()), Pairing::all))
-            if (!placed.contains(given.names[size_t(pair.first)].string()) ||
-                !placed.contains(given.names[size_t(pair.second)].string()))
-                others.pairs.push_back(pair);
-        if (!others.pairs.empty()) {
-            if (!resumed) fs::rename(work / "models", before);
-            match(colmap, photos, others, work, work / "other_matches.done", progress);
-            models = map_if_possible(colmap, photos, views, work);
-            if (names_in(models).size() < placed.size()) models = models_in(before);
-        }
-    }
-    if (models.empty() || models.front().images < 2)
+    const Mapping mapping(colmap, photos, views, work);
+    Placing placing = place_by_matches(colmap, mapping, given, views != nullptr, work, progress);
+    if (placing.models.empty() || placing.models.front().images < 2)
         throw InputError("COLMAP could not place the " + std::to_string(given.names.size()) +
                          " photos: too few of their details match; " + kOverlap + " (" + colmap.log_name() +
                          ")");
+    const FeatureDatabase database(work / "database.db");
+    const bool checked = !views && database.is_known();
+    if (checked) part_lookalikes(mapping, placing, database, work);
+    mapping.join(placing);
+    const std::vector<MappedModel>& models = placing.models;
     std::vector<std::string> remarks;
     if (models.size() > 1 && models.front().images < photos.names.size())
         remarks.push_back(std::string("the ") + units(views) + " fall into " + std::to_string(models.size()) +
@@ -460,13 +425,14 @@ std::vector<std::string> place_photos(const Photos& given, const fs::path& work,
     partial += ".partial";
     fs::remove_all(partial);
     core::make_folder(partial);
+    std::vector<std::string> more;
     if (views) {
-        const std::vector<std::string> more =
-            model_of_panoramas(colmap, given, *views, models.front().folder, work, partial);
-        remarks.insert(remarks.end(), more.begin(), more.end());
+        more = model_of_panoramas(colmap, given, *views, models.front().folder, work, partial);
     } else {
         copy_model(models.front().folder, partial);
+        if (checked) more = complete(colmap, mapping, placing, database, work, partial);
     }
+    remarks.insert(remarks.end(), more.begin(), more.end());
     fs::rename(partial, model);
     return remarks;
 }

@@ -194,6 +194,100 @@ void FeatureDatabase::pass_over(std::int64_t first, std::int64_t second) {
         .step();
 }
 
+std::int64_t FeatureDatabase::count(const char* sql) const {
+    const std::scoped_lock lock(mutex_);
+    Statement row(*this, sql);
+    return row.step() ? row.integer(0) : 0;
+}
+
+bool FeatureDatabase::has_plain_images() const {
+    return count("SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name = 'cameras'") == 1 &&
+           count("SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name IN ('rigs', 'frames')") ==
+               0 &&
+           count("SELECT COUNT(*) FROM pragma_table_info('images') WHERE name = 'camera_id'") == 1;
+}
+
+void FeatureDatabase::number_by_name() {
+    const std::map<std::string, std::int64_t> numbers = images();
+    std::int64_t highest = 0, next = 0;
+    for (const auto& [name, number] : numbers) highest = std::max(highest, number);
+    std::vector<std::pair<std::int64_t, std::int64_t>> moves;
+    for (const auto& [name, number] : numbers)
+        if (number != ++next) moves.emplace_back(number, next);
+    const std::scoped_lock lock(mutex_);
+    const auto move = [&](std::int64_t from, std::int64_t to) {
+        for (const char* sql : {"UPDATE images SET image_id = ?2 WHERE image_id = ?1",
+                                "UPDATE keypoints SET image_id = ?2 WHERE image_id = ?1",
+                                "UPDATE descriptors SET image_id = ?2 WHERE image_id = ?1"})
+            Statement(*this, sql).bind(1, from).bind(2, to).step();
+    };
+    // Numbers may not meet on the way.
+    for (const auto& [from, to] : moves) move(from, highest + from);
+    for (const auto& [from, to] : moves) move(highest + from, to);
+}
+
+std::map<std::string, double> FeatureDatabase::expected_focal_lengths() const {
+    const std::scoped_lock lock(mutex_);
+    std::map<std::string, double> lengths;
+    for (Statement rows(
+             *this,
+             "SELECT LENGTH(params) / 8, 1, params, name FROM images JOIN cameras USING (camera_id) "
+             "WHERE prior_focal_length != 0 AND LENGTH(params) >= 8");
+         rows.step();)
+        lengths[rows.text(3)] = rows.array<double>().front();
+    return lengths;
+}
+
+bool FeatureDatabase::has_shared_cameras() const {
+    return count("SELECT COUNT(*) - COUNT(DISTINCT camera_id) FROM images") > 0;
+}
+
+void FeatureDatabase::give_own_cameras() {
+    const std::map<std::string, std::int64_t> numbers = images();
+    const std::scoped_lock lock(mutex_);
+    std::int64_t next = 1;
+    if (Statement last(*this, "SELECT MAX(camera_id) FROM cameras"); last.step()) next += last.integer(0);
+    for (const auto& [name, number] : numbers) {
+        Statement(
+            *this,
+            "INSERT INTO cameras SELECT ?1, model, width, height, params, prior_focal_length FROM cameras "
+            "WHERE camera_id = (SELECT camera_id FROM images WHERE image_id = ?2)")
+            .bind(1, next)
+            .bind(2, number)
+            .step();
+        Statement(*this, "UPDATE images SET camera_id = ?1 WHERE image_id = ?2")
+            .bind(1, next++)
+            .bind(2, number)
+            .step();
+    }
+}
+
+void FeatureDatabase::visit_verified(
+    const std::function<void(std::int64_t, std::int64_t, const std::vector<FeatureMatch>&)>& visit) const {
+    const std::scoped_lock lock(mutex_);
+    for (Statement rows(*this,
+                        "SELECT rows, cols, data, pair_id FROM two_view_geometries WHERE rows > 0 ORDER BY "
+                        "pair_id");
+         rows.step();) {
+        const auto places = rows.array<std::uint32_t>();
+        std::vector<FeatureMatch> matches;
+        for (size_t i = 0; i + 1 < places.size(); i += 2) matches.push_back({places[i], places[i + 1]});
+        visit(rows.integer(3) / kMostImages, rows.integer(3) % kMostImages, matches);
+    }
+}
+
+void FeatureDatabase::remove_verified(std::int64_t first, std::int64_t second) {
+    const std::scoped_lock lock(mutex_);
+    Statement(*this, "DELETE FROM two_view_geometries WHERE pair_id = ?")
+        .bind(1, pair_of(first, second).number)
+        .step();
+}
+
+void FeatureDatabase::remove_descriptors() {
+    const std::scoped_lock lock(mutex_);
+    execute("DELETE FROM descriptors");
+}
+
 void FeatureDatabase::commit() {
     const std::scoped_lock lock(mutex_);
     execute("COMMIT");

@@ -3,6 +3,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -38,11 +39,32 @@ class FeatureDatabase {
     void write(std::int64_t first, std::int64_t second, const std::vector<FeatureMatch>& matches);
     /// Has COLMAP pass over two images without comparing them, until `write` gives their matches.
     void pass_over(std::int64_t first, std::int64_t second);
+
+    /// Whether each image has its camera in its own row, as up to COLMAP 3.11. Later ones have rigs and frames.
+    bool has_plain_images() const;
+    /// Numbers the images in the order of their names. COLMAP's order is that in which its threads have finished. Only before the
+    /// first matches, and with plain images.
+    void number_by_name();
+    /// The focal lengths that EXIF gives, px, by the images' names. Images without one are not in it.
+    std::map<std::string, double> expected_focal_lengths() const;
+    /// Gives each image a camera of its own, with the values of the one that it shares. Only with plain images.
+    void give_own_cameras();
+    /// Whether images share a camera.
+    bool has_shared_cameras() const;
+    /// Calls visit(first, second, matches) with the verified matches of each pair, by the pairs' numbers.
+    void visit_verified(const std::function<void(std::int64_t first, std::int64_t second,
+                                                 const std::vector<FeatureMatch>&)>& visit) const;
+    /// Removes the verified matches of these two images.
+    void remove_verified(std::int64_t first, std::int64_t second);
+    /// Removes the descriptors, which are most of a file.
+    void remove_descriptors();
+
     /// Makes what was written since the last call lasting, at once.
     void commit();
 
   private:
     class Statement;
+    std::int64_t count(const char* sql) const;
     void execute(const char* sql) const;
 
     mutable std::mutex mutex_;

@@ -26,7 +26,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr uint64_t kDecodingBytes = uint64_t(2) << 30;  // that all threads together may hold
-constexpr size_t kWholeLens = 10;                       // photos that determine four terms of distortion
 
 /// Whether a folder between `folder` and the file in it was made by ewa. known: the answers so far.
 bool below_made(const fs::path& folder, const fs::path& name, std::map<fs::path, bool>& known) {
@@ -242,13 +241,12 @@ std::vector<LensGroup> lenses_of(const fs::path& folder, const std::vector<fs::p
             .push_back(name);
     }
     std::vector<LensGroup> groups;
-    LensGroup single{.photos = {}, .shared = false, .tangential = false};
+    LensGroup single{.photos = {}, .shared = false};
     for (auto& [key, group] : alike) {
-        const bool tangential = group.size() == names.size() || group.size() >= kWholeLens;
         if (group.size() == 1)
             single.photos.push_back(group.front());
         else
-            groups.push_back({.photos = std::move(group), .shared = true, .tangential = tangential});
+            groups.push_back({.photos = std::move(group), .shared = true});
     }
     std::ranges::stable_sort(
         groups, [](const LensGroup& a, const LensGroup& b) { return a.photos.front() < b.photos.front(); });

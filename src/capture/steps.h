@@ -163,11 +163,9 @@ Chosen later_choice(const std::filesystem::path& folder, const std::vector<std::
 struct LensGroup {
     std::vector<std::filesystem::path> photos;  // sorted
     bool shared = true;                         // one camera; else one for each photo
-    bool tangential = true;                     // two radial and two tangential terms; else one radial term
 };
 
-/// Photos of one size, camera and focal length share a camera. Tangential terms need ten photos, or all that there are.
-/// Throws InputError where a photo cannot be read.
+/// Photos of one size, camera and focal length share a camera. Throws InputError where a photo cannot be read.
 std::vector<LensGroup> lenses_of(const std::filesystem::path& folder,
                                  const std::vector<std::filesystem::path>& names);
 

@@ -63,7 +63,7 @@ esac
         const ImageDimensions size{};
         std::string cameras = bytes_of(uint64_t(1)) + bytes_of(uint32_t(1)) + bytes_of(int32_t(1)) +
                               bytes_of(size.width) + bytes_of(size.height);
-        for (const double value : {40.0, 40.0, 24.0, 16.0}) cameras += bytes_of(value);
+        for (const double value : lens_) cameras += bytes_of(value);
         std::string images = bytes_of(uint64_t(photos.size()));
         for (size_t i = 0; i < photos.size(); ++i) {
             images += bytes_of(uint32_t(i + 1));
@@ -104,6 +104,7 @@ esac
     }
 
     Folder folder_;
+    std::vector<double> lens_{40, 40, 24, 16};  // of the models: fx, fy, cx, cy
 };
 
 }  // namespace ewa::test

@@ -72,14 +72,57 @@ TEST_F(Cameras, ComeFromComparingWhatLooksAlike) {
     fs::remove(folder_ / "calls");
     make_model("0", {"0.png", "1.png", "2.png"});
     ASSERT_EQ(cameras(features).status, 0);
-    EXPECT_EQ(calls(), "feature_extractor\nmatches_importer\nmapper\nmatches_importer\nmapper\n");
+    // Three of four are so few that another way is tried, too.
+    EXPECT_EQ(calls(),
+              "feature_extractor\nmatches_importer\nmapper\nmapper\nmatches_importer\nmapper\nmapper\n");
     EXPECT_TRUE(first_and_last());
 
     // A search that failed at the end continues there.
     fs::remove_all(folder_ / "dataset/sparse");
     fs::remove(folder_ / "calls");
     ASSERT_EQ(cameras(features).status, 0);
-    EXPECT_EQ(calls(), "mapper\n");
+    EXPECT_EQ(calls(), "mapper\nmapper\n");
+}
+
+/// A mapper that places more photos where the first pair may be apart by forward motion.
+TEST_F(Cameras, ComeFromTheWayThatPlacesMost) {
+    make_model("few/0", {"0.png", "1.png"});
+    make_model("most/0", {"0.png", "1.png", "2.png", "3.png"});
+    make_program(folder_ / "bin/colmap", R"sh(
+case "$*" in *--help*) exit 0;; esac
+echo "$1" >> "$CALLS"
+case "$*" in *init_max_forward_motion*) models=most;; *) models=few;; esac
+case $1 in
+feature_extractor) touch "$3";;
+mapper) for word; do if [ "$previous" = --output_path ]; then cp -r "$MODELS/$models/." "$word"; fi; previous=$word; done;;
+esac
+)sh");
+    const Outcome outcome = cameras();
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find("placed 2 of 4 photos in "), std::string::npos) << outcome.out;
+    EXPECT_NE(outcome.out.find("placed 4 of 4 photos with forward motion in "), std::string::npos)
+        << outcome.out;
+    EXPECT_NE(outcome.out.find("4 of 4 photos have cameras"), std::string::npos) << outcome.out;
+    EXPECT_EQ(calls(), "feature_extractor\nmatches_importer\nmapper\nmapper\n");
+}
+
+/// A model of a lens that no camera has is said to be wrong.
+TEST_F(Cameras, ThatCannotBeRightAreNamed) {
+    std::vector<DatabaseImage> images;
+    for (int i = 0; i < 4; ++i) {
+        images.push_back({std::to_string(i) + ".png", std::vector<std::uint8_t>(128, 0), {1.0f}});
+        images.back().descriptors[size_t(i)] = 255;
+    }
+    write_colmap_database(folder_ / "features.db", images);
+    lens_ = {40.0, 44.0, 24.0, 16.0};
+    make_model("0", {"0.png", "1.png", "2.png", "3.png"});
+    const Outcome outcome = cameras({.environment = {{"DATABASE", folder_ / "features.db"}}});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(
+        outcome.out.find("the cameras of 4 photos are probably wrong, since the focal lengths are 40 px "
+                         "along and 44 px across: 0.png, 1.png, 2.png, 3.png"),
+        std::string::npos)
+        << outcome.out;
 }
 
 /// COLMAP's lists end a name at a space.

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Signs that cameras are wrong, which the errors of their points do not show.
+#pragma once
+#include <filesystem>
+#include <glm/vec2.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "capture/feature_database.h"
+#include "capture/lens_check.h"
+#include "capture/sparse_model.h"
+
+namespace ewa::capture {
+
+/// Whether matches of two photos do not fit their cameras: most lie far from where they could be. matches: px in both.
+bool contradict(const Camera& first, const Camera& second,
+                const std::vector<std::pair<glm::dvec2, glm::dvec2>>& matches);
+
+/// Two photos whose matches contradict their cameras.
+struct Contradiction {
+    std::string first, second;
+    size_t matches = 0;
+    bool follows = false;  // the second follows the first, or the next one, in the order of names
+};
+
+/// The pairs with many matches that contradict their cameras. The database has the numbers of the model's images.
+std::vector<Contradiction> contradictions_in(const SparseModel& model, const FeatureDatabase& database);
+
+/// A photo's place and direction.
+struct Station {
+    std::string name;
+    glm::dvec3 center{0};
+    glm::dmat3 rotation{1};  // world to camera
+};
+
+/// The photos that are far from those before and after them, or turned, where these two are near each other, and photos that follow
+/// each other are near each other as a rule. stations: in the order in which the photos were taken.
+std::vector<std::string> strays_among(const std::vector<Station>& stations);
+
+/// Pairs of photos that follow each other, have many matches, and are much farther apart or turned than others, where photos that
+/// follow each other are near each other as a rule. matches: of each station with the next one.
+std::vector<std::string> jumps_among(const std::vector<Station>& stations,
+                                     const std::vector<size_t>& matches);
+/// The verified matches of each station with the next one.
+std::vector<size_t> matches_along(const std::vector<Station>& stations, const FeatureDatabase& database);
+
+/// The stations of a model's photos in the order of names.
+std::vector<Station> stations_of(const SparseModel& model);
+
+/// Lines for the user about what is probably wrong. None: nothing is known to be.
+std::vector<std::string> doubts_of(const Grade& grade, const std::vector<Contradiction>& contradictions,
+                                   const std::vector<std::string>& strays,
+                                   const std::vector<std::string>& jumps);
+
+}  // namespace ewa::capture

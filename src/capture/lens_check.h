@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether the lenses and the poses that a search has found can be those of photos.
+#pragma once
+#include <cstddef>
+#include <map>
+#include <set>
+#include <string>
+
+#include "capture/sparse_model.h"
+#include "ewa/camera.h"
+
+namespace ewa::capture {
+
+/// Why no lens of a camera is like this; empty if one may be. expected: the focal length by EXIF, px; 0: not known.
+std::string lens_fault(const Camera& lens, double expected);
+
+/// What a model is worth.
+struct Grade {
+    int placed = 0;           // photos
+    int sound = 0;            // of them: no fault of the lens, points in front of the camera
+    size_t observations = 0;  // of points
+    std::map<std::string, std::string> faults{};  // of the others, by name
+
+    bool is_sound() const { return placed > 0 && sound == placed; }
+};
+
+/// expected: focal lengths by EXIF by the photos' names, px.
+Grade grade_of(const SparseModel& model, const std::map<std::string, double>& expected);
+
+/// Whether the first model is worth more: it has more sound photos, else more photos, else more observations.
+bool is_better(const Grade& first, const Grade& second);
+
+/// Whether so many photos are so many that no other way is tried.
+bool is_enough(const Grade& grade, size_t photos);
+
+}  // namespace ewa::capture

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// Ways to place photos by the same matches, and which of them is taken.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "capture/colmap_program.h"
+#include "capture/lens_check.h"
+#include "capture/panoramas.h"
+#include "capture/steps.h"
+
+namespace ewa::capture {
+
+/// Photos, up to which a search gives the same each time: images are numbered by name, and one thread uses random numbers.
+constexpr size_t kSameEachTime = 200;
+
+/// A model that a mapper has written.
+struct MappedModel {
+    std::filesystem::path folder;
+    uint64_t images = 0;
+};
+
+/// The models in a folder, the largest first.
+std::vector<MappedModel> models_in(const std::filesystem::path& folder);
+
+/// A way to place photos.
+struct Way {
+    std::string name;                  // for the user, after "placed" and a count; empty: the first way
+    std::vector<std::string> words{};  // of COLMAP's mapper
+    bool own_lenses = false;           // each photo has its own lens
+    bool neighbours = false;           // only matches of photos that follow each other
+};
+
+/// What the matches and the photos allow.
+struct WayFacts {
+    bool exif = false;    // most photos have a focal length by EXIF
+    bool shared = false;  // photos share a lens, and may have their own
+};
+
+/// What may be added to the first way, in the order in which it is tried: first what costs least and places most.
+std::vector<Way> other_ways(const WayFacts& facts);
+/// The way with what `more` adds.
+Way with(const Way& way, const Way& more);
+/// Whether the way has that already.
+bool has(const Way& way, const Way& more);
+
+/// What a way has given.
+struct Placing {
+    Way way;
+    std::vector<MappedModel> models{};  // the largest first
+    Grade grade{};                      // of the largest
+    double seconds = 0;
+};
+
+/// Places photos by the matches in the database of a folder.
+class Mapping {
+  public:
+    /// views: the photos are such, whose lens is known; null: they are none.
+    Mapping(const Colmap& colmap, const Photos& photos, const PanoramaViews* views,
+            std::filesystem::path work);
+
+    /// By one way. The models are in `folder`. None where the mapper finds no pair of images to begin with.
+    Placing place(const Way& way, const std::filesystem::path& folder) const;
+    /// By this way, then with what others add until enough photos are placed. The models are in work/models. seconds: what the search
+    /// has taken before; all ways together take about as long.
+    Placing place_enough(const Way& first, double seconds) const;
+    /// Joins the largest model with others that share photos, where that is sound.
+    void join(Placing& placing) const;
+    /// What there is in a folder.
+    Placing placed_in(const Way& way, const std::filesystem::path& folder) const;
+
+    /// Tells the user what a way has given, and how long it took.
+    void say(const Placing& placing) const;
+    const std::map<std::string, double>& expected() const { return expected_; }
+
+  private:
+    std::filesystem::path database_for(const Way& way) const;
+    void keep(Placing& best, Placing& tried, const std::filesystem::path& folder) const;
+
+    const Colmap& colmap_;
+    const Photos& photos_;
+    const PanoramaViews* views_;
+    std::filesystem::path work_;
+    std::map<std::string, double> expected_;  // focal lengths by EXIF, px
+    WayFacts facts_;
+};
+
+}  // namespace ewa::capture
