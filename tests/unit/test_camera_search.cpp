@@ -297,8 +297,8 @@ void write_shared_camera(const std::string& file) {
         "data "
         "BLOB, config INTEGER);"
         // 800 and 400 as float64.
-        "INSERT INTO cameras VALUES (4, 2, 800, 600, X'0000000000008940' || X'0000000000007940', 1);"
-        "INSERT INTO cameras VALUES (5, 2, 800, 600, X'0000000000008940' || X'0000000000007940', 0);"
+        "INSERT INTO cameras VALUES (4, 2, 800, 600, X'00000000000089400000000000007940', 1);"
+        "INSERT INTO cameras VALUES (5, 2, 800, 600, X'00000000000089400000000000007940', 0);"
         "INSERT INTO images VALUES (1, 'c.jpg', 4), (2, 'a.jpg', 4), (7, 'b.jpg', 5);"
         "INSERT INTO keypoints VALUES (1, 1, 1, X'01'), (2, 2, 1, X'0202'), (7, 3, 1, X'030303');"
         "INSERT INTO descriptors VALUES (1, 1, 128, ZEROBLOB(128)), (2, 0, 128, NULL), (7, 0, 128, NULL);"
