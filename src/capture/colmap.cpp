@@ -75,12 +75,12 @@ struct LensWords {
 /// Whether the photos have so many pixels that COLMAP finds all the features that it keeps without enlarging them. Enlarged, they
 /// take three times as long.
 bool are_large(const fs::path& folder, const std::vector<fs::path>& names) {
-    constexpr double kMostSide = 3200;  // px; COLMAP reduces longer ones
-    constexpr double kEnough = 3e6;     // pixels: 2,600 features each million, of 8,192
+    constexpr double kMostSide = 3200;     // px; COLMAP reduces longer ones
+    constexpr double kEnoughPixels = 3e6;  // pixels: 2,600 features each million, of 8,192
     return std::ranges::all_of(names, [&](const fs::path& name) {
         const ImageSize size = read_image_size(folder / name);
         const double reduced = std::min(1.0, kMostSide / std::max({1, size.width, size.height}));
-        return size.width * reduced * (size.height * reduced) >= kEnough;
+        return size.width * reduced * (size.height * reduced) >= kEnoughPixels;
     });
 }
 
@@ -293,13 +293,13 @@ void write_way(const fs::path& file, const Way& way) {
 Way read_way(const fs::path& file) {
     Way way;
     if (!core::is_file(file)) return way;  // of an older search
-    constexpr size_t kMostLine = 4096;
+    constexpr size_t kLongestWord = 4096;
     core::FileReader reader(file);
     std::string line;
-    reader.read_line(way.name, kMostLine);
-    reader.read_line(line, kMostLine);
+    reader.read_line(way.name, kLongestWord);
+    reader.read_line(line, kLongestWord);
     way.own_lenses = !line.empty();
-    while (reader.read_line(line, kMostLine)) way.words.push_back(line);
+    while (reader.read_line(line, kLongestWord)) way.words.push_back(line);
     return way;
 }
 

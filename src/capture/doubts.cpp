@@ -13,6 +13,7 @@
 #include "core/text.h"
 #include "core/typing.h"
 #include "scene/lens.h"
+#include "scene/statistics.h"
 
 namespace ewa::capture {
 namespace {
@@ -25,13 +26,6 @@ constexpr double kLeastTurn = 30;      // degrees
 constexpr double kSteady =
     0.5;  // the usual step by the usual distance of any two, at most: the order is a path
 constexpr size_t kLeastStations = 6;
-
-double median(std::vector<double> values) {
-    if (values.empty()) return 0;
-    const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
 
 glm::dmat3 cross_matrix(const glm::dvec3& t) {
     return {0, t.z, -t.y, -t.z, 0, t.x, t.y, -t.x, 0};
@@ -66,8 +60,9 @@ std::optional<Step> usual_step(const std::vector<Station>& stations) {
         turns.push_back(turn_between(stations[i].rotation, stations[i + 1].rotation));
         apart.push_back(glm::distance(stations[i].center, stations[(i + count / 2) % count].center));
     }
-    const Step step{median(steps), median(turns)};
-    return step.length > 0 && step.length < kSteady * median(apart) ? std::optional(step) : std::nullopt;
+    const Step step{scene::quantile(steps, 0.5), scene::quantile(turns, 0.5)};
+    return step.length > 0 && step.length < kSteady * scene::quantile(apart, 0.5) ? std::optional(step)
+                                                                                  : std::nullopt;
 }
 
 /// How many usual steps two photos are apart, in space or by their turn.
@@ -97,7 +92,7 @@ bool contradict(const Camera& first, const Camera& second,
         errors.push_back(focal * std::abs(glm::dot(*b, line)) / std::max(slope, 1e-12));
     }
     const double side = std::max(std::max(first.width, first.height), std::max(second.width, second.height));
-    return errors.size() >= kManyMatches && median(errors) > kFarMatch * side;
+    return errors.size() >= kManyMatches && scene::quantile(errors, 0.5) > kFarMatch * side;
 }
 
 std::vector<Contradiction> contradictions_in(const SparseModel& model, const FeatureDatabase& database) {

@@ -15,16 +15,16 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int32_t kSimpleRadial = 2, kRadial = 3, kOpenCv = 4;  // COLMAP's numbers
-constexpr int kPhotosOfALens = 10;  // that determine four terms of distortion; or all photos
-constexpr uint32_t kEach = 10;      // of the observations one is held out
-constexpr size_t kLeastTrack = 3;   // observations that a point keeps
-constexpr double kMostError = 16;   // px; a mismatch says nothing of a lens
+constexpr int kPhotosOfALens = 10;   // that determine four terms of distortion; or all photos
+constexpr uint32_t kHeldOutOf = 10;  // of the observations one is held out
+constexpr size_t kLeastTrack = 3;    // observations that a point keeps
+constexpr double kMostError = 16;    // px; a mismatch says nothing of a lens
 constexpr size_t kLeastHeldOut = 50;
 constexpr double kChance = 2;  // standard errors
 
 /// Whether this observation is held out.
 bool is_held_out(uint32_t image, uint32_t feature) {
-    return core::pcg4d({image, feature, 0, 0})[0] % kEach == 0;
+    return core::pcg4d({image, feature, 0, 0})[0] % kHeldOutOf == 0;
 }
 
 /// Moves cameras, points and lenses of a model to the least errors.

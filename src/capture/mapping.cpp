@@ -34,7 +34,7 @@ constexpr std::array kMapping{"--Mapper.min_model_size",
                               "15"};
 constexpr size_t kTriedAnyway = 2;  // ways that count on no time
 constexpr int kFollowing = 10;      // photos, in the order of names, that are neighbours
-constexpr int kLeastShared = 3;     // photos of two models that are joined
+constexpr int kLeastJoining = 3;    // photos of two models that are joined
 
 const std::vector<std::string> kLensOfExif{"--Mapper.ba_refine_focal_length", "0",
                                            "--Mapper.ba_refine_extra_params", "0"};
@@ -218,7 +218,7 @@ void Mapping::join(Placing& placing) const {
         const std::set<std::string> others = names_of(placing.models[i].folder);
         const auto shared =
             std::ranges::count_if(others, [&](const std::string& name) { return names.contains(name); });
-        if (shared < kLeastShared || size_t(shared) == others.size()) continue;
+        if (shared < kLeastJoining || size_t(shared) == others.size()) continue;
         const fs::path joined = work_ / "joined", filtered = work_ / "joined_points";
         for (const fs::path& folder : {joined, filtered}) {
             fs::remove_all(folder);
