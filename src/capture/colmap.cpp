@@ -415,6 +415,7 @@ std::vector<std::string> place_photos(const Photos& given, const fs::path& work,
     const bool checked = !views && database.is_known();
     if (checked) part_lookalikes(mapping, placing, database, work);
     mapping.join(placing);
+    mapping.extend(placing);
     const std::vector<MappedModel>& models = placing.models;
     std::vector<std::string> remarks;
     if (models.size() > 1 && models.front().images < photos.names.size())

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <set>
 
+#include "capture/doubts.h"
 #include "capture/feature_database.h"
 #include "core/file_reader.h"
 #include "core/folders.h"
@@ -35,6 +36,8 @@ constexpr std::array kMapping{"--Mapper.min_model_size",
 constexpr size_t kTriedAnyway = 2;  // ways that count on no time
 constexpr int kFollowing = 10;      // photos, in the order of names, that are neighbours
 constexpr int kLeastJoining = 3;    // photos of two models that are joined
+// Of a photo with points, which the last photos need. COLMAP needs 30 of the others: with fewer, a wrong photo misplaces those after it.
+constexpr const char* kFewMatches = "20";
 
 const std::vector<std::string> kLensOfExif{"--Mapper.ba_refine_focal_length", "0",
                                            "--Mapper.ba_refine_extra_params", "0"};
@@ -64,14 +67,13 @@ std::vector<MappedModel> models_in(const fs::path& folder) {
 }
 
 std::vector<Way> other_ways(const WayFacts& facts) {
-    std::vector<Way> ways;
-    if (facts.exif) ways.push_back({.name = "with the lens by EXIF", .words = kLensOfExif});
-    if (facts.shared && !facts.exif)
-        ways.push_back({.name = "with a lens for each photo", .own_lenses = true});
-    ways.push_back({.name = "with forward motion", .words = kForward});
-    if (facts.shared && facts.exif)
-        ways.push_back({.name = "with a lens for each photo", .own_lenses = true});
-    return ways;
+    const Way exif{.name = "with the lens by EXIF", .words = kLensOfExif},
+        own{.name = "with a lens for each photo", .own_lenses = true},
+        forward{.name = "with forward motion", .words = kForward};
+    if (facts.exif && facts.shared) return {exif, with(exif, forward), forward, own};
+    if (facts.exif) return {exif, with(exif, forward), forward};
+    if (facts.shared) return {own, forward, with(own, forward)};
+    return {forward};
 }
 
 Way with(const Way& way, const Way& more) {
@@ -83,10 +85,9 @@ Way with(const Way& way, const Way& more) {
     return both;
 }
 
-bool has(const Way& way, const Way& more) {
-    return (!more.own_lenses || way.own_lenses) && (!more.neighbours || way.neighbours) &&
-           std::ranges::includes(std::set(way.words.begin(), way.words.end()),
-                                 std::set(more.words.begin(), more.words.end()));
+bool is_same(const Way& first, const Way& second) {
+    return first.words == second.words && first.own_lenses == second.own_lenses &&
+           first.neighbours == second.neighbours;
 }
 
 Mapping::Mapping(const Colmap& colmap, const Photos& photos, const PanoramaViews* views, fs::path work)
@@ -125,11 +126,8 @@ Placing Mapping::placed_in(const Way& way, const fs::path& folder) const {
     return placing;
 }
 
-Placing Mapping::place(const Way& way, const fs::path& folder) const {
-    const auto start = std::chrono::steady_clock::now();
-    fs::remove_all(folder);
-    core::make_folder(folder);
-    const bool glomap = way.words.empty() && !core::find_program("glomap").empty();
+void Mapping::map(const Way& way, const fs::path& folder, const std::vector<std::string>& more) const {
+    const bool glomap = way.words.empty() && more.empty() && !core::find_program("glomap").empty();
     std::vector<std::string> words{glomap ? "glomap" : "colmap",
                                    "mapper",
                                    "--database_path",
@@ -146,16 +144,24 @@ Placing Mapping::place(const Way& way, const fs::path& folder) const {
             words.insert(words.end(), {"--Mapper.num_threads", "1"});
         if (views_) words.insert(words.end(), kLensOfExif.begin(), kLensOfExif.end());
         words.insert(words.end(), way.words.begin(), way.words.end());
+        words.insert(words.end(), more.begin(), more.end());
     }
     static const std::regex pattern(R"(Registering image #\d+ \((\d+)\)|num_reg_frames=(\d+))");
+    colmap_.run(
+        std::move(words),
+        {CapturePhase::cameras, "placed", views_ ? "views" : "photos", 0, int(photos_.names.size()), {}},
+        [](const std::string& line) -> std::optional<int> {
+            const auto numbers = numbers_in(line, pattern);
+            return numbers ? std::optional(std::max(numbers->first, numbers->second)) : std::nullopt;
+        });
+}
+
+Placing Mapping::place(const Way& way, const fs::path& folder) const {
+    const auto start = std::chrono::steady_clock::now();
+    fs::remove_all(folder);
+    core::make_folder(folder);
     try {
-        colmap_.run(
-            std::move(words),
-            {CapturePhase::cameras, "placed", views_ ? "views" : "photos", 0, int(photos_.names.size()), {}},
-            [](const std::string& line) -> std::optional<int> {
-                const auto numbers = numbers_in(line, pattern);
-                return numbers ? std::optional(std::max(numbers->first, numbers->second)) : std::nullopt;
-            });
+        map(way, folder, {});
     } catch (const RunError&) {
         // COLMAP's mapper takes it for a failure that it finds no first pair.
         if (!core::is_folder(folder) || !models_in(folder).empty()) throw;
@@ -192,12 +198,14 @@ Placing Mapping::place_enough(const Way& first, double seconds) const {
     const double most = seconds + best.seconds;
     double taken = 0;
     size_t tries = 0;
-    for (const Way& way : other_ways(facts_)) {
-        if (has(best.way, way)) continue;
+    std::vector<Way> ways = other_ways(facts_);
+    if (!is_same(first, {})) ways.insert(ways.begin(), Way{});
+    for (const Way& way : ways) {
+        if (is_same(first, way)) continue;
         if (tries++ >= kTriedAnyway && taken >= most) break;
         const fs::path folder = work_ / "models_tried";
         try {
-            Placing tried = place(with(best.way, way), folder);
+            Placing tried = place(way, folder);
             taken += tried.seconds;
             say(tried);
             if (is_better(tried.grade, best.grade)) keep(best, tried, folder);
@@ -248,6 +256,36 @@ void Mapping::join(Placing& placing) const {
             continue;
         }
     }
+}
+
+void Mapping::extend(Placing& placing) const {
+    if (views_ || placing.models.empty() || size_t(placing.grade.placed) >= photos_.names.size()) return;
+    const auto start = std::chrono::steady_clock::now();
+    const fs::path extended = work_ / "extended", &largest = placing.models.front().folder;
+    fs::remove_all(extended);
+    core::make_folder(extended);
+    try {
+        map(placing.way, extended,
+            {"--input_path", argument(largest), "--Mapper.abs_pose_min_num_inliers", kFewMatches});
+    } catch (const RunError&) {
+        return;  // the model is one without them
+    }
+    if (!core::is_file(extended / "images.bin")) return;
+    Placing more{.way = {.name = "with fewer matches"}, .grade = grade_of(read_sparse(extended), expected_)};
+    more.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    say(more);
+    if (more.grade.sound <= placing.grade.sound || contradicts_more(extended, largest)) return;
+    fs::remove_all(largest);
+    fs::rename(extended, largest);
+    placing.grade = more.grade;
+    placing.models.front().images = uint64_t(more.grade.placed);
+}
+
+bool Mapping::contradicts_more(const fs::path& model, const fs::path& before) const {
+    const FeatureDatabase database(work_ / "database.db");
+    if (!database.is_known()) return false;
+    return contradictions_in(read_sparse(model), database).size() >
+           contradictions_in(read_sparse(before), database).size();
 }
 
 }  // namespace ewa::capture

@@ -40,12 +40,12 @@ struct WayFacts {
     bool shared = false;  // photos share a lens, and may have their own
 };
 
-/// What may be added to the first way, in the order in which it is tried: first what costs least and places most.
+/// The ways after the first one, in the order in which they are tried: first what costs least and places most.
 std::vector<Way> other_ways(const WayFacts& facts);
 /// The way with what `more` adds.
 Way with(const Way& way, const Way& more);
-/// Whether the way has that already.
-bool has(const Way& way, const Way& more);
+/// Whether two ways are one, whatever their names.
+bool is_same(const Way& first, const Way& second);
 
 /// What a way has given.
 struct Placing {
@@ -64,11 +64,13 @@ class Mapping {
 
     /// By one way. The models are in `folder`. None where the mapper finds no pair of images to begin with.
     Placing place(const Way& way, const std::filesystem::path& folder) const;
-    /// By this way, then with what others add until enough photos are placed. The models are in work/models. seconds: what the search
+    /// By this way, then by the others until enough photos are placed. The models are in work/models. seconds: what the search
     /// has taken before; all ways together take about as long.
     Placing place_enough(const Way& first, double seconds) const;
     /// Joins the largest model with others that share photos, where that is sound.
     void join(Placing& placing) const;
+    /// Adds photos with fewer matches to the largest model, where no more matches contradict their cameras.
+    void extend(Placing& placing) const;
     /// What there is in a folder.
     Placing placed_in(const Way& way, const std::filesystem::path& folder) const;
 
@@ -78,6 +80,10 @@ class Mapping {
 
   private:
     std::filesystem::path database_for(const Way& way) const;
+    /// Runs the mapper with these words, too.
+    void map(const Way& way, const std::filesystem::path& folder, const std::vector<std::string>& more) const;
+    /// Whether more matches contradict the cameras of the model than those of another.
+    bool contradicts_more(const std::filesystem::path& model, const std::filesystem::path& before) const;
     void keep(Placing& best, Placing& tried, const std::filesystem::path& folder) const;
 
     const Colmap& colmap_;

@@ -72,16 +72,17 @@ TEST_F(Cameras, ComeFromComparingWhatLooksAlike) {
     fs::remove(folder_ / "calls");
     make_model("0", {"0.png", "1.png", "2.png"});
     ASSERT_EQ(cameras(features).status, 0);
-    // Three of four are so few that another way is tried, too.
-    EXPECT_EQ(calls(),
-              "feature_extractor\nmatches_importer\nmapper\nmapper\nmatches_importer\nmapper\nmapper\n");
+    // Three of four are so few that another way is tried, too. At last the fourth may come with fewer matches.
+    EXPECT_EQ(
+        calls(),
+        "feature_extractor\nmatches_importer\nmapper\nmapper\nmatches_importer\nmapper\nmapper\nmapper\n");
     EXPECT_TRUE(first_and_last());
 
     // A search that failed at the end continues there.
     fs::remove_all(folder_ / "dataset/sparse");
     fs::remove(folder_ / "calls");
     ASSERT_EQ(cameras(features).status, 0);
-    EXPECT_EQ(calls(), "mapper\nmapper\n");
+    EXPECT_EQ(calls(), "mapper\nmapper\nmapper\n");
 }
 
 /// A mapper that places more photos where the first pair may be apart by forward motion.
@@ -104,6 +105,25 @@ esac
         << outcome.out;
     EXPECT_NE(outcome.out.find("4 of 4 photos have cameras"), std::string::npos) << outcome.out;
     EXPECT_EQ(calls(), "feature_extractor\nmatches_importer\nmapper\nmapper\n");
+}
+
+/// A mapper that adds a photo to its model where that may have fewer matches.
+TEST_F(Cameras, OfPhotosWithFewMatchesComeLast) {
+    make_model("few/0", {"0.png", "1.png", "2.png"});
+    make_model("more/0", {"0.png", "1.png", "2.png", "3.png"});
+    make_program(folder_ / "bin/colmap", R"sh(
+case "$*" in *--help*) exit 0;; esac
+case "$*" in *--input_path*abs_pose_min_num_inliers*) models=more/0;; *) models=few;; esac
+case $1 in
+feature_extractor) touch "$3";;
+mapper) for word; do if [ "$previous" = --output_path ]; then cp -r "$MODELS/$models/." "$word"; fi; previous=$word; done;;
+esac
+)sh");
+    const Outcome outcome = cameras();
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find("placed 4 of 4 photos with fewer matches in "), std::string::npos)
+        << outcome.out;
+    EXPECT_NE(outcome.out.find("4 of 4 photos have cameras"), std::string::npos) << outcome.out;
 }
 
 /// A model of a lens that no camera has is said to be wrong.
