@@ -3,6 +3,7 @@
 #pragma once
 #include <array>
 #include <filesystem>
+#include <glm/glm.hpp>
 #include <map>
 #include <optional>
 #include <string>
@@ -54,12 +55,28 @@ void check(const std::vector<Appearance>& appearances);
 /// than 3 channels.
 Image with_appearance(Image image, const Appearance& appearance);
 
-/// The mean over images, value by value. Throws InputError unless there is one or more, all of one model.
-Appearance mean_appearance(const std::vector<Appearance>& appearances);
+/// What views show that training has not seen. Neighbouring photos of a camera that exposes by itself have similar appearances, so
+/// a new view's is between those of the photos near it: a mean with weights of 1 / distance^4 (Shepard 1968). Where that would
+/// predict the brightness of the training images worse, each from the others, it is the mean over all images, or with Exposure the splats' own colours.
+class NewViewAppearance {
+  public:
+    /// There is none.
+    NewViewAppearance() = default;
+    /// centers: of the images' cameras, in world coordinates; empty: unknown. Throws InputError for appearances of several models,
+    /// for another number of centres, and for centres that are not finite.
+    explicit NewViewAppearance(std::vector<Appearance> of_images, std::vector<glm::dvec3> centers = {});
 
-/// What an image shows that training has not seen: the mean of those that it has seen, or the splats' own colours with
-/// Exposure. Empty without appearances.
-std::optional<Appearance> new_view_appearance(const std::vector<Appearance>& appearances);
+    /// The appearance of a view from this place in world coordinates. Empty without appearances.
+    std::optional<Appearance> at(const glm::dvec3& center) const;
+
+    /// Whether it differs from place to place.
+    bool is_local() const { return !centers_.empty(); }
+
+  private:
+    std::vector<Appearance> of_images_;
+    std::vector<glm::dvec3> centers_;  // empty: one appearance for all places
+    std::optional<Appearance> of_all_;
+};
 
 /// The appearances of training images under their Frame::name: appearance.json or exposures.json of a run's folder. Throws
 /// InputError if the file cannot be read, or values are missing or not finite.

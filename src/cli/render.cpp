@@ -325,8 +325,8 @@ int render_free_views(RenderArguments arguments) {
     const Dataset* const known = dataset ? &*dataset : nullptr;
     std::vector<fs::path> files{arguments.output};
     if (output != ViewsOutput::folder) check_renders(arguments, files, known);
-    const std::optional<Appearance> appearance =
-        appearance_of_new_views(arguments.appearance, arguments.run_is_folder ? arguments.run : std::nullopt);
+    const NewViewAppearance appearance = appearance_of_new_views(
+        arguments.appearance, arguments.run_is_folder ? arguments.run : std::nullopt, known);
     const Gaussians gaussians = load_scene(arguments, options);
     if (dataset && !dataset->frames.empty()) {
         glm::dvec3 sum(0);
@@ -347,8 +347,9 @@ int render_free_views(RenderArguments arguments) {
     const InterruptWatch watch;
     Progress progress("rendered", int(views.cameras.size()), "views", arguments.quiet);
     const DrawnScene scene{gaussians, options};
-    const std::vector<Appearance> appearances(appearance ? views.cameras.size() : 0,
-                                              appearance.value_or(Appearance()));
+    std::vector<Appearance> appearances;
+    for (const Camera& camera : views.cameras)
+        if (auto of_view = appearance.at(camera.position())) appearances.push_back(std::move(*of_view));
     if (film) return write_film(arguments, scene, renderer, views, appearances, encoder, progress);
     return write_images(arguments, scene, renderer, views, files, appearances, progress);
 }

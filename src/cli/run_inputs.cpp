@@ -88,11 +88,22 @@ namespace {
 struct KnownAppearances {
     fs::path file;
     std::map<std::string, Appearance> images = {};
-    std::optional<Appearance> others = {};  // of images that are not there, or of all
+    NewViewAppearance others = {};  // of images that are not there, or of all
 };
 
-KnownAppearances known_appearances(const AppearanceArguments& arguments,
-                                   const std::optional<live::Run>& run) {
+/// The centres of the images' cameras; empty unless the dataset has all of them.
+std::vector<glm::dvec3> centers_of(const std::vector<std::string>& names, const Dataset& dataset) {
+    std::map<std::string_view, glm::dvec3> known;
+    for (const Frame& frame : dataset.frames) known.emplace(frame.name, frame.camera.position());
+    std::vector<glm::dvec3> centers;
+    for (const std::string& name : names)
+        if (const auto found = known.find(name); found != known.end()) centers.push_back(found->second);
+    if (centers.size() != names.size()) centers.clear();
+    return centers;
+}
+
+KnownAppearances known_appearances(const AppearanceArguments& arguments, const std::optional<live::Run>& run,
+                                   const Dataset* dataset) {
     KnownAppearances known{
         appearance_file(arguments.file, run || arguments.of.empty() ? run : arguments.run)};
     if (known.file.empty() && !arguments.of.empty())
@@ -105,13 +116,16 @@ KnownAppearances known_appearances(const AppearanceArguments& arguments,
         all.push_back(appearance);
         names.push_back(name);
     }
-    known.others = new_view_appearance(all);
-    if (arguments.of.empty()) return known;
+    if (arguments.of.empty()) {
+        known.others = NewViewAppearance(std::move(all),
+                                         dataset ? centers_of(names, *dataset) : std::vector<glm::dvec3>());
+        return known;
+    }
     const int named = scene::index_of_name(names, arguments.of);
     if (named < 0)
         throw InputError("--appearance-of " + core::one_line(arguments.of) + ": no image of " +
                          core::one_line(known.file.string()) + core::did_you_mean(arguments.of, names));
-    known.others = all[size_t(named)];
+    known.others = NewViewAppearance({all[size_t(named)]});
     return known;
 }
 
@@ -120,25 +134,27 @@ KnownAppearances known_appearances(const AppearanceArguments& arguments,
 std::vector<Appearance> appearances_of(const AppearanceArguments& arguments,
                                        const std::optional<live::Run>& run, const Dataset& dataset,
                                        const std::vector<int>& frames) {
-    const KnownAppearances known = known_appearances(arguments, run);
+    const KnownAppearances known = known_appearances(arguments, run, &dataset);
     const auto has_appearance = [&](const Frame& frame) { return known.images.contains(frame.name); };
     if (!known.file.empty() && arguments.file != "auto" && arguments.of.empty() &&
         std::ranges::none_of(dataset.frames, has_appearance))
         throw InputError(core::one_line(known.file.string()) + ": has no exposure of an image of " +
                          core::one_line(dataset.root.string()) + "; --exposures none uses none");
-    if (!known.others) return {};
     std::vector<Appearance> appearances;
     for (const int index : frames) {
-        const auto found = known.images.find(dataset.frames[size_t(index)].name);
-        appearances.push_back(found == known.images.end() || !arguments.of.empty() ? *known.others
-                                                                                   : found->second);
+        const Frame& frame = dataset.frames[size_t(index)];
+        const auto found = known.images.find(frame.name);
+        if (found != known.images.end() && arguments.of.empty())
+            appearances.push_back(found->second);
+        else if (auto of_new_view = known.others.at(frame.camera.position()))
+            appearances.push_back(std::move(*of_new_view));
     }
     return appearances;
 }
 
-std::optional<Appearance> appearance_of_new_views(const AppearanceArguments& arguments,
-                                                  const std::optional<live::Run>& run) {
-    return known_appearances(arguments, run).others;
+NewViewAppearance appearance_of_new_views(const AppearanceArguments& arguments,
+                                          const std::optional<live::Run>& run, const Dataset* dataset) {
+    return known_appearances(arguments, run, dataset).others;
 }
 
 std::optional<live::Run> resolve_views(CLI::App& app, ViewArguments& arguments) {

@@ -31,7 +31,7 @@ Dataset cameras_of_run(const live::Run& run);
 /// Which appearance images get.
 struct AppearanceArguments {
     std::string file = "auto";  // or "none", or "auto": the file beside the splats of a run, if it is there
-    std::string of;  // the training image whose appearance all others get; empty: see new_view_appearance
+    std::string of;  // the training image whose appearance all others get; empty: see NewViewAppearance
     std::optional<live::Run> run = {};  // of the splats, where `of` is searched; empty: none
 };
 
@@ -46,9 +46,9 @@ std::vector<Appearance> appearances_of(const AppearanceArguments& arguments,
                                        const std::optional<live::Run>& run, const Dataset& dataset,
                                        const std::vector<int>& frames);
 
-/// The appearance of views that no image has. run: as above. Empty: none. Throws InputError.
-std::optional<Appearance> appearance_of_new_views(const AppearanceArguments& arguments,
-                                                  const std::optional<live::Run>& run);
+/// The appearance of views that no image has. run: as above. dataset: with the run's cameras; null: unknown. Throws InputError.
+NewViewAppearance appearance_of_new_views(const AppearanceArguments& arguments,
+                                          const std::optional<live::Run>& run, const Dataset* dataset);
 
 /// Replaces a run's folder among SPLATS and DATASET. Without DATASET, it is that of the run, also of a run that SPLATS
 /// is a file of. The run's options are used as in use_options_of, unless both arguments are files. Throws InputError,

@@ -9,6 +9,9 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <limits>
+#include <numeric>
+#include <span>
 #include <utility>
 
 #include "core/text.h"
@@ -143,14 +146,82 @@ Image with_grid(Image image, const ColorGrid& grid) {
     return image;
 }
 
-/// The mean of values(appearance), which are as many of each.
+/// The mean of values(appearance), which are as many of each. weights: of each; their sum is 1.
 template <class Model, class Values>
-void average(const std::vector<Appearance>& all, Model& mean, const Values& values) {
+void average(const std::vector<Appearance>& all, const std::vector<double>& weights, Model& mean,
+             const Values& values) {
     for (size_t k = 0; k < values(mean).size(); ++k) {
         double sum = 0;
-        for (const Appearance& each : all) sum += double(values(std::get<Model>(each))[k]);
-        values(mean)[k] = float(sum / double(all.size()));
+        for (size_t i = 0; i < all.size(); ++i)
+            sum += weights[i] * double(values(std::get<Model>(all[i]))[k]);
+        values(mean)[k] = float(sum);
     }
+}
+
+Appearance weighted_mean(const std::vector<Appearance>& all, const std::vector<double>& weights) {
+    Appearance mean = all.front();
+    if (auto* exposure = std::get_if<Exposure>(&mean))
+        average(
+            all, weights, *exposure, [](auto& e) -> auto& { return e; });
+    if (auto* ppisp = std::get_if<Ppisp>(&mean)) {
+        average(
+            all, weights, *ppisp, [](auto& p) -> auto& { return p.photo; });
+        average(
+            all, weights, *ppisp, [](auto& p) -> auto& { return p.camera; });
+    }
+    if (auto* grid = std::get_if<ColorGrid>(&mean))
+        average(
+            all, weights, *grid, [](auto& g) -> auto& { return g.cells; });
+    return mean;
+}
+
+/// How bright an image is beside others. Colour offsets differ from image to image as well, but by little.
+double brightness_of(const Appearance& appearance) {
+    if (const auto* ppisp = std::get_if<Ppisp>(&appearance)) return double(ppisp->photo[0]);
+    // Affine maps of a row a channel: what they make of a middle grey.
+    const auto* grid = std::get_if<ColorGrid>(&appearance);
+    const std::span<const float> maps =
+        grid ? std::span<const float>(grid->cells) : std::span<const float>(std::get<Exposure>(appearance));
+    constexpr double kGrey = 0.5;
+    double sum = 0;
+    for (size_t k = 0; k < maps.size(); ++k) sum += double(maps[k]) * (k % 4 == 3 ? 1 : kGrey);
+    return sum / double(maps.size());
+}
+
+/// Shepard's, with a sum of 1. skipped: an image that has none; the number of images skips none.
+std::vector<double> weights_at(const std::vector<glm::dvec3>& centers, const glm::dvec3& center,
+                               size_t skipped) {
+    std::vector<double> weights(centers.size(), 0);
+    double nearest = std::numeric_limits<double>::infinity(), sum = 0;
+    for (size_t i = 0; i < centers.size(); ++i)
+        if (i != skipped) nearest = std::min(nearest, glm::distance(centers[i], center));
+    for (size_t i = 0; i < centers.size(); ++i) {
+        if (i == skipped) continue;
+        const double distance = glm::distance(centers[i], center);
+        const double ratio = distance > nearest ? nearest / distance : 1;
+        sum += weights[i] = ratio * ratio * ratio * ratio;
+    }
+    for (double& weight : weights) weight /= sum;
+    return weights;
+}
+
+/// Whether the brightness of an image is predicted better by its neighbours than by what all new views would have. of_all: empty
+/// for the mean of the others.
+bool neighbours_predict(const std::vector<Appearance>& images, const std::vector<glm::dvec3>& centers,
+                        const std::optional<Appearance>& of_all) {
+    if (images.size() < 3) return false;
+    std::vector<double> values;
+    for (const Appearance& image : images) values.push_back(brightness_of(image));
+    const double sum = std::accumulate(values.begin(), values.end(), 0.0);
+    double by_neighbours = 0, by_all = 0;
+    for (size_t i = 0; i < images.size(); ++i) {
+        const std::vector<double> weights = weights_at(centers, centers[i], i);
+        const double near = std::inner_product(weights.begin(), weights.end(), values.begin(), 0.0);
+        const double all = of_all ? brightness_of(*of_all) : (sum - values[i]) / double(images.size() - 1);
+        by_neighbours += (near - values[i]) * (near - values[i]);
+        by_all += (all - values[i]) * (all - values[i]);
+    }
+    return by_neighbours < by_all;
 }
 
 void check_colors(const Image& image) {
@@ -215,29 +286,27 @@ void check(const std::vector<Appearance>& appearances) {
     }
 }
 
-Appearance mean_appearance(const std::vector<Appearance>& appearances) {
-    check(appearances);
-    if (appearances.empty()) throw InputError("there is no appearance to take the mean of");
-    Appearance mean = appearances.front();
-    if (auto* exposure = std::get_if<Exposure>(&mean))
-        average(
-            appearances, *exposure, [](auto& e) -> auto& { return e; });
-    if (auto* ppisp = std::get_if<Ppisp>(&mean)) {
-        average(
-            appearances, *ppisp, [](auto& p) -> auto& { return p.photo; });
-        average(
-            appearances, *ppisp, [](auto& p) -> auto& { return p.camera; });
-    }
-    if (auto* grid = std::get_if<ColorGrid>(&mean))
-        average(
-            appearances, *grid, [](auto& g) -> auto& { return g.cells; });
-    return mean;
+NewViewAppearance::NewViewAppearance(std::vector<Appearance> of_images, std::vector<glm::dvec3> centers)
+    : of_images_(std::move(of_images)) {
+    check(of_images_);
+    if (!centers.empty() && centers.size() != of_images_.size())
+        throw InputError(core::counted(centers.size(), "centre") + " for " +
+                         core::counted(of_images_.size(), "appearance"));
+    for (const glm::dvec3& center : centers)
+        if (!std::isfinite(center.x + center.y + center.z))
+            throw InputError("the centre of a camera is not finite");
+    if (of_images_.empty()) return;
+    std::optional<Appearance> own_colors;
+    if (std::holds_alternative<Exposure>(of_images_.front())) own_colors = kIdentityExposure;
+    const size_t n = of_images_.size();
+    of_all_ = own_colors ? *own_colors : weighted_mean(of_images_, std::vector<double>(n, 1 / double(n)));
+    if (!centers.empty() && neighbours_predict(of_images_, centers, own_colors))
+        centers_ = std::move(centers);
 }
 
-std::optional<Appearance> new_view_appearance(const std::vector<Appearance>& appearances) {
-    if (appearances.empty()) return std::nullopt;
-    if (std::holds_alternative<Exposure>(appearances.front())) return kIdentityExposure;
-    return mean_appearance(appearances);
+std::optional<Appearance> NewViewAppearance::at(const glm::dvec3& center) const {
+    if (centers_.empty()) return of_all_;
+    return weighted_mean(of_images_, weights_at(centers_, center, centers_.size()));
 }
 
 }  // namespace ewa

@@ -94,10 +94,21 @@ RenderedView view_of_protocol(Protocol protocol, Image rendering, const Frame& f
 
 }  // namespace
 
-std::vector<Appearance> for_new_views(const std::vector<Appearance>& learned, size_t count) {
-    // Exposures leave new views as they are.
-    if (learned.empty() || std::holds_alternative<Exposure>(learned.front())) return {};
-    return std::vector<Appearance>(count, mean_appearance(learned));
+NewViewAppearance new_view_appearance(const std::vector<Appearance>& learned, const Dataset& dataset,
+                                      const std::vector<int>& train) {
+    std::vector<glm::dvec3> centers;
+    if (!learned.empty())
+        for (const int frame : train) centers.push_back(dataset.frames[size_t(frame)].camera.position());
+    return NewViewAppearance(learned, std::move(centers));
+}
+
+std::vector<Appearance> for_new_views(const NewViewAppearance& appearance, const Dataset& dataset,
+                                      const std::vector<int>& frames) {
+    std::vector<Appearance> found;
+    for (const int frame : frames)
+        if (auto of_view = appearance.at(dataset.frames[size_t(frame)].camera.position()))
+            found.push_back(std::move(*of_view));
+    return found;
 }
 
 Measures measures_of(const RunOptions& options) {

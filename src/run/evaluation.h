@@ -33,8 +33,12 @@ struct RenderedView {
 RenderedView with_photo(Image rendering, const Frame& frame, const RenderOptions& options,
                         const Appearance* appearance);
 
-/// For evaluate_views: the same appearance for `count` views that training has not seen.
-std::vector<Appearance> for_new_views(const std::vector<Appearance>& learned, size_t count);
+/// The appearances of views that training has not seen. learned: of the frames `train` of the dataset.
+NewViewAppearance new_view_appearance(const std::vector<Appearance>& learned, const Dataset& dataset,
+                                      const std::vector<int>& train);
+/// For evaluate_views: those of frames that training has not seen.
+std::vector<Appearance> for_new_views(const NewViewAppearance& appearance, const Dataset& dataset,
+                                      const std::vector<int>& frames);
 
 /// What the options of a run measure. Throws InputError (weights that cannot be read).
 Measures measures_of(const RunOptions& options);

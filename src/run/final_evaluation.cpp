@@ -92,8 +92,9 @@ bool FinalEvaluation::evaluate(RunCameras& cameras, const RunFolder& folder) {
 }
 
 void FinalEvaluation::evaluate_test_views() {
-    of_test_views_ = evaluated(input_.split.test, for_new_views(scene_.appearances, input_.split.test.size()),
-                               true, measures_);
+    of_test_views_ =
+        evaluated(input_.split.test, for_new_views(new_view_appearance(), input_.dataset, input_.split.test),
+                  true, measures_);
     report_.summary.test_figures = of_test_views_->figures;
     if (of_test_views_->frames.empty()) return;  // no pixel counts
     report_.summary.test_psnr = of_test_views_->psnr;
@@ -152,12 +153,16 @@ bool FinalEvaluation::add_full_size() {
     });
 }
 
+NewViewAppearance FinalEvaluation::new_view_appearance() const {
+    return train::new_view_appearance(scene_.appearances, input_.dataset, input_.split.train);
+}
+
 RenderedView FinalEvaluation::drawn_again(int index) const {
     const std::vector<int>& train = input_.split.train;
     const auto place = std::find(train.begin(), train.end(), index);
     const bool known = !scene_.appearances.empty() && place != train.end();
-    const auto of_new_view = new_view_appearance(scene_.appearances);
     const Frame& frame = input_.dataset.frames[size_t(index)];
+    const auto of_new_view = new_view_appearance().at(frame.camera.position());
     return with_photo(std::move(scene_.renderer.images(std::span(&frame.camera, 1)).front()), frame,
                       input_.options.train.render,
                       known         ? &scene_.appearances[size_t(place - train.begin())]

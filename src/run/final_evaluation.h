@@ -69,6 +69,7 @@ class FinalEvaluation {
                          bool shown, const Measures& measures);
     void add_view(int index, const RenderedView& view, const EvalFrame& figures);
     void keep(int index, const RenderedView& view);
+    NewViewAppearance new_view_appearance() const;
     RenderedView drawn_again(int index) const;
     size_t add_full_size(report::ReportView& view) const;
 

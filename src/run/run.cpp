@@ -303,9 +303,11 @@ Evaluation Run::evaluate(Trainer& trainer) {
         cameras_.use_refined(trainer);
         cameras_.align_test(device_, gaussians, {});
     }
+    const NewViewAppearance appearance =
+        train::new_view_appearance(trainer.appearances(), input_.dataset, input_.split.train);
     Evaluation evaluation = train::evaluate_views(
         view_renderer(gaussians, trainer.sky(), &trainer), input_.dataset, input_.split.test,
-        options().train.render, train::for_new_views(trainer.appearances(), input_.split.test.size()),
+        options().train.render, train::for_new_views(appearance, input_.dataset, input_.split.test),
         [&] { trainer.keep_waiting(); }, [](size_t, const train::RenderedView&, const EvalFrame&) {},
         measures_);
     cameras_.use_given();

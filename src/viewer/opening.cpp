@@ -81,8 +81,13 @@ void add_appearances(OpenedScene& scene, const live::Run& run) {
             return;  // only the PSNR of images depends on them
         }
         std::vector<Appearance> all;
-        for (const auto& [image, appearance] : scene.appearances) all.push_back(appearance);
-        scene.of_new_views = new_view_appearance(all).value_or(kIdentityExposure);
+        std::vector<glm::dvec3> centers;
+        for (const Frame& frame : scene.dataset->frames)
+            if (const auto own = scene.appearances.find(frame.name); own != scene.appearances.end()) {
+                all.push_back(own->second);
+                centers.push_back(frame.camera.position());
+            }
+        scene.of_new_views = NewViewAppearance(std::move(all), std::move(centers));
         return;
     }
 }
@@ -96,7 +101,7 @@ void add_cameras(OpenedScene& scene, const live::Run& run, const fs::path& camer
                                          cameras.empty() ? run.refined_cameras() : fs::path());
         else
             scene.remark = "the dataset of this run was not found; name it with --cameras DATASET";
-        if (cameras.empty()) add_appearances(scene, run);
+        if (cameras.empty() && scene.dataset) add_appearances(scene, run);
     } catch (const InputError& problem) {
         if (!cameras.empty()) throw;
         scene.remark = problem.what();

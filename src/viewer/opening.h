@@ -35,7 +35,7 @@ struct OpenedScene {
     std::filesystem::file_time_type splats_time = std::filesystem::file_time_type::min();
     std::map<std::string, Appearance>
         appearances;  // of the dataset's frames, by name, as the run learned them
-    Appearance of_new_views = kIdentityExposure;
+    NewViewAppearance of_new_views;
     Look look;           // as the file or the run asks for
     std::string remark;  // one line: what is missing
 

@@ -169,7 +169,9 @@ void Shown::measure_view() {
     const Frame& frame = navigation_.frame();
     const auto own = state_.scene.appearances.find(frame.name);
     quality_.measure(renders, *navigation_.at_camera, frame, state_.settings.look,
-                     own == state_.scene.appearances.end() ? state_.scene.of_new_views : own->second);
+                     own == state_.scene.appearances.end()
+                         ? state_.scene.of_new_views.at(frame.camera.position()).value_or(kIdentityExposure)
+                         : own->second);
 }
 
 /// The full frame can be compared if it shows colours from the camera of the image.

@@ -190,9 +190,14 @@ TEST(Lengths, OfSkiesAndAppearancesAreChecked) {
     const ColorGrid few{std::vector<float>(5)};
     const auto path = folder / "appearance.json";
     expect_refused([&] { with_appearance(Image(8, 6, 3), few); }, "cells has 5 values");
-    expect_refused([&] { mean_appearance({few}); }, "cells has 5 values");
-    expect_refused([&] { mean_appearance({}); }, "no appearance");
-    expect_refused([&] { mean_appearance({Ppisp{}, ColorGrid{}}); }, "several models");
+    expect_refused([&] { NewViewAppearance({few}); }, "cells has 5 values");
+    expect_refused([&] { NewViewAppearance({Ppisp{}, ColorGrid{}}); }, "several models");
+    expect_refused(
+        [&] {
+            NewViewAppearance({Ppisp{}, Ppisp{}}, {glm::dvec3(0)});
+        },
+        "1 centre for 2 appearances");
+    expect_refused([&] { NewViewAppearance({Ppisp{}}, {glm::dvec3(0, std::nan(""), 0)}); }, "not finite");
     expect_refused([&] { save_appearances(path, {"a"}, {few}); }, "cells has 5 values");
     expect_refused([&] { save_appearances(path, {"a"}, {Ppisp{}, Ppisp{}}); }, "1 name for 2 appearances");
     expect_refused([&] { save_appearances(path, {"a", "b"}, {Ppisp{}, ColorGrid{}}); }, "several models");

@@ -128,14 +128,62 @@ TEST(ReferenceAppearance, MatchesTheAppearanceOfAnImage) {
     close(with_appearance(image, ColorGrid{{grid.begin(), grid.end()}}), sliced(to_double(image), grid));
 }
 
-TEST(ReferenceAppearance, ANewViewHasTheMean) {
-    ewa::Ppisp a, b;
-    a.photo[0] = 1;
-    b.photo[0] = -0.5f;
-    EXPECT_EQ(std::get<ewa::Ppisp>(*new_view_appearance({a, b})).photo[0], 0.25f);
-    EXPECT_EQ(std::get<ColorGrid>(*new_view_appearance({ColorGrid(), ColorGrid()})), ColorGrid());
-    EXPECT_EQ(std::get<Exposure>(*new_view_appearance({Exposure{2}, Exposure{4}})), kIdentityExposure);
-    EXPECT_FALSE(new_view_appearance({}));
+ewa::Ppisp exposed(float stops) {
+    ewa::Ppisp ppisp;
+    ppisp.photo[0] = stops;
+    return ppisp;
+}
+
+double stops_at(const NewViewAppearance& appearance, const glm::dvec3& center) {
+    return double(std::get<ewa::Ppisp>(*appearance.at(center)).photo[0]);
+}
+
+TEST(ReferenceAppearance, ANewViewHasTheMeanOfPhotosInUnknownPlaces) {
+    EXPECT_EQ(stops_at(NewViewAppearance({exposed(1), exposed(-0.5f)}), glm::dvec3(7)), 0.25);
+    EXPECT_EQ(std::get<ColorGrid>(*NewViewAppearance({ColorGrid(), ColorGrid()}).at({})), ColorGrid());
+    EXPECT_EQ(std::get<Exposure>(*NewViewAppearance({Exposure{2}, Exposure{4}}).at({})), kIdentityExposure);
+    EXPECT_FALSE(NewViewAppearance().at({}));
+}
+
+TEST(ReferenceAppearance, ANewViewIsBetweenThePhotosNearIt) {
+    // The light changes along a row of photos.
+    const std::vector<Appearance> row{exposed(0), exposed(0.1f), exposed(0.2f), exposed(0.3f), exposed(0.4f)};
+    std::vector<glm::dvec3> centers;
+    for (int i = 0; i < 5; ++i) centers.emplace_back(2 * i, 1, -i);
+    const NewViewAppearance near(row, centers);
+    EXPECT_TRUE(near.is_local());
+    EXPECT_NEAR(stops_at(near, centers[3]), 0.3, 1e-7);
+    const glm::dvec3 place(2.7, 1.5, -1.1);
+    double sum = 0, all = 0;
+    for (size_t i = 0; i < row.size(); ++i) {
+        const double weight = std::pow(glm::length(place - centers[i]), -4);
+        sum += weight * 0.1 * double(i);
+        all += weight;
+    }
+    EXPECT_NEAR(stops_at(near, place), sum / all, 1e-7);
+    // Neighbours that differ as much as any two photos predict no new view.
+    const NewViewAppearance mixed({row[2], row[0], row[4], row[0], row[4]}, centers);
+    EXPECT_FALSE(mixed.is_local());
+    EXPECT_NEAR(stops_at(mixed, place), 0.2, 1e-7);
+    // Two have no others to be predicted from.
+    EXPECT_FALSE(NewViewAppearance({row[0], row[1]}, {centers[0], centers[1]}).is_local());
+    // Photos from one place count alike.
+    EXPECT_NEAR(stops_at(NewViewAppearance({row[0], row[2], row[0], row[2]},
+                                           {centers[0], centers[0], centers[4], centers[4]}),
+                         centers[0]),
+                0.1, 1e-7);
+}
+
+TEST(ReferenceAppearance, ANewViewHasTheSplatsColoursUnlessNeighboursPredictExposures) {
+    std::vector<Appearance> images;
+    std::vector<glm::dvec3> centers;
+    for (const float gain : {1.2f, 1.2f, 0.8f, 0.8f}) {
+        images.emplace_back(Exposure{gain, 0, 0, 0, 0, gain, 0, 0, 0, 0, gain, 0});
+        centers.emplace_back(gain > 1 ? 0 : 9, double(images.size() % 2), 0);
+    }
+    EXPECT_NEAR(double(std::get<Exposure>(*NewViewAppearance(images, centers).at(centers[0]))[0]), 1.2, 1e-6);
+    std::swap(centers[0], centers[2]);
+    EXPECT_EQ(std::get<Exposure>(*NewViewAppearance(images, centers).at(centers[0])), kIdentityExposure);
 }
 
 }  // namespace
