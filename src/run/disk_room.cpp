@@ -27,9 +27,9 @@ struct RunBytes {
 };
 
 RunBytes bytes_of_run(uint64_t splats, const TrainOptions& options) {
-    const uint64_t parameters = pipeline::parameter_bytes(1, options.sh_degree);
+    const uint64_t parameters = pipeline::parameter_bytes(uint32_t(splats), options.sh_degree);
     const uint64_t moments = 2 * parameters * uint64_t(options.moment_bits) / 32;
-    return {splats * (parameters + kNormalBytes), splats * (parameters + moments + kStatisticsBytes)};
+    return {parameters + splats * kNormalBytes, parameters + moments + splats * kStatisticsBytes};
 }
 
 uint64_t replaced_bytes(const fs::path& folder) {

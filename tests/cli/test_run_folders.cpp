@@ -232,8 +232,9 @@ TEST_F(RunFolders, ShortAddressSpaceIsRefusedBeforeTheDriverCrashes) {
 
 /// Before it trains, a run compares the disk with what its files will take.
 TEST_F(RunFolders, ASmallDiskIsNamedAtTheStart) {
-    expect_failure(train({"-o", "o", "--steps", "1"}, with_fault("EWA_FAULT_ROOM", "4096")), 1,
-                   "o: its disk has 4.1 kB free, and splats.ply and checkpoint.ewa of the first 50 splats");
+    expect_failure(
+        train({"-o", "o", "--steps", "1"}, with_fault("EWA_FAULT_ROOM", "4096")), 1,
+        "o: its disk has 4.1 kB free, and splats.ply and checkpoint.ewa of the first 50 splats take 41.7 kB");
     EXPECT_FALSE(fs::exists(folder / "o/config.json"));
     const Outcome warned =
         ewa_in(folder / ".",
