@@ -60,6 +60,9 @@ class Engine {
         }
         if (own) needs_->use(*own);
         family_ = device()->queue_family();
+        // The layer objects to a family if this instance did not list the device's families.
+        if (family_ >= physical_.getQueueFamilyProperties().size())
+            throw std::runtime_error("no such queue family");
         queue_info_.setQueueFamilyIndex(family_).setQueueCount(1).setPQueuePriorities(&priority_);
         info_.setQueueCreateInfos(queue_info_)
             .setPEnabledExtensionNames(needs_->extensions)

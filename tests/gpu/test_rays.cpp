@@ -86,7 +86,7 @@ TEST_P(RayChain, GradientMatchesTheReference) {
     tolerance.cosine = others * 1e-6;
     tolerance.norm = others * (has_needles() ? 2e-4 : 1e-4);  // as for pictures
     tolerance.element_relative = 1e-2;
-    tolerance.element_absolute = 2e-4;
+    tolerance.element_absolute = others * 2e-4;
     EXPECT_TRUE(splat_gradients_agree(actual.gradient, expected.gradient, tolerance));
 }
 
