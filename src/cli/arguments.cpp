@@ -358,13 +358,4 @@ Views load_views(const ViewArguments& arguments, const std::string& which, int t
     return {std::move(dataset), refined, std::move(frames), std::move(rendered)};
 }
 
-std::string with_home(const std::string& word) {
-    const char* home = std::getenv("HOME");
-    const size_t equals = word.find('=');
-    const size_t begin = word.starts_with("--") && equals != std::string::npos ? equals + 1 : 0;
-    const bool names_home = word.compare(begin, 2, "~/") == 0 || word.substr(begin) == "~";
-    if (!home || *home == 0 || !names_home) return word;
-    return word.substr(0, begin) + home + word.substr(begin + 1);
-}
-
 }  // namespace ewa::cli

@@ -130,8 +130,4 @@ struct Views {
 /// select_frames, whose error comes before the rendering. Throws Interrupted if Ctrl-C ended the rendering.
 Views load_views(const ViewArguments& arguments, const std::string& which, int test_every);
 
-/// A word that begins with ~/, or --option=~/, with the user's home folder in place of ~: shells expand neither a quoted ~
-/// nor one behind =. Other words, and all where $HOME is not set, stay as they are.
-std::string with_home(const std::string& word);
-
 }  // namespace ewa::cli

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cli/arguments.h"
+#include "core/folders.h"
 #include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -55,7 +56,7 @@ void check_type(const CLI::Option& option, const Json& value, const std::string&
 
 /// The value as the command line takes it.
 std::string option_text(const Json& value, const std::string& where) {
-    if (value.is_string()) return with_home(value.get<std::string>());
+    if (value.is_string()) return core::with_home(value.get<std::string>());
     if (value.is_number() || value.is_boolean()) return value.dump();
     if (value.is_array()) {  // a background
         std::string text;

@@ -13,6 +13,7 @@
 #include "cli/status.h"
 #include "cli/usage.h"
 #include "core/exclusion.h"
+#include "core/folders.h"
 #include "core/terminal.h"
 #include "core/text.h"
 
@@ -60,7 +61,7 @@ std::string command_line(int argc, char** argv) {
 /// stand for.
 std::vector<std::string> usual_arguments(int argc, char** argv) {
     std::vector<std::string> words;
-    for (int i = 0; i < argc; ++i) words.push_back(with_home(argv[i]));
+    for (int i = 0; i < argc; ++i) words.push_back(core::with_home(argv[i]));
     if (argc < 2) return words;
     if (argc <= 3 && words[1] == "help") {
         words.erase(words.begin() + 1);

@@ -33,6 +33,15 @@ bool is_of_desktop(const std::filesystem::path& inside) {
     return inside.filename() == "Thumbs.db" || inside.filename() == "desktop.ini";
 }
 
+std::string with_home(const std::string& word) {
+    const char* home = std::getenv("HOME");
+    const size_t equals = word.find('=');
+    const size_t begin = word.starts_with("--") && equals != std::string::npos ? equals + 1 : 0;
+    const bool names_home = word.compare(begin, 2, "~/") == 0 || word.substr(begin) == "~";
+    if (!home || *home == 0 || !names_home) return word;
+    return word.substr(0, begin) + home + word.substr(begin + 1);
+}
+
 void make_folder(const std::filesystem::path& folder) {
     if (folder.empty()) return;
     std::error_code error;

@@ -18,6 +18,10 @@ bool is_of_desktop(const std::filesystem::path& inside);
 /// created, or if the path names something else.
 void make_folder(const std::filesystem::path& folder);
 
+/// A word that begins with ~/, or --option=~/, with the user's home folder in place of ~: shells expand neither a quoted ~
+/// nor one behind =. Other words, and all where $HOME is not set, stay as they are.
+std::string with_home(const std::string& word);
+
 /// Locks a folder until the object or the process ends. Nothing is left on disk. Throws RunError if another
 /// process holds the lock. On a file system without locks, this does nothing.
 class FolderLock {

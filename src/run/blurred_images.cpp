@@ -11,7 +11,6 @@
 #include "core/parallel.h"
 #include "core/typing.h"
 #include "image/metric.h"
-#include "run/option_rows.h"
 #include "scene/frame_images.h"
 #include "scene/statistics.h"
 
@@ -65,11 +64,6 @@ std::string handle_blurred(Dataset& dataset, Split& split, const RunOptions& opt
     }
     return fmt::format("{} {} blurred and {}{}", core::counted(blurred.size(), "training image"),
                        core::is_or_are(blurred.size()), done, names);
-}
-
-RunOption weigh_blurred_option() {
-    return later_flag("weigh-blurred", "Images that are blurred far more than the others count less",
-                      [](RunOptions& o) -> bool& { return o.weigh_blurred; });
 }
 
 }  // namespace ewa::train

@@ -12,7 +12,6 @@
 #include "ewa/error.h"
 #include "ewa/metrics.h"
 #include "run/advanced_options.h"
-#include "run/blurred_images.h"
 #include "run/look_options.h"
 #include "run/loss_option.h"
 #include "run/option_rows.h"
@@ -376,7 +375,9 @@ std::vector<Row> rows() {
         {"Data", "",
          later_flag("skip-blurred", "Do not train on images that are blurred far more than the others",
                     [](RunOptions& o) -> bool& { return o.skip_blurred; })},
-        {"Data", "", weigh_blurred_option()},
+        {"Data", "",
+         later_flag("weigh-blurred", "Images that are blurred far more than the others count less",
+                    [](RunOptions& o) -> bool& { return o.weigh_blurred; })},
         {"Data", "robust",
          later_flag("robust",
                     "Mask what single images show and the others do not, such as people who pass by. A short "

@@ -7,6 +7,9 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
+#include <string>
+
+#include "ewa/error.h"
 
 namespace ewa::scene {
 

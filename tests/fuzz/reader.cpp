@@ -227,9 +227,10 @@ void check_error(const std::string& text) {
     bool named = false;
     for (size_t at = text.find("byte "); at != std::string::npos; at = text.find("byte ", at + 1))
         named = named || std::isdigit(static_cast<unsigned char>(text[at + 5]));
-    for (const char* place : {"\"", "'", "`", "properties f_rest_", "attribute ", "accessor", "node ",
-                              "mesh ", "buffer ", "image ", "material ", "texture ", "the JSON ", "claims ",
-                              "view ", "line ", "begins ", "is empty", "it is a"})
+    for (const char* place :
+         {"\"",    "'",       "`",       "properties f_rest_", "attribute ", "accessor",  "node ",
+          "mesh ", "buffer ", "image ",  "material ",          "texture ",   "the JSON ", "claims ",
+          "view ", "line ",   "begins ", "is empty",           "it is a",    "is UTF-16"})
         named = named || text.find(place) != std::string::npos;
     EWA_REQUIRE(named);
     EWA_REQUIRE(text.find('\n') == std::string::npos && text.size() < 2000);

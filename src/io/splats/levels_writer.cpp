@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
+#include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "io/splats/formats.h"
 #include "io/splats/levels.h"

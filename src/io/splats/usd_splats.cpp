@@ -20,6 +20,7 @@
 #include <limits>
 
 #include "core/atomic_file.h"
+#include "core/file_reader.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
