@@ -78,21 +78,6 @@ void read_points(const std::filesystem::path& file, SparseModel& model) {
     }
 }
 
-/// A file that is written value by value.
-class SparseFile {
-  public:
-    explicit SparseFile(const std::filesystem::path& path) : file_(path) {}
-    template <class... Values>
-    void add(const Values&... values) {
-        (file_.write(&values, sizeof(values)), ...);
-    }
-    void add_text(const std::string& text) { file_.write(text.c_str(), text.size() + 1); }
-    void commit() { file_.commit(); }
-
-  private:
-    core::AtomicFile file_;
-};
-
 }  // namespace
 
 SparseModel read_sparse(const std::filesystem::path& folder) {
@@ -105,14 +90,14 @@ SparseModel read_sparse(const std::filesystem::path& folder) {
 
 void write_sparse(const SparseModel& model, const std::filesystem::path& folder) {
     core::make_folder(folder);
-    SparseFile cameras(folder / "cameras.bin");
+    core::BinaryFile cameras(folder / "cameras.bin");
     cameras.add(uint64_t(model.cameras.size()));
     for (const auto& [id, camera] : model.cameras) {
         cameras.add(id, camera.lens, camera.width, camera.height);
         for (const double parameter : camera.parameters) cameras.add(parameter);
     }
     cameras.commit();
-    SparseFile images(folder / "images.bin");
+    core::BinaryFile images(folder / "images.bin");
     images.add(uint64_t(model.images.size()));
     for (const auto& [id, image] : model.images) {
         images.add(id);
@@ -124,7 +109,7 @@ void write_sparse(const SparseModel& model, const std::filesystem::path& folder)
             images.add(feature.at.x, feature.at.y, feature.point);
     }
     images.commit();
-    SparseFile points(folder / "points3D.bin");
+    core::BinaryFile points(folder / "points3D.bin");
     points.add(uint64_t(model.points.size()));
     for (const auto& [id, point] : model.points) {
         points.add(id, point.position.x, point.position.y, point.position.z, point.color[0], point.color[1],

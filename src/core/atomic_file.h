@@ -3,6 +3,7 @@
 #pragma once
 #include <cstddef>
 #include <filesystem>
+#include <string>
 #include <string_view>
 
 #include "ewa/error.h"
@@ -51,6 +52,22 @@ class AtomicFile {
     int descriptor_ = -1;
     int listed_ = -1;  // for remove_unfinished_files()
     bool claimed_ = false;
+};
+
+/// The same, value by value, in the machine's byte order.
+class BinaryFile {
+  public:
+    explicit BinaryFile(const std::filesystem::path& path) : file_(path) {}
+    template <class... Values>
+    void add(const Values&... values) {
+        (file_.write(&values, sizeof(values)), ...);
+    }
+    /// With a zero behind it.
+    void add_text(const std::string& text) { file_.write(text.c_str(), text.size() + 1); }
+    void commit() { file_.commit(); }
+
+  private:
+    AtomicFile file_;
 };
 
 /// Replaces the content of a file. On failure, throws RunError and the file keeps its content.

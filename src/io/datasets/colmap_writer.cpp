@@ -33,28 +33,13 @@ std::optional<int32_t> lens_with(const Distortion& distortion) {
     return std::nullopt;
 }
 
-/// A file of COLMAP, piece by piece.
-class BinaryFile {
-  public:
-    explicit BinaryFile(const std::filesystem::path& path) : file_(path) {}
-    template <class... Values>
-    void add(const Values&... values) {
-        (file_.write(&values, sizeof(values)), ...);
-    }
-    void add_text(const std::string& text) { file_.write(text.c_str(), text.size() + 1); }
-    void commit() { file_.commit(); }
-
-  private:
-    core::AtomicFile file_;
-};
-
 bool same_lens(const ImageRecord& a, const ImageRecord& b) {
     const Camera &x = a.camera, &y = b.camera;
     return x.width == y.width && x.height == y.height && x.fx == y.fx && x.fy == y.fy && x.cx == y.cx &&
            x.cy == y.cy && a.distortion == b.distortion;
 }
 
-void write_camera(BinaryFile& file, uint32_t id, const ImageRecord& image) {
+void write_camera(core::BinaryFile& file, uint32_t id, const ImageRecord& image) {
     const Camera& c = image.camera;
     const std::optional<int32_t> lens = lens_with(image.distortion);
     if (!lens) throw RunError("COLMAP has no lens model with these distortion terms");
@@ -87,12 +72,12 @@ void write_colmap(const std::filesystem::path& model, const std::vector<ImageRec
         if (i == 0 || !same_lens(images[i - 1], images[i])) first.push_back(i);
         camera_of.push_back(uint32_t(first.size()));
     }
-    BinaryFile cameras(model / "cameras.bin");
+    core::BinaryFile cameras(model / "cameras.bin");
     cameras.add(uint64_t(first.size()));
     for (size_t i = 0; i < first.size(); ++i) write_camera(cameras, uint32_t(i + 1), images[first[i]]);
     cameras.commit();
 
-    BinaryFile poses(model / "images.bin");
+    core::BinaryFile poses(model / "images.bin");
     poses.add(uint64_t(images.size()));
     for (size_t i = 0; i < images.size(); ++i) {
         const glm::dquat q = glm::quat_cast(images[i].camera.rotation);
@@ -103,7 +88,7 @@ void write_colmap(const std::filesystem::path& model, const std::vector<ImageRec
     }
     poses.commit();
 
-    BinaryFile cloud(model / "points3D.bin");
+    core::BinaryFile cloud(model / "points3D.bin");
     cloud.add(uint64_t(points.positions.size()));
     for (size_t i = 0; i < points.positions.size(); ++i) {
         const glm::dvec3& p = points.positions[i];
