@@ -57,7 +57,8 @@ Image with_appearance(Image image, const Appearance& appearance);
 
 /// What views show that training has not seen. Neighbouring photos of a camera that exposes by itself have similar appearances, so
 /// a new view's is between those of the photos near it: a mean with weights of 1 / distance^4 (Shepard 1968). Where that would
-/// predict the brightness of the training images worse, each from the others, it is the mean over all images, or with Exposure the splats' own colours.
+/// predict the brightness of the training images worse, each from the others, it is the mean over all images, or with Exposure the splats'
+/// own colours.
 class NewViewAppearance {
   public:
     /// There is none.

@@ -21,8 +21,8 @@ namespace ewa {
 class Renderer;
 
 /// What libewa uses of a device. VkDeviceCreateInfo::pNext points to `features`, and pEnabledFeatures is null. Its extensions are
-/// `extensions`. A program adds what it uses itself to the members and to the end of the chain; VkPhysicalDeviceVulkan13Features by
-/// use(). libewa cannot do without
+/// `extensions`. A program adds what it uses itself to the members and to the end of the chain, and its
+/// VkPhysicalDeviceVulkan13Features by use(). libewa cannot do without
 /// VkPhysicalDeviceVulkan12Features::scalarBlockLayout. Without the other features and the extensions it is slower.
 struct DeviceNeeds {
     /// api_version: VkApplicationInfo::apiVersion of the instance, 1.2 or later.

@@ -92,9 +92,8 @@ bool FinalEvaluation::evaluate(RunCameras& cameras, const RunFolder& folder) {
 }
 
 void FinalEvaluation::evaluate_test_views() {
-    of_test_views_ =
-        evaluated(input_.split.test, for_new_views(new_view_appearance(), input_.dataset, input_.split.test),
-                  true, measures_);
+    of_test_views_ = evaluated(
+        input_.split.test, for_new_views(of_new_views(), input_.dataset, input_.split.test), true, measures_);
     report_.summary.test_figures = of_test_views_->figures;
     if (of_test_views_->frames.empty()) return;  // no pixel counts
     report_.summary.test_psnr = of_test_views_->psnr;
@@ -153,16 +152,18 @@ bool FinalEvaluation::add_full_size() {
     });
 }
 
-NewViewAppearance FinalEvaluation::new_view_appearance() const {
-    return train::new_view_appearance(scene_.appearances, input_.dataset, input_.split.train);
+const NewViewAppearance& FinalEvaluation::of_new_views() {
+    if (!of_new_views_)
+        of_new_views_ = new_view_appearance(scene_.appearances, input_.dataset, input_.split.train);
+    return *of_new_views_;
 }
 
-RenderedView FinalEvaluation::drawn_again(int index) const {
+RenderedView FinalEvaluation::drawn_again(int index) {
     const std::vector<int>& train = input_.split.train;
     const auto place = std::find(train.begin(), train.end(), index);
     const bool known = !scene_.appearances.empty() && place != train.end();
     const Frame& frame = input_.dataset.frames[size_t(index)];
-    const auto of_new_view = new_view_appearance().at(frame.camera.position());
+    const auto of_new_view = of_new_views().at(frame.camera.position());
     return with_photo(std::move(scene_.renderer.images(std::span(&frame.camera, 1)).front()), frame,
                       input_.options.train.render,
                       known         ? &scene_.appearances[size_t(place - train.begin())]
@@ -171,7 +172,7 @@ RenderedView FinalEvaluation::drawn_again(int index) const {
 }
 
 /// Returns the bytes that it adds.
-size_t FinalEvaluation::add_full_size(report::ReportView& view) const {
+size_t FinalEvaluation::add_full_size(report::ReportView& view) {
     const auto kept = kept_.find(view.frame);
     if (kept != kept_.end()) return report::add_full_size(view, kept->second.photo, kept->second.rendering);
     const RenderedView rendered = drawn_again(view.frame);

@@ -69,9 +69,9 @@ class FinalEvaluation {
                          bool shown, const Measures& measures);
     void add_view(int index, const RenderedView& view, const EvalFrame& figures);
     void keep(int index, const RenderedView& view);
-    NewViewAppearance new_view_appearance() const;
-    RenderedView drawn_again(int index) const;
-    size_t add_full_size(report::ReportView& view) const;
+    const NewViewAppearance& of_new_views();
+    RenderedView drawn_again(int index);
+    size_t add_full_size(report::ReportView& view);
 
     RunObserver& observer_;
     const RunInput& input_;
@@ -83,6 +83,7 @@ class FinalEvaluation {
     size_t done_ = 0;                                   // views
     std::optional<Evaluation> of_test_views_;
     std::filesystem::path first_render_;
+    std::optional<NewViewAppearance> of_new_views_;
     std::map<int, RenderedView> kept_;       // for their full size
     uint64_t kept_values_ = 0;               // of their images
     std::vector<std::future<void>> saving_;  // renders
