@@ -264,8 +264,7 @@ RunOption dense_start_option() {
     RunOption option = choice<DenseStart>(
         "dense-start",
         "Whether splats start between neighbouring points, too. auto: in runs of adc of at most 700 "
-        "steps, if "
-        "points are few for the size of the images",
+        "steps, or 1,000 if points are very few for the size of the images",
         [](RunOptions& o) -> DenseStart& { return o.dense_start; }, kDenseStarts);
     option.before = "auto";
     return option;

@@ -43,6 +43,9 @@ constexpr size_t kUsualPoints = 200000;
 constexpr const char* kOtherLimit = "; --max-splats N sets another limit";
 // A longer run adds splats by itself where they are needed. fox_270 gains 0.7 dB in 500 steps, and nothing in 1,000.
 constexpr int kDenseStartSteps = 700;
+// With so few points for each pixel of a photo, runs of 1,000 steps gain from it, too (docs/training.md#short-runs).
+constexpr int kDenseStartStepsOfFewPoints = 1000;
+constexpr double kFewPoints = 0.15;
 constexpr double kPixelsOfDenseStart = 2;  // of an image, for each first splat
 
 /// Four numbers of (0, 1) for each seed, splat and use of it.
@@ -257,13 +260,17 @@ Gaussians random_gaussians(const Dataset& dataset, const std::vector<int>& frame
 namespace {
 
 /// How many first splats there should be, or 0 if the points are to be taken as they are.
-size_t dense_start_size(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames) {
+/// points: those that the run starts from.
+size_t dense_start_size(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames,
+                        size_t points) {
     const TrainOptions& train = options.train;
     if (options.dense_start == DenseStart::off) return 0;
-    if (options.dense_start == DenseStart::automatic &&
-        (train.strategy != Strategy::adc || train.steps > kDenseStartSteps || train.render.points))
-        return 0;
     const double pixels = pixels_of(dataset, frames) / double(frames.size());
+    const bool few = double(points) < kFewPoints * pixels && !few_photos(train, frames.size());
+    const int most_steps = few ? kDenseStartStepsOfFewPoints : kDenseStartSteps;
+    if (options.dense_start == DenseStart::automatic &&
+        (train.strategy != Strategy::adc || train.steps > most_steps || train.render.points))
+        return 0;
     const auto wanted = size_t(pixels / kPixelsOfDenseStart);
     return train.max_splats == kAutomaticMaxSplats ? wanted : std::min(wanted, size_t(train.max_splats));
 }
@@ -294,7 +301,7 @@ std::string thinned_note(size_t taken, size_t all, const RunOptions& options) {
 
 Gaussians splats_of(const PointCloud& points, const RunOptions& options, const Dataset& dataset,
                     const std::vector<int>& frames) {
-    const size_t wanted = dense_start_size(options, dataset, frames);
+    const size_t wanted = dense_start_size(options, dataset, frames, points.positions.size());
     if (wanted <= points.positions.size()) return gaussians_from_points(points, options.train.sh_degree);
     return gaussians_from_points(
         scene::with_midpoints(points, wanted,

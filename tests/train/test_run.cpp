@@ -197,6 +197,34 @@ TEST(Run, ADenseStartKeepsToACapThatIsGiven) {
     }
 }
 
+/// 40 points for photos of 1,728 pixels are few: 0.02 a pixel. Eight photos are few, too.
+TEST(Run, ADenseStartOfAThousandStepsIsForFewPoints) {
+    Synthetic made;
+    make_synthetic(made, 40, 8, 48, 36, 7);
+    RunOptions options;
+    options.train.strategy = Strategy::adc;
+    options.train.sh_degree = 0;
+    const std::vector<int> frames = all_frames(made.dataset);
+    const auto splats = [&](int steps, int few_photos) {
+        options.train.steps = steps;
+        options.train.few_photos = few_photos;
+        return train::initial_splats(options, made.dataset, frames).size();
+    };
+    const size_t points = made.dataset.points.positions.size(), dense = splats(700, 16);
+    EXPECT_GT(dense, points);
+    EXPECT_EQ(splats(1000, 0), dense);
+    EXPECT_EQ(splats(1001, 0), points);
+    EXPECT_EQ(splats(1000, 16), points);
+    for (size_t copies = 1; copies < 7; ++copies)
+        for (size_t i = 0; i < points; ++i) {
+            made.dataset.points.positions.push_back(made.dataset.points.positions[i] +
+                                                    glm::dvec3(0.01 * double(copies)));
+            made.dataset.points.colors.push_back(made.dataset.points.colors[i]);
+        }
+    EXPECT_EQ(splats(1000, 0), 7 * points);  // 0.16 a pixel
+    EXPECT_GT(splats(700, 0), 7 * points);
+}
+
 TEST(Run, ADenseStartNeedsPoints) {
     TempFolder folder;
     RunOptions options = small_run(folder / "o");
