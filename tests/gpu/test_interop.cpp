@@ -322,7 +322,11 @@ TEST(Interop, SemaphoresOrderTheWork) {
     sync.signal = *counter;
     sync.signal_value = 7;
     render_to(renderer, drawn.scene.camera, drawn.options, targets, sync);
-    EXPECT_EQ(engine.handle().getSemaphoreCounterValue(*counter), 7u);
+    // The fence that render_to waits for may be signalled before the semaphore.
+    constexpr uint64_t kSecond = 1'000'000'000, kValue = 7;
+    EXPECT_EQ(engine.handle().waitSemaphores(vk::SemaphoreWaitInfo({}, *counter, kValue), 10 * kSecond),
+              vk::Result::eSuccess);
+    EXPECT_EQ(engine.handle().getSemaphoreCounterValue(*counter), kValue);
     sync = {};
     sync.wait = *counter;
     sync.wait_value = 7;
