@@ -54,6 +54,9 @@ struct TrainOptions {
     int sh_degree = 3;               // 0 to 3, or kAutomaticShDegree
     uint64_t seed = 0;               // the same seed on the same device gives the same bytes
     bool random_background = false;  // a new background colour each step
+    /// Each step adds another number to each channel of the background, of this width around 0. What splats leave transparent
+    /// then costs, so photos are trained to be opaque. Not with random_background or sky.
+    double background_noise = 0;
     /// Learns a SkyMap in place of the background. Not with refine_poses.
     bool sky = false;
     double sky_rate = 0.02, sky_rate_final = 0.002;

@@ -29,6 +29,7 @@
 #include "report/run_file_names.h"
 #include "run/first_checks.h"
 #include "run/option_table.h"
+#include "run/photo_background.h"
 #include "run/resume.h"
 #include "run/run_input.h"
 #include "run/scout.h"
@@ -257,6 +258,7 @@ void start_training(Training* self, const ObjectOrPath<LoadedDataset>& given, nb
     const FirstSplats first(init);
     const bool from_points = !first.given && first.word == "sfm";
     if (!from_points && start.run.train.halvings == kAutomaticHalvings) start.run.train.halvings = 0;
+    train::choose_background(start.run, *start.dataset, start.frames);
     start.resolve_options();
     new (self) Training(std::move(start), first);
 }
@@ -341,7 +343,7 @@ Training resume(const std::filesystem::path& named, const ObjectOrPath<LoadedDat
         throw InputError(path.string() + ": its training began with splats; pass them again as init");
     RunOptions& run = start.run;
     if (steps) run.train.steps = *steps;
-    train::continue_from(path, checkpoint, TrainOptions(run.train), run);
+    train::continue_from(path, checkpoint, RunOptions(run), run);
     start.resolve_options();
     const nb::object first =
         init.is_none() ? nb::cast(begun.is_string() ? begun.get<std::string>() : "sfm") : nb::borrow(init);

@@ -45,6 +45,7 @@ struct Special {
 nb::object background_value(const RunOptions& options) {
     if (options.train.random_background) return nb::str("random");
     if (options.train.sky) return nb::str("sky");
+    if (options.automatic_background) return nb::str("auto");
     const auto& [r, g, b] = options.train.render.background;
     return nb::make_tuple(r, g, b);
 }
@@ -53,7 +54,8 @@ void set_background(RunOptions& options, nb::handle value) {
     const std::string word = nb::isinstance<nb::str>(value) ? nb::cast<std::string>(value) : std::string();
     options.train.random_background = word == "random";
     options.train.sky = word == "sky";
-    const bool colour = word != "random" && word != "sky";
+    options.automatic_background = word == "auto";
+    const bool colour = word != "random" && word != "sky" && word != "auto";
     options.train.render.background = colour ? background_of(value) : std::array<float, 3>{};
 }
 
@@ -232,6 +234,7 @@ nb::dict argument_names() {
 RunOptions usual_options() {
     RunOptions usual;
     usual.train.appearance = AppearanceModel::none;
+    usual.automatic_background = false;
     return usual;
 }
 

@@ -101,7 +101,7 @@ RenderOptions DrawArguments::options() const {
             throw InputError(std::string("--") + name + ": " + error.what());
         }
     };
-    if (background == "random" || background == "sky")
+    if (background == "random" || background == "sky" || background == "auto")
         throw InputError("--background: only ewa train takes " + background);
     const bool sky = background.ends_with(".json");
     if (!sky) set("background", background);

@@ -170,8 +170,12 @@ void resolve_runs(CLI::App& app, CompareInputs& inputs) {
         side = input.file;
         if (!first) first = input.run;
         if (inputs.cameras.empty()) refined[i] = refined_cameras_of(*input.run);
+        // With noise, what a run learned looks the same over any background.
+        const bool opaque =
+            first->config.contains("background-noise") && input.run->config.contains("background-noise");
         for (const char* option : {"kernel", "background"})
             if (first->text(option) != input.run->text(option) &&
+                !(opaque && std::string_view(option) == "background") &&
                 app.get_option("--" + std::string(option))->empty())
                 throw InputError(first->folder.string() + " and " + input.run->folder.string() +
                                  " were trained with another --" + option +

@@ -50,6 +50,8 @@ std::vector<RunOption> advanced_options() {
                                  "With so many training images or fewer, adc and none are regularised"),
         advanced<&O::exposure_rate>("exposure-rate", "Learning rate of the exposures"),
         advanced<&O::exposure_rate_final>("exposure-rate-final", "The same at the end of the run"),
+        advanced<&O::background_noise>(
+            "background-noise", "Width of the noise that each step adds to each channel of the background"),
         advanced<&O::sky_rate>("sky-rate", "Learning rate of the sky"),
         advanced<&O::sky_rate_final>("sky-rate-final", "The same at the end of the run"),
         advanced<&O::appearance_rate>("appearance-rate", "Learning rate of --appearance ppisp and grid"),

@@ -36,19 +36,23 @@ RunOption background_option() {
     RunOption option{
         "background", "COLOUR",
         "Colour behind the splats: r,g,b in 0..1, a name such as white, #rrggbb, random (a new one each "
-        "step), or sky (light from far away that is learned, by direction)",
+        "step), or sky (light from far away that is learned, by direction). auto: photos without "
+        "transparency have their mean colour, and each step one near it; others have black",
         kDecides};
     option.get = [](const RunOptions& options) {
         const auto& [r, g, b] = options.train.render.background;
         if (options.train.sky) return std::string("sky");
+        if (options.automatic_background && !options.train.random_background) return std::string("auto");
         return options.train.random_background ? "random" : fmt::format("{},{},{}", r, g, b);
     };
     option.set = [](RunOptions& options, const std::string& text) {
-        const bool random = text == "random", sky = text == "sky";
-        const auto colour = random || sky ? std::optional(std::array<float, 3>{}) : core::parse_colour(text);
+        const bool random = text == "random", sky = text == "sky", automatic = text == "auto";
+        const auto colour =
+            random || sky || automatic ? std::optional(std::array<float, 3>{}) : core::parse_colour(text);
         if (!colour) throw InputError(core::not_a_colour(text));
         options.train.random_background = random;
         options.train.sky = sky;
+        options.automatic_background = automatic;
         options.train.render.background = *colour;
     };
     return option;

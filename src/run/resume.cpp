@@ -112,7 +112,7 @@ std::string dataset_fingerprint(const Dataset& dataset, const Split& split, bool
     return core::digits_of(hash);
 }
 
-int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, const TrainOptions& asked,
+int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, const RunOptions& asked,
                   RunOptions& options) {
     const Json then = parse_settings(path, earlier.settings);
     RunOptions before = options;
@@ -129,12 +129,17 @@ int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, 
         }
     };
     take("steps", before);
-    if (asked.strategy == Strategy::automatic) take("strategy", options);
-    if (asked.appearance == AppearanceModel::automatic) take("appearance", options);
-    if (asked.halvings == kAutomaticHalvings) {
-        options.train.resolution_every = asked.resolution_every;
+    if (asked.train.strategy == Strategy::automatic) take("strategy", options);
+    if (asked.train.appearance == AppearanceModel::automatic) take("appearance", options);
+    if (asked.automatic_background) {
+        take("background", options);
+        take("background-noise", options);
+    }
+    if (asked.train.halvings == kAutomaticHalvings) {
+        options.train.resolution_every = asked.train.resolution_every;
         take("resolution-schedule", options);
-        if (asked.resolution_every == TrainOptions().resolution_every) take("resolution-every", options);
+        if (asked.train.resolution_every == TrainOptions().resolution_every)
+            take("resolution-every", options);
     }
     options.train.measure_exposures = false;
     const int step = earlier.state.report.step;
@@ -152,7 +157,7 @@ int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, 
     const Schedule schedule = schedule_for(before.train);
     options.train.least_sh_degree = schedule.degree(step);
     // The steps of the smaller images were chosen for fewer steps in all.
-    options.train.most_halvings = asked.halvings == kAutomaticHalvings ? 0 : schedule.halvings_at(step);
+    options.train.most_halvings = asked.train.halvings == kAutomaticHalvings ? 0 : schedule.halvings_at(step);
     return before.train.steps;
 }
 

@@ -24,7 +24,7 @@ nlohmann::ordered_json checkpoint_settings(const RunOptions& options, const std:
 /// checkpoint's run has another number of steps, the options keep what it has reached (TrainOptions::least_sh_degree,
 /// most_halvings). An automatic cap of splats does not fall below the checkpoint's. Returns that run's number of steps. Throws InputError if the checkpoint lies behind the last step.
 /// asked: the options before resolve().
-int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, const TrainOptions& asked,
+int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, const RunOptions& asked,
                   RunOptions& options);
 
 /// The setting that --robust adds: fingerprint_of its masks.

@@ -79,14 +79,14 @@ class Run {
           folder_(train::checked_folder(input_)),
           cameras_(input_),
           saves_(folder_, input_.options, cameras_, progress_) {
-        read_checkpoint(options.train);
+        read_checkpoint(options);
     }
 
     RunResult run();
 
   private:
     const RunOptions& options() const { return input_.options; }
-    void read_checkpoint(const TrainOptions& asked);
+    void read_checkpoint(const RunOptions& asked);
     void begin_files();
     void leave_out_passers_by();
     MemoryEstimate choose_cap();
@@ -123,7 +123,7 @@ class Run {
     std::filesystem::path first_render_;
 };
 
-void Run::read_checkpoint(const TrainOptions& asked) {
+void Run::read_checkpoint(const RunOptions& asked) {
     train::check_free(folder_.path(), options());  // again, now that no other run writes here
     if (options().resume && std::filesystem::exists(folder_.checkpoint())) {
         earlier_.emplace(EarlierRun{std::make_unique<train::CheckpointReader>(folder_.checkpoint()), 0});

@@ -22,6 +22,7 @@
 #include "run/blurred_images.h"
 #include "run/depth_points.h"
 #include "run/first_checks.h"
+#include "run/photo_background.h"
 #include "run/pose_options.h"
 #include "run/region_option.h"
 #include "run/stereo_points.h"
@@ -463,6 +464,7 @@ RunInput load_run(const RunOptions& options) {
             fmt::format("appearance {}: {}{}", learned ? "ppisp" : "none", choice.reason,
                         learned ? "; --metrics cc_psnr compares held-out images without it" : ""));
     }
+    choose_background(input.options, input.dataset, input.split.train);
     // The rule is for splats that start from the dataset's points.
     if (train.halvings == kAutomaticHalvings && options.init != "sfm") train.halvings = 0;
     train = resolve(train, input.dataset, input.split.train);

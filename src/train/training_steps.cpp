@@ -33,9 +33,16 @@ Region region_of(const TrainOptions& options, const glm::dvec3& origin) {
     return region;
 }
 
-std::array<float, 3> random_background(int step, uint64_t seed) {
-    const auto u = core::uniform4({uint32_t(step), 0x62636b67u, uint32_t(seed), uint32_t(seed >> 32)});
-    return {float(u[0]), float(u[1]), float(u[2])};
+/// What the step's splats are drawn over.
+std::array<float, 3> background_of(int step, const TrainOptions& options) {
+    const bool random = options.random_background;
+    if (!random && options.background_noise == 0) return options.render.background;
+    const auto u =
+        core::uniform4({uint32_t(step), 0x62636b67u, uint32_t(options.seed), uint32_t(options.seed >> 32)});
+    if (random) return {float(u[0]), float(u[1]), float(u[2])};
+    std::array<float, 3> color = options.render.background;
+    for (size_t c = 0; c < 3; ++c) color[c] += float(options.background_noise * (u[c] - 0.5));
+    return color;
 }
 
 }  // namespace
@@ -191,11 +198,8 @@ void Training::optimise(int first, int last) {
 portions::StepView Training::view_of(int step, ImageCache& seen, int sh_degree, uint32_t slot) {
     const size_t index = index_of(step);
     const CameraUse camera = seen.camera(index);
-    const FrameInputs inputs{.camera = camera,
-                             .background = options_.random_background ? random_background(step, options_.seed)
-                                                                      : options_.render.background,
-                             .sky = sky(),
-                             .sh_degree = sh_degree};
+    const FrameInputs inputs{
+        .camera = camera, .background = background_of(step, options_), .sky = sky(), .sh_degree = sh_degree};
     const ExposureUse exposure{&learned_.exposures, uint32_t(index), float(schedule_.exposure_rate(step)),
                                visit_of(step)};
     const AppearanceUse appearance{&learned_.appearances, uint32_t(index), slot,

@@ -119,7 +119,7 @@ TEST(Run, WritesItsFilesAndTellsItsObserver) {
     const Json config = json_of(folder / "o/config.json");
     EXPECT_EQ(config["strategy"], "mcmc");
     EXPECT_EQ(config["sh-degree"], 3);
-    EXPECT_EQ(config["background"], "0,0,0");
+    EXPECT_EQ(config["background"], "0.24,0.28,0.21");
 }
 
 TEST(Run, StoppedAndResumedEndsWithTheSameBytes) {
