@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -50,10 +51,21 @@ report::Json to_json(const Evaluation& evaluation, const io::RefinedUse& refined
     return json;
 }
 
+std::string line_of(double psnr, double ssim, const std::vector<Figure>& figures) {
+    const auto fitted = std::ranges::find(figures, kFittedMetric, &Figure::name);
+    const std::string beside =
+        fitted == figures.end() ? "" : fmt::format(" (colours fitted {:.3f} dB)", fitted->value);
+    return fmt::format("PSNR {:.3f} dB{}  SSIM {:.5f}", psnr, beside, ssim);
+}
+
 void print_figures(const Evaluation& evaluation, const MetricArguments& arguments) {
+    const auto others = [](std::vector<Figure> figures) {
+        std::erase_if(figures, [](const Figure& figure) { return figure.name == kFittedMetric; });
+        return figures;
+    };
     std::vector<FigureRow> rows;
-    for (const EvalFrame& frame : evaluation.frames) rows.push_back({frame.name, frame.figures});
-    rows.push_back({"mean", evaluation.figures});
+    for (const EvalFrame& frame : evaluation.frames) rows.push_back({frame.name, others(frame.figures)});
+    rows.push_back({"mean", others(evaluation.figures)});
     fmt::print("{}{}", figure_table(rows), lpips_note(evaluation.figures, arguments.lpips_weights));
 }
 
@@ -85,7 +97,7 @@ int run(const EvalArguments& arguments) {
         depths = train::evaluate_depths(device, gaussians, dataset, frames, options, before_frame);
     progress.clear();
     for (const EvalFrame& frame : evaluation.frames)
-        fmt::print("{}  PSNR {:.3f} dB  SSIM {:.5f}\n", core::one_line(frame.name), frame.psnr, frame.ssim);
+        fmt::print("{}  {}\n", core::one_line(frame.name), line_of(frame.psnr, frame.ssim, frame.figures));
     if (dataset.missing_images > 0)
         fmt::print("{} missing and skipped\n", core::counted(uint64_t(dataset.missing_images), "image"));
     if (refined.used)
@@ -95,9 +107,9 @@ int run(const EvalArguments& arguments) {
         fmt::print("no figures: every pixel of {} ({}) is masked\n", core::counted(frames.size(), "frame"),
                    arguments.split);
     else
-        fmt::print("mean of {} ({})  PSNR {:.3f} dB  SSIM {:.5f}  in {:.2f} s\n",
-                   core::counted(evaluation.frames.size(), "frame"), arguments.split, evaluation.psnr,
-                   evaluation.ssim, evaluation.seconds);
+        fmt::print("mean of {} ({})  {}  in {:.2f} s\n", core::counted(evaluation.frames.size(), "frame"),
+                   arguments.split, line_of(evaluation.psnr, evaluation.ssim, evaluation.figures),
+                   evaluation.seconds);
     print_figures(evaluation, arguments.metrics);
     if (depths) fmt::print("{}", depth_table(*depths));
     if (!arguments.json.empty()) {
@@ -118,6 +130,7 @@ Action add_eval(CLI::App& app) {
         ->capture_default_str();
     add_test_every_option(app, arguments->test_every);
     add_appearance_options(app, arguments->appearance);
+    arguments->metrics.fitted = true;
     add_metric_options(app, arguments->metrics);
     add_protocol_option(app, arguments->metrics);
     app.add_flag("--depth", arguments->depth,

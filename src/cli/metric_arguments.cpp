@@ -58,6 +58,7 @@ Measures MetricArguments::measures() const {
         result.protocol = Protocol::inria;
         if (list.empty()) list = "lpips_vgg";
     }
+    if (fitted && protocol == "ewa") list.append(list.empty() ? "" : ",").append(kFittedMetric);
     if (lpips_weights.empty() && core::lower(metrics).find("lpips") != std::string::npos)
         throw InputError(
             "--metrics " + metrics +

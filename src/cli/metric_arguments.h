@@ -13,10 +13,14 @@
 
 namespace ewa::cli {
 
+/// The metric beside the plain PSNR where a photo's exposure is not known.
+inline constexpr const char* kFittedMetric = "fitted_psnr";
+
 struct MetricArguments {
     std::string metrics;  // a list; empty: those of the protocol
     std::filesystem::path lpips_weights;
     std::string protocol = "ewa";
+    bool fitted = false;  // kFittedMetric is measured, too, unless the protocol is another program's
 
     /// Throws InputError, also if the file of weights cannot be read.
     Measures measures() const;

@@ -122,6 +122,28 @@ Image affine_corrected(const Image& a, const Image& b, const Image& weights) {
     return image_of(colors, a);
 }
 
+Image affine_fitted(const Image& a, const Image& b, const Image& weights) {
+    compared_channels(a, b);
+    weight_sum(weights, a);  // refuses weights of another size
+    std::vector<Color> colors = colors_of(a);
+    const std::vector<Color> reference = colors_of(b);
+    for (size_t c = 0; c < 3; ++c) {
+        NormalEquations equations;
+        const auto terms_at = [&](size_t i) {
+            Terms terms{};
+            terms[0] = colors[i][c];
+            terms[1] = 1;
+            return terms;
+        };
+        for (size_t i = 0; i < colors.size(); ++i)
+            equations.add(terms_at(i), reference[i][c],
+                          weights.pixels.empty() ? 1.0 : double(weights.pixels[i]));
+        const Terms map = equations.solution();
+        for (size_t i = 0; i < colors.size(); ++i) colors[i][c] = map_color(map, terms_at(i));
+    }
+    return image_of(colors, a);
+}
+
 Image quadratic_corrected(const Image& a, const Image& b, const Image& weights) {
     constexpr int kRounds = 5;
     constexpr double kMargin = 0.5 / 255;

@@ -42,6 +42,7 @@ const std::vector<Metric>& all_metrics() {
         {"psnr", "PSNR, dB", 3},
         {"ssim", "SSIM", 5},
         {"ssim_valid", "SSIM without pixels whose window leaves the image", 5},
+        {"fitted_psnr", "PSNR after an affine fit of the colours to the reference, dB", 3},
         {"cc_psnr", "PSNR after an affine correction of colours (gsplat), dB", 3},
         {"cc_ssim", "SSIM after it", 5},
         {"cc2_psnr", "PSNR after a quadratic correction of colours (multinerf), dB", 3},
@@ -105,13 +106,15 @@ std::vector<Figure> Meter::measure(const Image& image, const Image& reference, c
         return std::any_of(names_.begin(), names_.end(),
                            [&](const auto& name) { return name.starts_with(prefix); });
     };
-    Image affine, quadratic;
+    Image fitted, affine, quadratic;
+    if (asked("fitted_")) fitted = image::affine_fitted(image, reference, weights);
     if (asked("cc_")) affine = image::affine_corrected(image, reference, weights);
     if (asked("cc2_")) quadratic = image::quadratic_corrected(image, reference, weights);
     std::array<double, image::kBands> bands{};
     if (asked("psnr_")) bands = image::band_psnr(image, reference, weights);
     const auto value_of = [&](const std::string& name) {
         if (name == "ssim_valid") return image::ssim_valid(image, reference, weights);
+        if (name == "fitted_psnr") return psnr(fitted, reference, weights);
         if (name == "cc_psnr") return psnr(affine, reference, weights);
         if (name == "cc_ssim") return ssim(affine, reference, weights);
         if (name == "cc2_psnr") return psnr(quadratic, reference, weights);

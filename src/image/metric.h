@@ -35,6 +35,8 @@ double blur_effect(const Image& image);
 /// Per channel, the inverse of the affine map that takes b to a in the least-squares sense, applied to a (gsplat's
 /// color_correct_affine).
 Image affine_corrected(const Image& a, const Image& b, const Image& weights);
+/// Per channel, the affine map of a that comes closest to b in the least-squares sense.
+Image affine_fitted(const Image& a, const Image& b, const Image& weights);
 /// Five rounds of the quadratic map of a's colours that comes closest to b in the least-squares sense, without pixels that are
 /// saturated (multinerf's color_correct).
 Image quadratic_corrected(const Image& a, const Image& b, const Image& weights);

@@ -41,8 +41,8 @@ TEST_F(Metrics, AreNotMeasuredUnlessAskedFor) {
     const Outcome plain = eval({});
     expect_success(plain);
     EXPECT_EQ(std::count(plain.out.begin(), plain.out.end(), '\n'), 5) << plain.out;
-    EXPECT_EQ(keys_of(json()), (std::set<std::string>{"psnr", "ssim", "frames", "seconds"}));
-    EXPECT_EQ(keys_of(json()["frames"][0]), (std::set<std::string>{"name", "psnr", "ssim"}));
+    EXPECT_EQ(keys_of(json()), (std::set<std::string>{"psnr", "ssim", "fitted_psnr", "frames", "seconds"}));
+    EXPECT_EQ(keys_of(json()["frames"][0]), (std::set<std::string>{"name", "psnr", "ssim", "fitted_psnr"}));
 }
 
 TEST_F(Metrics, FollowTheLinesOfPsnrAndSsim) {

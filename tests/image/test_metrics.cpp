@@ -4,6 +4,7 @@
 #include "ewa/metrics.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <random>
@@ -93,6 +94,33 @@ TEST(Metrics, ColourCorrectionUndoesAnAffineChange) {
     for (const Figure& figure :
          Meter({"cc_psnr", "cc_ssim", "cc2_psnr", "cc2_ssim"}).measure(image, reference))
         EXPECT_GT(figure.value, figure.name.ends_with("psnr") ? 90 : 0.99999) << figure.name;
+}
+
+/// A render that knows little is fitted to nearly the mean of the reference, and never farther from it than before.
+TEST(Metrics, ColoursFittedToTheReferenceAreNotWorse) {
+    const Image reference = grain(40, 30, 3, 7), other = grain(40, 30, 3, 8);
+    Image mean = reference, changed = reference, weights(40, 30, 1);
+    std::array<double, 3> sums{};
+    for (size_t i = 0; i < reference.pixels.size(); ++i)
+        sums[i % 3] += double(reference.pixels[i]) / (40 * 30);
+    for (size_t i = 0; i < reference.pixels.size(); ++i) {
+        mean.pixels[i] = float(sums[i % 3]);
+        changed.pixels[i] = 0.6f * reference.pixels[i] + 0.1f * float(i % 3);
+    }
+    const auto fitted = [&](const Image& image, const Image& by = {}) {
+        return Meter({"fitted_psnr"}).measure(image, reference, by)[0].value;
+    };
+    EXPECT_GT(fitted(changed), 90);
+    EXPECT_GE(fitted(other), psnr(other, reference));
+    EXPECT_NEAR(fitted(other), psnr(mean, reference), 0.5);
+    EXPECT_NEAR(fitted(mean), psnr(mean, reference), 1e-6);
+    // What has no weight is not fitted.
+    for (int y = 0; y < 30; ++y)
+        for (int x = 0; x < 40; ++x) {
+            *weights.at(x, y) = x < 20 ? 1 : 0;
+            if (x >= 20) std::copy_n(other.at(x, y), 3, changed.at(x, y));
+        }
+    EXPECT_GT(fitted(changed, weights), 90);
 }
 
 TEST(Metrics, OfSmallImagesAreNotComputedWhereTheWindowDoesNotFit) {
