@@ -44,7 +44,7 @@ bool keeps_order(const Camera& lens) {
 }
 
 /// Whether nearly all points that the photo shows are in front of it.
-bool looks_at_its_points(const SparseModel& model, const SparseImage& image, size_t& observations) {
+bool looks_at_its_points(const SparseModel& model, const SparseImage& image) {
     const Camera camera = camera_of(model, image);
     size_t all = 0, front = 0;
     for (const SparseFeature& feature : image.features) {
@@ -53,7 +53,6 @@ bool looks_at_its_points(const SparseModel& model, const SparseImage& image, siz
         ++all;
         if ((camera.rotation * point->second.position + camera.translation).z > 0) ++front;
     }
-    observations += all;
     return double(front) >= kInFront * double(all);
 }
 
@@ -80,19 +79,24 @@ Grade grade_of(const SparseModel& model, const std::map<std::string, double>& ex
         ++grade.placed;
         const auto known = expected.find(image.name);
         std::string fault = lens_fault(camera_of(model, image), known == expected.end() ? 0 : known->second);
-        if (!looks_at_its_points(model, image, grade.observations) && fault.empty())
-            fault = "points are behind the camera";
+        if (!looks_at_its_points(model, image) && fault.empty()) fault = "points are behind the camera";
         if (fault.empty())
             ++grade.sound;
         else
             grade.faults[image.name] = fault;
     }
+    double errors = 0, observations = 0;
+    for (const auto& [id, point] : model.points) {
+        errors += point.error * double(point.track.size());
+        observations += double(point.track.size());
+    }
+    if (observations > 0) grade.error = errors / observations;
     return grade;
 }
 
 bool is_better(const Grade& first, const Grade& second) {
-    return std::tie(first.sound, first.placed, first.observations) >
-           std::tie(second.sound, second.placed, second.observations);
+    return std::tie(first.sound, first.placed, second.contradictions, second.error) >
+           std::tie(second.sound, second.placed, first.contradictions, first.error);
 }
 
 bool is_enough(const Grade& grade, size_t photos) {

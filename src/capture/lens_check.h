@@ -16,18 +16,20 @@ std::string lens_fault(const Camera& lens, double expected);
 
 /// What a model is worth.
 struct Grade {
-    int placed = 0;           // photos
-    int sound = 0;            // of them: no fault of the lens, points in front of the camera
-    size_t observations = 0;  // of points
+    int placed = 0;             // photos
+    int sound = 0;              // of them: no fault of the lens, points in front of the camera
+    size_t contradictions = 0;  // pairs of photos whose matches do not fit their cameras
+    double error = 0;           // of the points, px, the mean over their observations
     std::map<std::string, std::string> faults{};  // of the others, by name
 
     bool is_sound() const { return placed > 0 && sound == placed; }
 };
 
-/// expected: focal lengths by EXIF by the photos' names, px.
+/// Without contradictions, which the model does not know. expected: focal lengths by EXIF by the photos' names, px.
 Grade grade_of(const SparseModel& model, const std::map<std::string, double>& expected);
 
-/// Whether the first model is worth more: it has more sound photos, else more photos, else more observations.
+/// Whether the first model is worth more: it has more sound photos, else more photos, else fewer contradictions, else a smaller
+/// error. More observations say nothing: those of a photo in a wrong place count, too.
 bool is_better(const Grade& first, const Grade& second);
 
 /// Whether so many photos are so many that no other way is tried.

@@ -121,9 +121,16 @@ fs::path Mapping::database_for(const Way& way) const {
 
 Placing Mapping::placed_in(const Way& way, const fs::path& folder) const {
     Placing placing{.way = way, .models = models_in(folder)};
-    if (!placing.models.empty())
-        placing.grade = grade_of(read_sparse(placing.models.front().folder), expected_);
+    if (!placing.models.empty()) placing.grade = grade_in(placing.models.front().folder);
     return placing;
+}
+
+Grade Mapping::grade_in(const fs::path& model) const {
+    const SparseModel read = read_sparse(model);
+    Grade grade = grade_of(read, expected_);
+    const FeatureDatabase database(work_ / "database.db");
+    if (!views_ && database.is_known()) grade.contradictions = contradictions_in(read, database).size();
+    return grade;
 }
 
 void Mapping::map(const Way& way, const fs::path& folder, const std::vector<std::string>& more) const {
@@ -243,7 +250,7 @@ void Mapping::join(Placing& placing) const {
             colmap_.run({"colmap", "point_filtering", "--input_path", argument(joined), "--output_path",
                          argument(filtered)},
                         now, nothing);
-            const Grade grade = grade_of(read_sparse(filtered), expected_);
+            const Grade grade = grade_in(filtered);
             if (!is_better(grade, placing.grade)) continue;
             fs::remove_all(largest);
             fs::rename(filtered, largest);
@@ -271,21 +278,15 @@ void Mapping::extend(Placing& placing) const {
         return;  // the model is one without them
     }
     if (!core::is_file(extended / "images.bin")) return;
-    Placing more{.way = {.name = "with fewer matches"}, .grade = grade_of(read_sparse(extended), expected_)};
+    Placing more{.way = {.name = "with fewer matches"}, .grade = grade_in(extended)};
     more.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     say(more);
-    if (more.grade.sound <= placing.grade.sound || contradicts_more(extended, largest)) return;
+    const bool worse = more.grade.contradictions > placing.grade.contradictions;
+    if (more.grade.sound <= placing.grade.sound || worse) return;
     fs::remove_all(largest);
     fs::rename(extended, largest);
     placing.grade = more.grade;
     placing.models.front().images = uint64_t(more.grade.placed);
-}
-
-bool Mapping::contradicts_more(const fs::path& model, const fs::path& before) const {
-    const FeatureDatabase database(work_ / "database.db");
-    if (!database.is_known()) return false;
-    return contradictions_in(read_sparse(model), database).size() >
-           contradictions_in(read_sparse(before), database).size();
 }
 
 }  // namespace ewa::capture

@@ -82,8 +82,8 @@ class Mapping {
     std::filesystem::path database_for(const Way& way) const;
     /// Runs the mapper with these words, too.
     void map(const Way& way, const std::filesystem::path& folder, const std::vector<std::string>& more) const;
-    /// Whether more matches contradict the cameras of the model than those of another.
-    bool contradicts_more(const std::filesystem::path& model, const std::filesystem::path& before) const;
+    /// Grades a model, also by the matches in the database.
+    Grade grade_in(const std::filesystem::path& model) const;
     void keep(Placing& best, Placing& tried, const std::filesystem::path& folder) const;
 
     const Colmap& colmap_;

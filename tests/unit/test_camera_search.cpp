@@ -100,7 +100,8 @@ TEST(LensCheck, NamesWhatNoLensHas) {
 TEST(LensCheck, CountsPhotosThatCanBeRight) {
     SparseModel model = photographed({});
     EXPECT_EQ(capture::grade_of(model, {}).sound, 12);
-    EXPECT_EQ(capture::grade_of(model, {}).observations, 3600u);
+    for (auto& [id, point] : model.points) point.error = id % 2 == 0 ? 0.5 : 1;
+    EXPECT_DOUBLE_EQ(capture::grade_of(model, {}).error, 0.75);
     const Grade far = capture::grade_of(model, {{"p11.jpg", 300.0}});
     EXPECT_EQ(far.placed, 12);
     EXPECT_EQ(far.sound, 11);
@@ -111,14 +112,16 @@ TEST(LensCheck, CountsPhotosThatCanBeRight) {
 
 /// A wrong model of all photos loses against a sound one of most.
 TEST(LensCheck, SoundPhotosCountFirst) {
-    const Grade wrong{.placed = 30, .sound = 0, .observations = 9000},
-        right{.placed = 24, .sound = 24, .observations = 4000},
-        more{.placed = 25, .sound = 24, .observations = 1},
-        dense{.placed = 24, .sound = 24, .observations = 4001};
+    const Grade wrong{.placed = 30, .sound = 0, .error = 0.1},
+        right{.placed = 24, .sound = 24, .contradictions = 1, .error = 0.6},
+        more{.placed = 25, .sound = 24, .contradictions = 2, .error = 1},
+        consistent{.placed = 24, .sound = 24, .error = 0.9},
+        exact{.placed = 24, .sound = 24, .contradictions = 1, .error = 0.5};
     EXPECT_TRUE(is_better(right, wrong));
     EXPECT_FALSE(is_better(wrong, right));
     EXPECT_TRUE(is_better(more, right));
-    EXPECT_TRUE(is_better(dense, right));
+    EXPECT_TRUE(is_better(consistent, exact));
+    EXPECT_TRUE(is_better(exact, right));
     EXPECT_FALSE(is_better(right, right));
     EXPECT_TRUE(is_enough(right, 30));
     EXPECT_FALSE(is_enough(right, 31));
