@@ -48,6 +48,7 @@ LoadedDataset read_dataset(const fs::path& path, const AskedDataset& asked) {
     return with_files([&] {
         const std::optional<live::Run> run = live::run_named(path);
         LoadedDataset opened{nullptr, fs::absolute(path), options_of(asked, run), test_every_of(run)};
+        if (run) opened.background = core::parse_colour(run->text("background")).value_or(opened.background);
         const fs::path named = run ? live::dataset_of(*run) : path;
         opened.archived = is_archive(named);
         auto kept = std::make_shared<KeptDataset>();

@@ -5,6 +5,7 @@
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/variant.h>
 
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -26,6 +27,7 @@ struct LoadedDataset {
     DatasetOptions options;
     int test_every = 0;     // every which frame is held out
     bool archived = false;  // `dataset` then keeps what was unpacked
+    std::array<float, 3> background{};  // of the run that `path` is; else black
 };
 
 /// What of DatasetOptions is given. The rest is that of a run, or as usual.

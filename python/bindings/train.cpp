@@ -372,7 +372,10 @@ Evaluation evaluate_splats(const ObjectOrPath<Splats>& given_splats,
     if (chosen.empty()) throw InputError("frames is empty: there is nothing to evaluate");
     RenderOptions options =
         look_of({antialias, std::move(kernel), integrator, samples, points, nearest}, *splats);
-    use_background(options, background);
+    if (background.is_none())
+        options.background = dataset->background;
+    else
+        use_background(options, background);
     Gaussians fitted;
     const Gaussians& gaussians = fitted_to(options.kernel, *splats, fitted);
     const DeviceWork work;
@@ -536,19 +539,19 @@ void bind_train(nb::module_& module) {
     module.attr("_value_words") = value_words();
     module.def("evaluate", evaluate_splats, "splats"_a, "dataset"_a, "frames"_a = nb::none(), nb::kw_only(),
                "metrics"_a = nb::tuple(), "lpips_weights"_a = nb::none(),
-               "background"_a = nb::make_tuple(0, 0, 0), "antialias"_a = nb::none(), "kernel"_a = nb::none(),
+               "background"_a = nb::none(), "antialias"_a = nb::none(), "kernel"_a = nb::none(),
                "integrator"_a = "splat", "samples"_a = nb::none(), "points"_a = false,
                "nearest"_a = nb::none(),
                nb::sig("def evaluate(splats: " EWA_SPLATS_TYPE ", dataset: " EWA_DATASET_TYPE
                        ", frames: collections.abc.Sequence[int] | None = None, *, "
                        "metrics: str | collections.abc.Sequence[str] = (), "
                        "lpips_weights: str | os.PathLike[str] | None = None, background: "
-                       "numpy.typing.ArrayLike | str = (0, 0, 0), " EWA_LOOK_TYPES ") "
+                       "numpy.typing.ArrayLike | str | None = None, " EWA_LOOK_TYPES ") "
                        "-> Evaluation"),
                "Renders frames and compares each with its image: every eighth frame unless given, those that "
                "Trainer leaves "
                "out. metrics: names of docs/figures.md that are measured beside PSNR and SSIM; \"all\" names "
-               "all. Ctrl-C ends it.");
+               "all. background: that of the run that dataset is, else black, unless given. Ctrl-C ends it.");
 }
 
 }  // namespace ewa::python

@@ -234,7 +234,6 @@ nb::dict argument_names() {
 RunOptions usual_options() {
     RunOptions usual;
     usual.train.appearance = AppearanceModel::none;
-    usual.automatic_background = false;
     return usual;
 }
 
