@@ -19,6 +19,7 @@ SHARED = pathlib.Path(os.environ.get("EWA_SHARED", PROJECT.parent / "shared")) /
 SCENES, RENDERED = PROJECT / "scenes", PROJECT / "build/quality/datasets"
 DATASETS = ("fox_270", "fox_540", "tea_table", "railing", "plaster")
 STRATEGIES = ("default", "adc", "mcmc", "none")
+SCRIPT = "quality"  # of scripts/bench; captures.py sets its own
 ONLY = "ewa"  # the side of all runs without --before; with it, sides are before and after
 WRONG_USE = 2  # exit status of ewa, and of this script
 NOT_KEPT = ("checkpoint.ewa", "times.json", "splats.ply")  # a run of a million splats has a gigabyte of them
@@ -34,7 +35,7 @@ def say(text):
 
 
 def stop(text, status=WRONG_USE):
-    print(f"quality: {text}", file=sys.stderr)
+    print(f"{SCRIPT}: {text}", file=sys.stderr)
     sys.exit(status)
 
 
@@ -62,7 +63,7 @@ def strategy(text):
 
 class Parser(argparse.ArgumentParser):
     def error(self, message):
-        stop(f"{message} (see scripts/bench quality --help)")
+        stop(f"{message} (see scripts/bench {SCRIPT} --help)")
 
 
 def parse(words):

@@ -25,8 +25,8 @@ struct LoadedDataset {
     std::filesystem::path
         path;  // absolute; it and the options below load the dataset again in another process
     DatasetOptions options;
-    int test_every = 0;     // every which frame is held out
-    bool archived = false;  // `dataset` then keeps what was unpacked
+    int test_every = 0;                 // every which frame is held out
+    bool archived = false;              // `dataset` then keeps what was unpacked
     std::array<float, 3> background{};  // of the run that `path` is; else black
 };
 

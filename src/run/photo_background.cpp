@@ -48,7 +48,8 @@ std::optional<std::array<float, 3>> mean_colour(const Dataset& dataset, const st
     for (size_t k = 0; k < count; ++k)
         read.push_back(&dataset.frames[size_t(frames[k * frames.size() / count])]);
     std::vector<Sum> sums(count);
-    core::on_all_cores(count, [&](size_t k) { sums[k] = sum_of(*read[k]); }, scene::images_at_once(read));
+    core::on_all_cores(
+        count, [&](size_t k) { sums[k] = sum_of(*read[k]); }, scene::images_at_once(read));
     Sum all;
     for (const Sum& sum : sums) {
         all.transparent |= sum.transparent;
