@@ -5,7 +5,8 @@
 // the outputs. It writes the parameters or the moments of what the splat becomes, side by side in the old order.
 // A kept splat and a clone's original keep their moments; new splats start with zero moments. Children of a split are
 // drawn from the parent's Gaussian and are SPLIT_SCALE times smaller. With revised opacity, two children in one place
-// are together as opaque as the parent: 1 - (1 - o)^(1/2) (Rota Bulo et al. 2024, eq. 9).
+// are together as opaque as the parent: 1 - (1 - o)^(1/2) (Rota Bulo et al. 2024, eq. 9). An even split puts them side by
+// side along the longest axis, and a clone and its original share the opacity.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"
@@ -41,12 +42,22 @@ void main() {
         const bool keeps_moments = child == 0u && action != ACTION_SPLIT;
         vec3 mean = p0.xyz, log_scale = p2.xyz;
         float logit = p0.w;
-        if (action == ACTION_SPLIT) {
+        const bool even = push.split == SPLIT_EVEN;
+        if (even && action == ACTION_CLONE) logit = thinned_logit(logit, 0.5);
+        if (even && action == ACTION_SPLIT) {
+            float norm;
+            const float longest = max(p2.x, max(p2.y, p2.z));
+            const uint axis = p2.x == longest ? 0u : p2.y == longest ? 1u : 2u;
+            const float side = child == 0u ? float(EVEN_OFFSET) : -float(EVEN_OFFSET);
+            mean += side * exp(longest) * rotation_of(normalize_quaternion(p1, norm))[axis];
+            log_scale[axis] += log(float(EVEN_SCALE));
+            logit = thinned_logit(logit, float(EVEN_SHARE));
+        } else if (action == ACTION_SPLIT) {
             float norm;
             const vec3 normal = normal3(uvec4(push.first + i, 2u * push.step + child, push.seed[0], push.seed[1]));
             mean += rotation_of(normalize_quaternion(p1, norm)) * (exp(p2.xyz) * normal);
             log_scale -= log(float(SPLIT_SCALE));
-            if (push.revised_opacity != 0u) logit = halved_logit(logit);
+            if (push.split == SPLIT_REVISED) logit = halved_logit(logit);
         }
         [[unroll]] for (uint plane = 0; plane < PLANES; ++plane) {
             const uint from = param_texel(PLANES, plane, i);

@@ -603,8 +603,8 @@ struct DensifyPush {
     float prune_scale;    // world units; a larger splat is pruned; 0: none is
     uint seed[2];
     uint step;
-    uint first;            // number of the first splat, among those of all ranks
-    uint revised_opacity;  // 1: a split's two children in one place are together as opaque as their parent
+    uint first;  // number of the first splat, among those of all ranks
+    uint split;  // SPLIT_*
     float
         region[6];  // low corner, then high corner: a splat whose mean is outside is neither cloned nor split
 };

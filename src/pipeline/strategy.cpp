@@ -45,7 +45,7 @@ shared::DensifyPush densify_push(const Model& model, const FrameBuffers& frame, 
                              .seed = {uint32_t(rules.seed), uint32_t(rules.seed >> 32)},
                              .step = rules.step,
                              .first = model.first,
-                             .revised_opacity = rules.revised_opacity ? 1u : 0u,
+                             .split = rules.split,
                              .region = {}};
     std::ranges::copy(rules.region, push.region);
     return push;

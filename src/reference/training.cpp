@@ -158,6 +158,25 @@ Splat split_child(const Splat& parent, const glm::dvec3& normal, bool revised_op
     return child;
 }
 
+Splat thinned(Splat splat, double share) {
+    // The thickness is -ln(1 - opacity).
+    const double thickness =
+        share * (std::max(splat.opacity_logit, 0.0) + std::log1p(std::exp(-std::abs(splat.opacity_logit))));
+    splat.opacity_logit = std::log(-std::expm1(-thickness)) + thickness;
+    return splat;
+}
+
+Splat even_child(const Splat& parent, bool forward) {
+    Splat child = thinned(parent, EVEN_SHARE);
+    int axis = 0;
+    for (int k = 1; k < 3; ++k)
+        if (parent.log_scale[k] > parent.log_scale[axis]) axis = k;
+    const double length = EVEN_OFFSET * std::exp(parent.log_scale[axis]);
+    child.mean += (forward ? length : -length) * rotation_of(parent)[axis];
+    child.log_scale[axis] += std::log(EVEN_SCALE);
+    return child;
+}
+
 Densified densify(const Values& values, std::span<const Decision> decisions,
                   std::span<const glm::dvec3> normals) {
     assert(decisions.size() == values.size());

@@ -94,6 +94,12 @@ std::vector<Decision> decide(const Values& values, const DensifyStatistics& stat
 /// opacity)^(1/2) (Rota Bulo et al. 2024, "Revising densification", eq. 9).
 Splat split_child(const Splat& parent, const glm::dvec3& normal, bool revised_opacity = false);
 
+/// The splat with opacity 1 - (1 - opacity)^share: 1 / share of them in one place let through as much as it.
+Splat thinned(Splat splat, double share);
+/// A child of an even split: EVEN_OFFSET standard deviations along the longest axis of the parent, forward or back, and EVEN_SCALE times
+/// as long there. Two of them have the parent's second moment and optical thickness. The first of equal axes counts as the longest.
+Splat even_child(const Splat& parent, bool forward);
+
 struct Densified {
     Values values;  // kept splats in index order, then the clones, then the children pair by pair
     std::vector<uint32_t> source;  // the old index of each

@@ -26,6 +26,8 @@ constexpr int kLeastRefinements = 6;     // of adc, unless they would last for m
 constexpr int kLeastRelocateEvery = 25;  // a relocated splat has time to fade or to stay
 constexpr int kLeastResetEvery = 1000;
 constexpr int kLeastShEvery = 50;
+// Longer runs have opacity resets, or time to recover from splits that change the picture: docs/training.md#short-runs.
+constexpr int kLongestEvenRun = 1000;
 // Share of the steps in which the rate of the poses rises from 0: the first splats say little of the cameras.
 constexpr double kPoseWarmUp = 0.1;
 // With few training images: how often each is seen by a run whose rates fade, and the rates' last factor.
@@ -214,6 +216,7 @@ Schedule schedule_for(const TrainOptions& options, size_t photos) {
     s.relocate_every = scaled(options.refine_every, std::min(options.refine_every, kLeastRelocateEvery));
     s.growth = std::pow(options.growth, std::max(1.0, s.relocate_every / (share * options.refine_every)));
     s.copy_spread = (1 - share) * options.copy_spread;
+    s.even_splits = options.steps <= kLongestEvenRun && !options.revised_opacity && !options.render.points;
     if (options.opacity_reset_every > 0 && !options.render.points)
         s.opacity_reset_every =
             scaled(options.opacity_reset_every, std::min(options.opacity_reset_every, kLeastResetEvery));

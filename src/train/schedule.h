@@ -31,6 +31,7 @@ struct Schedule {
     int relocate_stop = 0, relocate_every = 0;                // steps, of MCMC
     double growth = 1;       // of MCMC at each refinement, so that the whole run grows as much as a full run
     double copy_spread = 0;  // of MCMC
+    bool even_splits = false;     // of adc: the picture stays as it was when splats are added
     int opacity_reset_every = 0;  // 0: never
     int prune_step = 0;  // with TrainOptions::final_splats: the step after which splats are removed; 0: never
     int sh_degree_every = 0;

@@ -100,12 +100,16 @@ Expected expected_of(const Start& start, const DensifyRules& rules) {
     };
     for (size_t i = 0; i < old.size(); ++i) {
         const reference::Splat splat = read_splat(old, i);
-        if (decisions[i] == Decision::keep || decisions[i] == Decision::clone) add(splat, i, false);
-        if (decisions[i] == Decision::clone) add(splat, i, true);
+        const bool even = rules.split == shared::SPLIT_EVEN;
+        if (decisions[i] == Decision::keep) add(splat, i, false);
+        for (const bool fresh : {false, true})
+            if (decisions[i] == Decision::clone) add(even ? thinned(splat, 0.5) : splat, i, fresh);
         for (uint32_t child = 0; decisions[i] == Decision::split && child < 2; ++child) {
             const auto n = core::normal3(
                 {uint32_t(i), 2 * rules.step + child, uint32_t(rules.seed), uint32_t(rules.seed >> 32)});
-            add(split_child(splat, {n[0], n[1], n[2]}, rules.revised_opacity), i, true);
+            add(even ? even_child(splat, child == 0)
+                     : split_child(splat, {n[0], n[1], n[2]}, rules.split == shared::SPLIT_REVISED),
+                i, true);
         }
     }
     out.values.sh_degree = old.sh_degree;
@@ -125,15 +129,16 @@ pipeline::Refinement run_densify(pipeline::Model& model, const DensifyRules& rul
 struct DensifyCase {
     size_t splats;
     int degree;
-    bool revised_opacity = false, region = false;
+    uint32_t split = shared::SPLIT_DRAWN;
+    bool region = false;
 };
 class Densify : public testing::TestWithParam<DensifyCase> {};
 
 TEST_P(Densify, WritesTheReferencesNextGeneration) {
-    const auto [splats, degree, revised, region] = GetParam();
+    const auto [splats, degree, split, region] = GetParam();
     Start start(2000 + splats, splats, degree);
     DensifyRules rules = rules_for(1u << 20);
-    rules.revised_opacity = revised;
+    rules.split = split;
     if (region) rules.region = middle_region(start.gaussians);
     const Expected expected = expected_of(start, rules);
     const auto result = run_densify(start.model, rules);
@@ -152,7 +157,7 @@ TEST_P(Densify, WritesTheReferencesNextGeneration) {
     near(actual.means, expected.values.means, 2e-6);  // of split children: float32 sine and logarithm
     near(actual.log_scales, expected.values.log_scales, 2e-7);  // one subtraction
     near(actual.quaternions, expected.values.quaternions, 0);   // copied
-    near(actual.opacity_logits, expected.values.opacity_logits, revised ? 1e-6 : 0);
+    near(actual.opacity_logits, expected.values.opacity_logits, split == shared::SPLIT_DRAWN ? 0 : 2e-6);
     near(actual.sh, expected.values.sh, 0);
 
     // Moments go with what is kept and are zero for what is new, texel by texel.
@@ -172,8 +177,9 @@ TEST_P(Densify, WritesTheReferencesNextGeneration) {
 
 INSTANTIATE_TEST_SUITE_P(Sizes, Densify,
                          testing::Values(DensifyCase{3, 0}, DensifyCase{1500, 0}, DensifyCase{777, 1},
-                                         DensifyCase{300, 3}, DensifyCase{1500, 0, true},
-                                         DensifyCase{1500, 1, false, true}));
+                                         DensifyCase{300, 3}, DensifyCase{1500, 0, shared::SPLIT_REVISED},
+                                         DensifyCase{1500, 0, shared::SPLIT_EVEN},
+                                         DensifyCase{1500, 1, shared::SPLIT_DRAWN, true}));
 
 /// The kernel that writes, on its own: nothing past its capacity.
 TEST(DensifyEdges, WritesNothingPastItsCapacity) {

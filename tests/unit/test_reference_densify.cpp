@@ -6,6 +6,8 @@
 
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/matrix.hpp>
 
 #include "reference/projection.h"
 #include "support/random_scene.h"
@@ -133,6 +135,47 @@ TEST(ReferenceDensify, TwoChildrenOfRevisedOpacityLetThroughWhatTheirParentDid) 
         const double through = 1 / (1 + std::exp(child.opacity_logit));
         EXPECT_NEAR(through * through * (1 + std::exp(logit)), 1, 1e-12) << logit;
         EXPECT_LT(child.opacity_logit, logit);
+    }
+}
+
+TEST(ReferenceDensify, ThinnedSplatsLetThroughTogetherWhatOneDid) {
+    for (const double logit : {-12.0, -2.0, 0.0, 3.0, 12.0}) {
+        Splat parent = make(0.5, 0.5);
+        parent.opacity_logit = logit;
+        for (const int parts : {1, 2, 5}) {
+            const double through = 1 / (1 + std::exp(thinned(parent, 1.0 / parts).opacity_logit));
+            EXPECT_NEAR(std::pow(through, parts) * (1 + std::exp(logit)), 1, 1e-11) << logit << " " << parts;
+        }
+    }
+}
+
+/// The children have the parent's mean, second moment and, as faint splats, its opacity times its volume.
+TEST(ReferenceDensify, AnEvenSplitKeepsTheMoments) {
+    const Camera camera = test::random_camera(1);
+    const Values values = test::random_gaussians(3, 20, test::SplatKind::ordinary, camera, 0);
+    for (size_t i = 0; i < 20; ++i) {
+        Splat parent = read_splat(values, i);
+        parent.opacity_logit = -9;
+        const Splat children[] = {even_child(parent, true), even_child(parent, false)};
+        const auto covariance = [](const Splat& splat) {
+            const glm::dmat3 axes = glm::mat3_cast(glm::normalize(glm::dquat(
+                splat.quaternion[0], splat.quaternion[1], splat.quaternion[2], splat.quaternion[3])));
+            glm::dmat3 scaled = axes;
+            for (int k = 0; k < 3; ++k) scaled[k] *= std::exp(splat.log_scale[k]);
+            return scaled * glm::transpose(scaled);
+        };
+        const auto mass = [](const Splat& splat) {
+            return std::exp(splat.log_scale.x + splat.log_scale.y + splat.log_scale.z) /
+                   (1 + std::exp(-splat.opacity_logit));
+        };
+        EXPECT_NEAR(mass(children[0]) + mass(children[1]), mass(parent), 1e-4 * mass(parent));
+        EXPECT_NEAR(glm::length(0.5 * (children[0].mean + children[1].mean) - parent.mean), 0, 1e-12);
+        const glm::dvec3 off = children[0].mean - parent.mean;
+        EXPECT_GT(glm::length(off), 0);
+        const glm::dmat3 both = covariance(children[0]) + glm::outerProduct(off, off),
+                         one = covariance(parent);
+        for (int c = 0; c < 3; ++c)
+            for (int r = 0; r < 3; ++r) EXPECT_NEAR(both[c][r], one[c][r], 1e-12);
     }
 }
 
