@@ -101,6 +101,9 @@ TEST(Background, OfPhotosIsTheirMeanColour) {
     options.train.render.points = true;
     EXPECT_EQ(config_of(opaque, options, folder / "o")["background"], "0,0,0");
     options = {};
+    options.train.refine_poses = true;
+    EXPECT_EQ(config_of(opaque, options, folder / "o")["background"], "0,0,0");
+    options = {};
     options.train.render.background = {1, 1, 0};
     EXPECT_EQ(config_of(opaque, options, folder / "o")["background"], "1,1,0");
     options = {};
