@@ -182,7 +182,8 @@ HEADINGS = ("capture", "placed", "search, s", "turned: median, largest", "doubts
 
 
 def markdown(options, rows):
-    text = (f"{options.steps:,} steps, `--downscale {options.downscale}`, {len(options.seeds)} seeds"
+    seeds = f"{len(options.seeds)} seeds" if len(options.seeds) > 1 else f"seed {options.seeds[0]}"
+    text = (f"{options.steps:,} steps, `--downscale {options.downscale}`, {seeds}"
             f"{''.join(' ' + word for word in options.more)}\n\n")
     text += "| " + " | ".join(HEADINGS) + " |\n|" + "---|" * len(HEADINGS) + "\n"
     return text + "".join("| " + " | ".join(row) + " |\n" for row in rows)
