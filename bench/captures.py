@@ -19,7 +19,7 @@ quality.SCRIPT = "captures"
 PICTURES = {".jpg", ".jpeg", ".png", ".heic", ".tif", ".tiff", ".bmp"}
 TURNED = 10  # degrees, from which a camera is wrong
 
-Run = collections.namedtuple("Run", "psnr best best_step fitted ssim splats seconds train background")
+Run = collections.namedtuple("Run", "psnr best best_step fitted ssim splats seconds train chosen")
 
 
 def parse(words):
@@ -126,7 +126,8 @@ def search(photos, folder, options):
         result["failure"] = lines[-1] if lines else f"status {status}"
     elif (reference := photos.parent / "reference_cameras.json").exists():
         result["turned"] = turned_from(read_json(reference), rotations_of(work / "sparse/0"))
-    write_file(found, json.dumps(result, indent=2) + "\n")
+    if status == 0:  # a search that failed is tried again
+        write_file(found, json.dumps(result, indent=2) + "\n")
     return result
 
 
@@ -173,7 +174,7 @@ def row_of(name, found, runs, peers):
     cells += [shown(mean(runs, "seconds"), ".0f"), shown(mean(runs, "psnr"), ".2f"), shown(deviation, ".2f"),
               f"{best.best:.2f} at {best.best_step:,}" if best else "-", shown(mean(runs, "fitted"), ".2f"),
               shown(mean(runs, "train"), ".2f"), shown(mean(runs, "ssim"), ".3f"), shown(mean(runs, "splats"), ",.0f"),
-              runs[0].background if runs else found.get("failure", "-")]
+              runs[0].chosen if runs else found.get("failure", "-")]
     return cells + [", ".join(f"{program} {psnr:.2f}" for program, psnr in peers.get(name, {}).items()) or "-"]
 
 

@@ -126,6 +126,9 @@ class Captures(unittest.TestCase):
         self.assertEqual(self.rows()["blind"]["placed"], "0 of 4")
         self.assertEqual(self.rows()["blind"]["chosen"], "ewa cameras: COLMAP could not place the photos")
         self.assertEqual(self.rows()["turned"]["PSNR, dB"], "21.00")
+        self.called()
+        self.run_script("--seeds", "1")
+        self.assertEqual(self.called(), ["cameras blind"])
 
     def test_wrong_words_end_it(self):
         for words, text in ((("--only", "lef"), "there is no capture lef"), (("--peers", self.folder / "none"), "No such file"),
