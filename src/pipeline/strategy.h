@@ -49,8 +49,8 @@ struct DensifyRules {
     float grow_gradient = 0;  // threshold of the mean gradient norm
     float split_scale = 0;    // world units
     float prune_logit = 0;
-    float prune_scale = 0;  // world units; 0: scale does not prune
-    uint32_t split = shared::SPLIT_DRAWN;
+    float prune_scale = 0;                 // world units; 0: scale does not prune
+    uint32_t split = shared::SPLIT_DRAWN;  // SPLIT_*: what a clone and a split leave
     uint64_t seed = 0;
     uint32_t step = 0;
     uint32_t max_splats = 0;  // hard cap: the threshold is raised until the next generation fits
