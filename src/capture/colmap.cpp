@@ -148,9 +148,9 @@ void extract_features(const Colmap& colmap, const Photos& photos, const Panorama
                    });
         before += int(group.photos.size());
     }
-    if (FeatureDatabase database(work / "database.db");
-        photos.names.size() <= kSameEachTime && database.is_known() && database.has_plain_images()) {
-        database.number_by_name();
+    if (FeatureDatabase database(work / "database.db"); database.is_known() && database.has_plain_images()) {
+        database.clear_unwritten_descriptors();
+        if (photos.names.size() <= kSameEachTime) database.number_by_name();
         database.commit();
     }
     part.mark();

@@ -17,6 +17,9 @@ namespace {
 constexpr std::int64_t kMostImages = 2147483647;  // a pair's number is made with it
 constexpr int kUndefined = 0;                     // the configuration of a pair without a geometry
 constexpr int kWait = 10000;                      // ms, for another program that uses the file
+// Of a feature's scale. VLFeat describes none in the last row of its octave, nor beyond: up to 1.5 of the octave's pixels, and one more
+// where the image has an odd size. The octave's pixel is the scale divided by 1.6 at most.
+constexpr float kBorder = 2.5f / 1.6f;
 
 struct Pair {
     std::int64_t number = 0;
@@ -44,7 +47,8 @@ class FeatureDatabase::Statement {
         check(sqlite3_bind_int64(statement_.get(), place, value) == SQLITE_OK);
         return *this;
     }
-    Statement& bind(int place, std::span<const std::uint32_t> values) {
+    template <class T>
+    Statement& bind(int place, std::span<const T> values) {
         check(sqlite3_bind_blob64(statement_.get(), place, values.data(), values.size_bytes(),
                                   SQLITE_TRANSIENT) == SQLITE_OK);
         return *this;
@@ -127,26 +131,55 @@ Descriptors FeatureDatabase::descriptors(std::int64_t image) const {
     return {values.begin(), values.end()};
 }
 
+std::vector<FeatureDatabase::Feature> FeatureDatabase::features(std::int64_t image, size_t count) const {
+    std::vector<Feature> features(count);
+    const std::scoped_lock lock(mutex_);
+    Statement row(*this, "SELECT rows, cols, data FROM keypoints WHERE image_id = ?");
+    if (!row.bind(1, image).step()) return features;
+    const auto values = row.array<float>();
+    const auto columns = size_t(row.integer(1));
+    row.check(values.size() == count * columns, "an image has other keypoints than descriptors");
+    // A keypoint is x, y and nothing, or scale and angle, or a 2x2 matrix by rows.
+    for (size_t i = 0; i < count && columns >= 2; ++i) {
+        const std::span<const float> at = values.subspan(i * columns, columns);
+        features[i] = {at[0], at[1], columns < 4 ? 0 : columns < 6 ? at[2] : std::hypot(at[2], at[4])};
+    }
+    return features;
+}
+
+void FeatureDatabase::clear_unwritten_descriptors() {
+    for (const auto& [name, image] : images()) {
+        const Descriptors all = descriptors(image);
+        std::vector<std::uint8_t> written(all.begin(), all.end());
+        if (all.empty()) continue;
+        const std::vector<Feature> found = features(image, all.size() / kDescriptorSize);
+        const std::scoped_lock lock(mutex_);
+        Statement size(*this,
+                       "SELECT width, height FROM images JOIN cameras USING (camera_id) WHERE image_id = ?");
+        if (!size.bind(1, image).step()) continue;
+        bool changed = false;
+        for (size_t i = 0; i < found.size(); ++i) {
+            const float border = kBorder * found[i].scale;
+            if (found[i].x < float(size.integer(0)) - border && found[i].y < float(size.integer(1)) - border)
+                continue;
+            std::fill_n(written.begin() + std::ptrdiff_t(i * kDescriptorSize), kDescriptorSize, 0);
+            changed = true;
+        }
+        if (!changed) continue;
+        Statement(*this, "UPDATE descriptors SET data = ?2 WHERE image_id = ?1")
+            .bind(1, image)
+            .bind(2, std::span<const std::uint8_t>(written))
+            .step();
+    }
+}
+
 Descriptors FeatureDatabase::prominent(std::int64_t image, size_t most) const {
     const Descriptors all = descriptors(image);
     const size_t count = all.size() / kDescriptorSize;
-    std::vector<float> scales(count, 0.0f);
-    {
-        const std::scoped_lock lock(mutex_);
-        Statement row(*this, "SELECT rows, cols, data FROM keypoints WHERE image_id = ?");
-        if (row.bind(1, image).step()) {
-            const auto values = row.array<float>();
-            const auto columns = size_t(row.integer(1));
-            row.check(values.size() == count * columns, "an image has other keypoints than descriptors");
-            // A keypoint is x, y and nothing, or scale and angle, or a 2x2 matrix by rows.
-            for (size_t i = 0; i < count && columns >= 4; ++i)
-                scales[i] = columns < 6 ? values[i * columns + 2]
-                                        : std::hypot(values[i * columns + 2], values[i * columns + 4]);
-        }
-    }
+    const std::vector<Feature> found = features(image, count);
     std::vector<size_t> order(count);
     std::iota(order.begin(), order.end(), size_t(0));
-    std::ranges::stable_sort(order, [&](size_t a, size_t b) { return scales[a] > scales[b]; });
+    std::ranges::stable_sort(order, [&](size_t a, size_t b) { return found[a].scale > found[b].scale; });
     Descriptors largest;
     for (size_t i = 0; i < std::min(most, count); ++i) {
         const auto from = all.begin() + std::ptrdiff_t(order[i] * kDescriptorSize);
@@ -177,7 +210,7 @@ void FeatureDatabase::write(std::int64_t first, std::int64_t second,
     Statement(*this, "INSERT OR REPLACE INTO matches (pair_id, rows, cols, data) VALUES (?, ?, 2, ?)")
         .bind(1, pair.number)
         .bind(2, std::int64_t(matches.size()))
-        .bind(3, places)
+        .bind(3, std::span<const std::uint32_t>(places))
         .step();
 }
 

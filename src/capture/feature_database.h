@@ -30,6 +30,9 @@ class FeatureDatabase {
     std::map<std::string, std::int64_t> images() const;
     /// The descriptors of an image, in the order of its features; empty if it has none.
     Descriptors descriptors(std::int64_t image) const;
+    /// Sets to zero the descriptors of features so near the right or the lower border that VLFeat writes none. COLMAP keeps what
+    /// its memory had in their place, which another search has not. Zeros match nothing. Only with plain images.
+    void clear_unwritten_descriptors();
     /// Those of the features with the largest scales, at most so many.
     Descriptors prominent(std::int64_t image, size_t most) const;
 
@@ -64,6 +67,12 @@ class FeatureDatabase {
 
   private:
     class Statement;
+    /// px, with the image's corner at 0. scale: of the Gaussian in which COLMAP has found it; 0: not known.
+    struct Feature {
+        float x = 0, y = 0, scale = 0;
+    };
+    /// Of an image with so many descriptors.
+    std::vector<Feature> features(std::int64_t image, size_t count) const;
     std::int64_t count(const char* sql) const;
     void execute(const char* sql) const;
 

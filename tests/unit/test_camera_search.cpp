@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
+#include <array>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 #include <random>
@@ -347,6 +348,40 @@ TEST(DatabaseOfPhotos, NumbersThemByNameAndPartsTheirLenses) {
               (std::map<std::string, double>{{"a.jpg", 800}, {"c.jpg", 800}}));
     database.remove_descriptors();
     EXPECT_TRUE(database.descriptors(3).empty());
+}
+
+TEST(DatabaseOfPhotos, ClearsDescriptorsThatWereNeverWritten) {
+    const TempFolder folder;
+    const std::string file = folder / "database.db";
+    write_shared_camera(file);
+    // x, y and the columns of a turned scale of 2: inside, at the lower border, at the right one.
+    const std::array<float, 18> features{790, 590, 0, -2,    2,   0, 100, 597.5, 0,
+                                         -2,  2,   0, 797.5, 300, 2, 0,   0,     2};
+    sqlite3* database = nullptr;
+    ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
+    sqlite3_stmt* row = nullptr;
+    ASSERT_EQ(
+        sqlite3_prepare_v2(database, "UPDATE keypoints SET rows = 3, cols = 6, data = ? WHERE image_id = 1",
+                           -1, &row, nullptr),
+        SQLITE_OK);
+    sqlite3_bind_blob(row, 1, features.data(), sizeof(features), SQLITE_TRANSIENT);
+    ASSERT_EQ(sqlite3_step(row), SQLITE_DONE);
+    sqlite3_finalize(row);
+    ASSERT_EQ(sqlite3_prepare_v2(database, "UPDATE descriptors SET rows = 3, data = ? WHERE image_id = 1", -1,
+                                 &row, nullptr),
+              SQLITE_OK);
+    const std::vector<std::uint8_t> values(3 * capture::kDescriptorSize, 7);
+    sqlite3_bind_blob(row, 1, values.data(), int(values.size()), SQLITE_TRANSIENT);
+    ASSERT_EQ(sqlite3_step(row), SQLITE_DONE);
+    sqlite3_finalize(row);
+    sqlite3_close(database);
+
+    capture::FeatureDatabase found(file);
+    found.clear_unwritten_descriptors();
+    const capture::Descriptors cleared = found.descriptors(1);
+    ASSERT_EQ(cleared.size(), values.size());
+    for (size_t i = 0; i < cleared.size(); ++i)
+        EXPECT_EQ(cleared[i], i < capture::kDescriptorSize ? 7 : 0) << i;
 }
 
 }  // namespace
