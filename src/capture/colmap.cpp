@@ -303,34 +303,46 @@ Way read_way(const fs::path& file) {
     return way;
 }
 
-/// The pairs of photos that have been compared by looks alone, of which one has no camera.
+/// Whether it takes little time to compare all photos.
+bool are_few(const Photos& photos) {
+    return photos.names.size() * (photos.names.size() - 1) / 2 <= kSamePairs;
+}
+
+/// The pairs of photos that may have been compared by looks alone: those with a photo that has no camera. All of few photos where not
+/// enough are placed, since weak matches steady the cameras that hold the others.
 Comparison other_pairs(const Photos& photos, const Placing& placing) {
+    const size_t count = photos.names.size();
+    const bool all = !is_enough(placing.grade, count) && are_few(photos);
     std::set<std::string> placed;
-    if (!placing.models.empty())
+    if (!placing.models.empty() && !all)
         for (const auto& [id, image] : read_sparse(placing.models.front().folder).images)
             placed.insert(image.name);
     Comparison others;
-    for (const ImagePair& pair : pairs_of(int(photos.names.size()), Pairing::all))
+    for (const ImagePair& pair : pairs_of(int(count), Pairing::all))
         if (!placed.contains(photos.names[size_t(pair.first)].string()) ||
             !placed.contains(photos.names[size_t(pair.second)].string()))
             others.pairs.push_back(pair);
     return others;
 }
 
-/// Places the photos by the first comparisons, then by those that seemed needless if these left some out.
+/// Places the photos by the first comparisons, then by those that seemed needless if these left some out. Where these take little
+/// time, they come before other ways.
 Placing place_by_matches(const Colmap& colmap, const Mapping& mapping, const Photos& photos, bool views,
                          const fs::path& work, const ProgressFunction& progress) {
     const double seconds = Part(work / "features.done").seconds() + Part(work / "matches.done").seconds();
     // Models from before a search was interrupted in the other comparisons.
     const fs::path before = work / "models_by_look";
     const bool resumed = core::is_folder(before);
-    Placing placing =
-        resumed ? mapping.placed_in(read_way(before / "way"), before) : mapping.place_enough({}, seconds);
-    if (views || photos.pairing != Pairing::by_look || int(photos.names.size()) > kMostCompared)
-        return placing;
+    const bool by_look =
+        !views && photos.pairing == Pairing::by_look && int(photos.names.size()) <= kMostCompared;
+    Placing placing = resumed                      ? mapping.placed_in(read_way(before / "way"), before)
+                      : by_look && are_few(photos) ? mapping.place({}, work / "models")
+                                                   : mapping.place_enough({}, seconds);
+    if (!by_look) return placing;
     const Comparison others = other_pairs(photos, placing);
     if (others.pairs.empty()) return placing;
     if (!resumed) {
+        if (are_few(photos) && !is_enough(placing.grade, photos.names.size())) mapping.say(placing);
         write_way(work / "models" / "way", placing.way);
         fs::rename(work / "models", before);
     }
@@ -377,9 +389,12 @@ std::vector<std::string> complete(const Colmap& colmap, const Mapping& mapping, 
     refine_lens(colmap, model, mapping.expected(), work);
     const SparseModel found = read_sparse(model);
     const std::vector<Station> stations = stations_of(found);
+    std::vector<std::string> jumps;
+    for (const size_t at : jumps_among(stations, matches_along(stations, database)))
+        jumps.push_back(core::one_line(stations[at].name) + " to " + core::one_line(stations[at + 1].name));
     const std::vector<std::string> doubts =
         doubts_of(grade_of(found, mapping.expected()), contradictions_in(found, database),
-                  strays_among(stations), jumps_among(stations, matches_along(stations, database)));
+                  strays_among(stations), jumps);
     remarks.insert(remarks.end(), doubts.begin(), doubts.end());
     return remarks;
 }

@@ -156,15 +156,23 @@ std::vector<std::string> strays_among(const std::vector<Station>& stations) {
     return strays;
 }
 
-std::vector<std::string> jumps_among(const std::vector<Station>& stations,
-                                     const std::vector<size_t>& matches) {
+std::vector<size_t> jumps_among(const std::vector<Station>& stations, const std::vector<size_t>& matches) {
     const auto usual = usual_step(stations);
     if (!usual) return {};
-    std::vector<std::string> jumps;
+    std::vector<size_t> jumps;
     for (size_t i = 0; i + 1 < stations.size(); ++i)
         if (matches[i] >= kManyMatches && distance_by(*usual, stations[i], stations[i + 1]) > kFarStep)
-            jumps.push_back(core::one_line(stations[i].name) + " to " + core::one_line(stations[i + 1].name));
+            jumps.push_back(i);
     return jumps;
+}
+
+size_t parted_by(const std::vector<size_t>& jumps, size_t stations) {
+    size_t longest = 0, begin = 0;
+    for (const size_t jump : jumps) {
+        longest = std::max(longest, jump + 1 - begin);
+        begin = jump + 1;
+    }
+    return stations - std::max(longest, stations - begin);
 }
 
 std::vector<size_t> matches_along(const std::vector<Station>& stations, const FeatureDatabase& database) {

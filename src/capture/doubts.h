@@ -38,17 +38,18 @@ struct Station {
 /// each other are near each other as a rule. stations: in the order in which the photos were taken.
 std::vector<std::string> strays_among(const std::vector<Station>& stations);
 
-/// Pairs of photos that follow each other, have many matches, and are much farther apart or turned than others, where photos that
-/// follow each other are near each other as a rule. matches: of each station with the next one.
-std::vector<std::string> jumps_among(const std::vector<Station>& stations,
-                                     const std::vector<size_t>& matches);
+/// The photos, by their places, that have many matches with the next one, and are much farther from it or turned than others, where
+/// photos that follow each other are near each other as a rule. matches: of each station with the next one.
+std::vector<size_t> jumps_among(const std::vector<Station>& stations, const std::vector<size_t>& matches);
+/// Photos outside the longest part of a path of so many that no jump parts.
+size_t parted_by(const std::vector<size_t>& jumps, size_t stations);
 /// The verified matches of each station with the next one.
 std::vector<size_t> matches_along(const std::vector<Station>& stations, const FeatureDatabase& database);
 
 /// The stations of a model's photos in the order of names.
 std::vector<Station> stations_of(const SparseModel& model);
 
-/// Lines for the user about what is probably wrong. None: nothing is known to be.
+/// Lines for the user about what is probably wrong. None: nothing is known to be. jumps: texts with both photos.
 std::vector<std::string> doubts_of(const Grade& grade, const std::vector<Contradiction>& contradictions,
                                    const std::vector<std::string>& strays,
                                    const std::vector<std::string>& jumps);

@@ -71,7 +71,7 @@ class FeatureDatabase {
     struct Feature {
         float x = 0, y = 0, scale = 0;
     };
-    /// Of an image with so many descriptors.
+    /// The features of an image with `count` descriptors.
     std::vector<Feature> features(std::int64_t image, size_t count) const;
     std::int64_t count(const char* sql) const;
     void execute(const char* sql) const;

@@ -95,12 +95,12 @@ Grade grade_of(const SparseModel& model, const std::map<std::string, double>& ex
 }
 
 bool is_better(const Grade& first, const Grade& second) {
-    return std::tie(first.sound, first.placed, second.contradictions, second.error) >
-           std::tie(second.sound, second.placed, first.contradictions, first.error);
+    return std::tuple(first.credible(), first.placed, second.contradictions, second.error) >
+           std::tuple(second.credible(), second.placed, first.contradictions, first.error);
 }
 
 bool is_enough(const Grade& grade, size_t photos) {
-    return double(grade.sound) >= kEnough * double(photos);
+    return double(grade.credible()) >= kEnough * double(photos);
 }
 
 }  // namespace ewa::capture

@@ -34,6 +34,7 @@ constexpr std::array kMapping{"--Mapper.min_model_size",
                               "--Mapper.ba_local_max_num_iterations",
                               "15"};
 constexpr size_t kTriedAnyway = 2;  // ways that count on no time
+constexpr int kSeeds = 4;           // of random numbers that are tried
 constexpr int kFollowing = 10;      // photos, in the order of names, that are neighbours
 constexpr int kLeastJoining = 3;    // photos of two models that are joined
 // Of a photo with points, which the last photos need. COLMAP needs 30 of the others: with fewer, a wrong photo misplaces those after it.
@@ -129,7 +130,10 @@ Grade Mapping::grade_in(const fs::path& model) const {
     const SparseModel read = read_sparse(model);
     Grade grade = grade_of(read, expected_);
     const FeatureDatabase database(work_ / "database.db");
-    if (!views_ && database.is_known()) grade.contradictions = contradictions_in(read, database).size();
+    if (views_ || !database.is_known()) return grade;
+    grade.contradictions = contradictions_in(read, database).size();
+    const std::vector<Station> stations = stations_of(read);
+    grade.parted = int(parted_by(jumps_among(stations, matches_along(stations, database)), stations.size()));
     return grade;
 }
 
@@ -186,15 +190,36 @@ void Mapping::say(const Placing& placing) const {
     text += " in " + std::to_string(seconds) + " s";
     if (placing.grade.sound < placing.grade.placed)
         text += "; " + std::to_string(placing.grade.placed - placing.grade.sound) + " cannot be right";
+    if (placing.grade.parted > 0)
+        text += "; their path jumps, with " + std::to_string(placing.grade.parted) + " beyond";
     colmap_.say(text);
 }
 
-void Mapping::keep(Placing& best, Placing& tried, const fs::path& folder) const {
-    const fs::path kept = work_ / "models";
-    fs::remove_all(kept);
-    fs::rename(folder, kept);
-    tried.models = models_in(kept);
-    best = std::move(tried);
+double Mapping::try_way(Placing& best, const Way& way) const {
+    const fs::path folder = work_ / "models_tried", kept = work_ / "models";
+    double seconds = 0;
+    try {
+        Placing tried = place(way, folder);
+        seconds = tried.seconds;
+        say(tried);
+        if (is_better(tried.grade, best.grade)) {
+            fs::remove_all(kept);
+            fs::rename(folder, kept);
+            tried.models = models_in(kept);
+            best = std::move(tried);
+        }
+    } catch (const RunError&) {
+        // The log has its reason, and there are models without it.
+        if (best.models.empty()) throw;
+    }
+    fs::remove_all(folder);
+    return seconds;
+}
+
+std::string Mapping::seed_option() const {
+    for (const char* name : {"random_seed", "default_random_seed"})  // until COLMAP 3.11, and later
+        if (colmap_.has_option("mapper", name)) return std::string("--") + name;
+    return {};
 }
 
 Placing Mapping::place_enough(const Way& first, double seconds) const {
@@ -205,24 +230,19 @@ Placing Mapping::place_enough(const Way& first, double seconds) const {
     const double most = seconds + best.seconds;
     double taken = 0;
     size_t tries = 0;
+    const auto goes_on = [&] {
+        return !is_enough(best.grade, photos) && (tries++ < kTriedAnyway || taken < most);
+    };
     std::vector<Way> ways = other_ways(facts_);
     if (!is_same(first, {})) ways.insert(ways.begin(), Way{});
-    for (const Way& way : ways) {
-        if (is_same(first, way)) continue;
-        if (tries++ >= kTriedAnyway && taken >= most) break;
-        const fs::path folder = work_ / "models_tried";
-        try {
-            Placing tried = place(way, folder);
-            taken += tried.seconds;
-            say(tried);
-            if (is_better(tried.grade, best.grade)) keep(best, tried, folder);
-        } catch (const RunError&) {
-            // The log has its reason, and there are models without it.
-            if (best.models.empty()) throw;
-        }
-        fs::remove_all(folder);
-        if (is_enough(best.grade, photos)) break;
-    }
+    for (const Way& way : ways)
+        if (!is_same(first, way) && goes_on()) taken += try_way(best, way);
+    if (is_enough(best.grade, photos)) return best;
+    const std::string option = seed_option();
+    const Way way = best.way;
+    for (int seed = 1; !option.empty() && seed <= kSeeds && goes_on(); ++seed)
+        taken += try_way(best, with(way, {.name = "with random numbers of seed " + std::to_string(seed),
+                                          .words = {option, std::to_string(seed)}}));
     return best;
 }
 
@@ -282,7 +302,7 @@ void Mapping::extend(Placing& placing) const {
     more.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     say(more);
     const bool worse = more.grade.contradictions > placing.grade.contradictions;
-    if (more.grade.sound <= placing.grade.sound || worse) return;
+    if (more.grade.credible() <= placing.grade.credible() || worse) return;
     fs::remove_all(largest);
     fs::rename(extended, largest);
     placing.grade = more.grade;

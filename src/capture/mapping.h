@@ -64,8 +64,8 @@ class Mapping {
 
     /// By one way. The models are in `folder`. None where the mapper finds no pair of images to begin with.
     Placing place(const Way& way, const std::filesystem::path& folder) const;
-    /// By this way, then by the others until enough photos are placed. The models are in work/models. seconds: what the search
-    /// has taken before; all ways together take about as long.
+    /// By this way, then by the others until enough photos are placed, then by the best way with other random numbers. The models
+    /// are in work/models. seconds: what the search has taken before; all ways together take about as long.
     Placing place_enough(const Way& first, double seconds) const;
     /// Joins the largest model with others that share photos, where that is sound.
     void join(Placing& placing) const;
@@ -84,7 +84,10 @@ class Mapping {
     void map(const Way& way, const std::filesystem::path& folder, const std::vector<std::string>& more) const;
     /// Grades a model, also by the matches in the database.
     Grade grade_in(const std::filesystem::path& model) const;
-    void keep(Placing& best, Placing& tried, const std::filesystem::path& folder) const;
+    /// Tries a way, and keeps it if it is better. Returns the seconds that it took.
+    double try_way(Placing& best, const Way& way) const;
+    /// The option of COLMAP's mapper for the first of its random numbers; empty if it has none.
+    std::string seed_option() const;
 
     const Colmap& colmap_;
     const Photos& photos_;

@@ -117,12 +117,15 @@ TEST(LensCheck, SoundPhotosCountFirst) {
         right{.placed = 24, .sound = 24, .contradictions = 1, .error = 0.6},
         more{.placed = 25, .sound = 24, .contradictions = 2, .error = 1},
         consistent{.placed = 24, .sound = 24, .error = 0.9},
-        exact{.placed = 24, .sound = 24, .contradictions = 1, .error = 0.5};
+        exact{.placed = 24, .sound = 24, .contradictions = 1, .error = 0.5},
+        jumping{.placed = 26, .sound = 26, .parted = 3};
     EXPECT_TRUE(is_better(right, wrong));
     EXPECT_FALSE(is_better(wrong, right));
     EXPECT_TRUE(is_better(more, right));
     EXPECT_TRUE(is_better(consistent, exact));
     EXPECT_TRUE(is_better(exact, right));
+    EXPECT_TRUE(is_better(right, jumping));
+    EXPECT_FALSE(is_enough(jumping, 30));
     EXPECT_FALSE(is_better(right, right));
     EXPECT_TRUE(is_enough(right, 30));
     EXPECT_FALSE(is_enough(right, 31));
@@ -266,9 +269,13 @@ TEST(Doubts, NameJumpsBetweenPhotosThatMatch) {
     EXPECT_TRUE(capture::jumps_among(walk, matches).empty());
     for (size_t i = 8; i < walk.size(); ++i) walk[i].center.x += 2;
     for (size_t i = 4; i < walk.size(); ++i) walk[i].rotation = photo_at(0, 40).rotation;
-    EXPECT_EQ(capture::jumps_among(walk, matches), (std::vector<std::string>{"3 to 4", "7 to 8"}));
+    EXPECT_EQ(capture::jumps_among(walk, matches), (std::vector<size_t>{3, 7}));
     matches[7] = 10;
-    EXPECT_EQ(capture::jumps_among(walk, matches), std::vector<std::string>{"3 to 4"});
+    EXPECT_EQ(capture::jumps_among(walk, matches), std::vector<size_t>{3});
+    EXPECT_EQ(capture::parted_by({3}, 12), 4u);
+    EXPECT_EQ(capture::parted_by({3, 8}, 12), 7u);
+    EXPECT_EQ(capture::parted_by({9}, 12), 2u);
+    EXPECT_EQ(capture::parted_by({}, 12), 0u);
 }
 
 TEST(Doubts, AreLinesWithNames) {
