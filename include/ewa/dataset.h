@@ -62,6 +62,8 @@ struct Frame {
     std::optional<std::array<float, 3>> behind;
     /// Indices in Dataset::points of the points that the reconstruction saw in this image. Null: the dataset does not say.
     std::shared_ptr<const std::vector<uint32_t>> seen;
+    /// The median distance between these points' images and where the reconstruction saw them, px of the file. 0: not known.
+    float point_error = 0;
     Distortion distortion;  // of the file, which load_frame_image takes out; none with LensUse::native
     Camera pinhole;         // `camera` before downscaling
     int downscale = 1;      // factor that is applied to the file, which may be a smaller copy already
@@ -136,6 +138,23 @@ struct DatasetOptions {
 /// With a downscale factor K, images in images_K (beside images) are used as they are. In a folder that make_dataset has
 /// made, an image that is cut off or no image counts as missing. Throws InputError.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options);
+
+/// What holds a frame's camera: the points that the reconstruction saw in its image.
+struct CameraSupport {
+    size_t points = 0;
+    float error = 0;  // Frame::point_error
+    struct Neighbor {
+        int frame = 0;      // index into Dataset::frames
+        size_t points = 0;  // that both see
+    };
+    std::vector<Neighbor> neighbors;  // the frames that see most of the same points, the most first
+};
+/// That of each frame, with at most `most` neighbours each. Empty where the dataset does not say which frame sees which points.
+std::vector<CameraSupport> camera_support(const Dataset& dataset, size_t most = 3);
+/// "312 points, 0.42 px; most in common with b.jpg (120) and c.jpg (88)".
+std::string support_text(const Dataset& dataset, const CameraSupport& support);
+/// "b.jpg (120) and c.jpg (88)". Empty without neighbours.
+std::string neighbors_text(const Dataset& dataset, const CameraSupport& support);
 
 /// Throws InputError unless `frames` are indices into dataset.frames. Functions that take both call it.
 void check(const Dataset& dataset, const std::vector<int>& frames);

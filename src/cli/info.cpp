@@ -257,15 +257,52 @@ void print_cameras(const Dataset& dataset) {
     if (groups.size() > kShown) fmt::print("{:<16}and {} more\n", "", groups.size() - kShown);
 }
 
+Json support_json(const Dataset& dataset, const std::vector<CameraSupport>& supports) {
+    Json photos = Json::array();
+    for (size_t i = 0; i < supports.size(); ++i) {
+        Json neighbors = Json::array();
+        for (const auto& [frame, points] : supports[i].neighbors)
+            neighbors.push_back({{"name", dataset.frames[size_t(frame)].name}, {"points", points}});
+        photos.push_back({{"name", dataset.frames[i].name},
+                          {"points", supports[i].points},
+                          {"error", supports[i].error},
+                          {"neighbors", neighbors}});
+    }
+    return photos;
+}
+
+/// What holds the cameras: of all photos, else of those with the fewest points and the largest error.
+void print_support(const Dataset& dataset, const std::vector<CameraSupport>& supports, bool all) {
+    if (supports.empty()) return;
+    const auto print = [&](const char* title, size_t i) {
+        fmt::print("{:<16}{}: {}\n", title, core::one_line(dataset.frames[i].name),
+                   support_text(dataset, supports[i]));
+    };
+    if (all) {
+        for (size_t i = 0; i < supports.size(); ++i) print(i == 0 ? "photos" : "", i);
+        return;
+    }
+    const auto fewest = std::ranges::min_element(supports, {}, &CameraSupport::points),
+               worst = std::ranges::max_element(supports, {}, &CameraSupport::error);
+    print("fewest points", size_t(fewest - supports.begin()));
+    if (worst->error > 0) print("largest error", size_t(worst - supports.begin()));
+}
+
 /// named: what the user calls it.
-void info_dataset(const fs::path& path, const fs::path& named, int test_every, bool json) {
+void info_dataset(const fs::path& path, const fs::path& named, const InfoArguments& arguments) {
+    const int test_every = arguments.test_every;
     const Dataset dataset = load_cameras_as_trained(path, {.points = true});
     const Split split = split_frames(dataset, test_every);
     std::vector<int> every(dataset.frames.size());
     std::iota(every.begin(), every.end(), 0);
     const double extent = every.empty() ? 0 : scene_extent(dataset, every);
     const std::vector<std::string> warnings = warnings_of(dataset, split, every);
-    if (json) return print_json(dataset_json(dataset, split, extent, warnings));
+    const std::vector<CameraSupport> supports = camera_support(dataset);
+    if (arguments.json) {
+        Json json = dataset_json(dataset, split, extent, warnings);
+        json["photos"] = support_json(dataset, supports);
+        return print_json(json);
+    }
     fmt::print("{}\nkind            {}\n", core::one_line(named.string()), dataset.format);
     if (!dataset.program.empty()) fmt::print("program         {}\n", core::one_line(dataset.program));
     for (const std::string& note : dataset.notes) fmt::print("note            {}\n", core::one_line(note));
@@ -285,6 +322,7 @@ void info_dataset(const fs::path& path, const fs::path& named, int test_every, b
                dataset.dropped_points == 0
                    ? std::string()
                    : fmt::format(" ({} dropped: a coordinate is not finite)", dataset.dropped_points));
+    print_support(dataset, supports, arguments.verbose);
     if (!dataset.color_depends_on_view)
         fmt::print("colour          does not depend on the view: training skips SH degrees 1 to {}\n",
                    kMaxShDegree);
@@ -397,11 +435,9 @@ int run(const InfoArguments& arguments) {
         info_capture(path, arguments.json);
     else if (fs::is_directory(path) || (path.extension() == ".json" && !is_sog(path)) ||
              io::find_importer(path))
-        info_dataset(path, path, arguments.test_every, arguments.json);
+        info_dataset(path, path, arguments);
     else if (is_archive(path) && (archive_has_cameras(path) || !io::has_splats(io::ZipFiles(path))))
-        read_archive(path, [&](const fs::path& folder) {
-            info_dataset(folder, path, arguments.test_every, arguments.json);
-        });
+        read_archive(path, [&](const fs::path& folder) { info_dataset(folder, path, arguments); });
     else if (const std::string_view format = image_format(path); !format.empty())
         info_image(path, format, arguments.json);
     else if (is_mesh_scene(path))
@@ -427,7 +463,8 @@ Action add_info(CLI::App& app) {
         ->required();
     add_test_every_option(app, arguments->test_every);
     app.add_flag("--json", arguments->json, "Print JSON");
-    app.add_flag("--verbose", arguments->verbose, "Also print the work that rendering and training skip");
+    app.add_flag("--verbose", arguments->verbose,
+                 "Also print the work that rendering and training skip, and each photo of a dataset");
     return [arguments] { return run(*arguments); };
 }
 

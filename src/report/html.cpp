@@ -8,11 +8,14 @@
 
 #include "core/messages.h"
 #include "core/text.h"
+#include "core/typing.h"
 #include "report/chart.h"
 #include "report/page.h"
 
 namespace ewa::report {
 namespace {
+
+constexpr size_t kMostCameras = 500;  // in a table, which bounds the size of the file
 
 std::string figure(const std::string& value, const std::string& label) {
     return fmt::format("<div><b>{}</b><span>{}</span></div>", escape_html(value), escape_html(label));
@@ -95,6 +98,26 @@ std::string charts(const std::vector<MetricsLine>& metrics) {
     return html.empty() ? "" : "<h2>Training curves</h2>\n<div class=\"charts\">\n" + html + "</div>\n";
 }
 
+std::string cameras(const std::vector<CameraRow>& rows) {
+    if (rows.empty()) return "";
+    const size_t shown = std::min(rows.size(), kMostCameras);
+    std::string html = fmt::format(
+        "<details><summary><h2>Cameras</h2></summary>\n<p class=\"soft\">What the reconstruction says of {}, "
+        "the "
+        "largest error first{}. The error is the median distance between points and where they were "
+        "seen.</p>\n"
+        "<table><tr><th>photo</th><th class=\"number\">points</th><th class=\"number\">error, px</th>"
+        "<th>points in common with</th></tr>\n",
+        core::counted(rows.size(), "photo"),
+        shown < rows.size() ? fmt::format("; the first {} are shown", shown) : std::string());
+    for (size_t i = 0; i < shown; ++i)
+        html += fmt::format(
+            "<tr><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td><td>{}</td></tr>\n",
+            escape_html(rows[i].name), rows[i].points,
+            rows[i].error > 0 ? fmt::format("{:.2f}", rows[i].error) : "–", escape_html(rows[i].together));
+    return html + "</table></details>\n";
+}
+
 std::string plan(const std::vector<PlanLine>& lines) {
     if (lines.empty()) return "";
     std::string html =
@@ -130,7 +153,7 @@ std::string html_report(const ReportData& data) {
                                      left_out_html(data.left_out) + charts(data.metrics) +
                                      step_time_html(data.times, data.earlier_steps) +
                                      ranks_html(data.summary.ranks) + chunks_html(data.summary.chunks) +
-                                     data.section + plan(data.plan) + settings(data));
+                                     data.section + cameras(data.cameras) + plan(data.plan) + settings(data));
 }
 
 }  // namespace ewa::report

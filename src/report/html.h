@@ -12,6 +12,14 @@
 
 namespace ewa::report {
 
+/// What holds a photo's camera: CameraSupport.
+struct CameraRow {
+    std::string name;
+    size_t points = 0;
+    double error = 0;      // px; 0: not known
+    std::string together;  // the photos that see most of the same points
+};
+
 struct ReportData {
     std::string title;  // the dataset's name
     Summary summary;
@@ -24,6 +32,7 @@ struct ReportData {
     std::vector<std::pair<std::string, std::string>> settings;  // name, value
     std::vector<ReportView> views;                              // sorted
     std::vector<LeftOutView> left_out;                          // training images, the most first
+    std::vector<CameraRow> cameras;                             // the largest error first
     std::string section;                                        // HTML that the report contains as it is
     bool held_out = true;                                       // the views were not trained on
 };

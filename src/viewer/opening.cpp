@@ -217,6 +217,7 @@ OpenedScene open_scene(const fs::path& path, const fs::path& cameras, size_t bud
     } else {
         scene = open_splats(path, cameras, budget);
     }
+    if (scene.dataset) scene.supports = camera_support(*scene.dataset);
     scene.title = scene_title(path);
     scene.path = path;
     return scene;
@@ -231,6 +232,7 @@ bool is_dataset(const fs::path& path) {
 OpenedScene with_cameras(const OpenedScene& splats, const OpenedScene& cameras) {
     OpenedScene scene = splats;
     scene.dataset = cameras.dataset;
+    scene.supports = cameras.supports;
     scene.appearances.clear();
     scene.cameras = cameras.path;
     scene.remark = "with the cameras of ";

@@ -29,6 +29,7 @@ struct OpenedScene {
     int sh_degree = 0;                       // the highest that changes the image
     std::vector<PlanLine> plan;              // what rendering skips
     std::shared_ptr<const Dataset> dataset;  // null: no cameras
+    std::vector<CameraSupport> supports;     // of the dataset's frames; empty: not known
     std::filesystem::path run;               // folder of the run; empty: no run
     std::filesystem::path cameras;           // what gave the dataset, if not `path`
     /// Of the run's splats.ply.

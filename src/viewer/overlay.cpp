@@ -185,8 +185,10 @@ std::optional<int> draw_cameras(const CamerasShown& cameras) {
     list.PopClipRect();
     if (pointed) {
         const ImVec2 mouse = ImGui::GetIO().MousePos;
-        label(*ImGui::GetForegroundDrawList(), {mouse.x + 14, mouse.y + 10},
-              cameras.dataset.frames[size_t(*pointed)].name.c_str());
+        std::string text = cameras.dataset.frames[size_t(*pointed)].name;
+        if (!cameras.supports.empty())
+            text += "\n" + support_text(cameras.dataset, cameras.supports[size_t(*pointed)]);
+        label(*ImGui::GetForegroundDrawList(), {mouse.x + 14, mouse.y + 10}, text.c_str());
     }
     return pointed;
 }

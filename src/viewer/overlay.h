@@ -17,13 +17,14 @@ void draw_help(bool& open);
 
 struct CamerasShown {
     const Dataset& dataset;
-    const Camera& view;            // of the size of `place`
-    Rectangle place;               // of the render in the window, px
-    double size = 1;               // of a frustum, world units
-    std::optional<int> at_camera;  // this one is not drawn: it would frame the image
+    const std::vector<CameraSupport>& supports;  // of its frames; empty: not known
+    const Camera& view;                          // of the size of `place`
+    Rectangle place;                             // of the render in the window, px
+    double size = 1;                             // of a frustum, world units
+    std::optional<int> at_camera;                // this one is not drawn: it would frame the image
 };
 
-/// Draws the frustum of each camera. Returns the one under the pointer, which also shows its name.
+/// Draws the frustum of each camera. Returns the one under the pointer, which also shows its name and what holds it.
 std::optional<int> draw_cameras(const CamerasShown& cameras);
 
 /// Marks the points that are measured, with their distance. view: of the size of `place`.

@@ -14,6 +14,7 @@
 #include "capture/lens_refinement.h"
 #include "capture/mapping.h"
 #include "capture/sparse_model.h"
+#include "ewa/dataset.h"
 #include "scene/lens.h"
 #include "support/temp_folder.h"
 
@@ -259,6 +260,35 @@ TEST(Doubts, NameFramesFarFromTheirNeighbours) {
     std::vector<Station> shuffled;
     for (size_t i = 0; i < walk.size(); ++i) shuffled.push_back(walk[i * 5 % walk.size()]);
     EXPECT_TRUE(capture::strays_among(shuffled).empty());
+}
+
+/// The errors and neighbours that a reader of the dataset gets: p12 sees everything 3 px to the right, and p14 sees 100 points less.
+TEST(CameraSupports, AreThoseOfTheModel) {
+    const TempFolder folder;
+    SparseModel model = photographed({});
+    for (capture::SparseFeature& feature : model.images[2].features) feature.at.x += 3;
+    for (uint64_t k = 0; k < 100; ++k) {
+        model.images[4].features[k].point = capture::kNoPoint;
+        std::erase_if(model.points[k].track, [](const auto& entry) { return entry.first == 4; });
+    }
+    for (auto it = model.images.begin(); it != model.images.end();)
+        it = it->first > 4 ? model.images.erase(it) : ++it;
+    capture::write_sparse(model, folder / "sparse/0");
+    const Dataset dataset = load_dataset(folder.path(), {.need_images = false});
+    ASSERT_EQ(dataset.frames.size(), 4u);
+    const std::vector<CameraSupport> supports = camera_support(dataset, 2);
+    ASSERT_EQ(supports.size(), 4u);
+    EXPECT_NEAR(supports[0].error, 0, 1e-3);
+    EXPECT_NEAR(supports[1].error, 3, 1e-3);
+    EXPECT_EQ(supports[0].points, 300u);
+    EXPECT_EQ(supports[3].points, 200u);
+    ASSERT_EQ(supports[0].neighbors.size(), 2u);
+    EXPECT_EQ(supports[0].neighbors[0].frame, 1);
+    EXPECT_EQ(supports[0].neighbors[0].points, 300u);
+    EXPECT_EQ(supports[3].neighbors[0].points, 200u);
+    EXPECT_EQ(support_text(dataset, supports[1]),
+              "300 points, 3.00 px; most in common with p11.jpg (300) and p13.jpg (300)");
+    EXPECT_TRUE(camera_support(Dataset{}).empty());
 }
 
 /// Photos before and after a jump that have no matches are a walk with a gap.

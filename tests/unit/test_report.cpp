@@ -269,6 +269,21 @@ TEST(Report, ShowsMaskedPixelsOfTrainingImages) {
     EXPECT_EQ(left_out_html({}), "");
 }
 
+TEST(Report, ShowsWhatHoldsTheCameras) {
+    ReportData data;
+    EXPECT_EQ(html_report(data).find("<h2>Cameras</h2>"), std::string::npos);
+    data.cameras = {{"<a>.jpg", 312, 0.42, "b.jpg (88)"}, {"b.jpg", 88, 0, ""}};
+    const std::string html = html_report(data);
+    EXPECT_NE(html.find("<td>&lt;a&gt;.jpg</td><td class=\"number\">312</td><td class=\"number\">0.42</td>"
+                        "<td>b.jpg (88)</td>"),
+              std::string::npos);
+    EXPECT_NE(html.find("<td>b.jpg</td><td class=\"number\">88</td><td class=\"number\">–</td>"),
+              std::string::npos);
+    data.cameras.resize(600);
+    EXPECT_NE(html_report(data).find("600 photos, the largest error first; the first 500 are shown"),
+              std::string::npos);
+}
+
 TEST(Report, ViewsKeepTheFileSmallAndSaySo) {
     std::vector<ReportView> views(5, made_up_view("v.jpg", 20));
     const ReportView::Jpeg large(kSmallBytes / 2);

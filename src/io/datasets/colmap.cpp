@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <limits>
 #include <map>
 #include <string>
 #include <string_view>
@@ -18,7 +20,9 @@
 #include "io/datasets/colmap_lens.h"
 #include "io/datasets/image_records.h"
 #include "io/datasets/importers/image_finder.h"
+#include "scene/lens.h"
 #include "scene/native_lens.h"
+#include "scene/statistics.h"
 
 namespace ewa::io {
 
@@ -26,6 +30,11 @@ namespace {
 
 /// Throws InputError that names the position in the file.
 using Fail = std::function<void(const std::string&)>;
+
+/// An image that saw a point, by its id, and the number of the feature that shows it.
+struct TrackEntry {
+    uint32_t image = 0, feature = 0;
+};
 
 /// Collects a model and checks its ids. Errors go to the Fail of the file that is being read.
 class ColmapBuilder {
@@ -35,13 +44,19 @@ class ColmapBuilder {
     /// pose: qw qx qy qz tx ty tz, world to camera.
     void add_image(uint32_t id, const std::array<double, 7>& pose, uint32_t camera_id,
                    const std::string& name, const Fail& fail);
-    /// images: ids of those that saw the point. Others than the model's do not count. `where` is called for the first dropped point.
+    /// Where the image that was added last shows a point, as its feature of this number. In the order of the numbers.
+    void add_feature(uint32_t number, const glm::vec2& at) { features_.back().push_back({number, at}); }
+    /// track: ids of the images that saw the point, and the numbers of their features. Other images than the model's do not count.
+    /// `where` is called for the first dropped point.
     bool add_point(const glm::dvec3& position, const std::array<uint8_t, 3>& color,
-                   const std::vector<uint32_t>& images, const std::function<std::string()>& where) {
+                   const std::vector<TrackEntry>& track, const std::function<std::string()>& where) {
         if (!io::add_point(result_.points, result_.dropped, position, color, where)) return false;
-        for (const uint32_t id : images)
-            if (const auto image = image_of_.find(id); image != image_of_.end())
-                result_.images[image->second].seen.push_back(uint32_t(result_.points.positions.size() - 1));
+        for (const TrackEntry& entry : track) {
+            const auto image = image_of_.find(entry.image);
+            if (image == image_of_.end()) continue;
+            result_.images[image->second].seen.push_back(uint32_t(result_.points.positions.size() - 1));
+            add_error(image->second, entry.feature, position);
+        }
         return true;
     }
     /// The colours of all points, times the scale.
@@ -50,17 +65,44 @@ class ColmapBuilder {
             for (size_t k = 0; k < 3; ++k)
                 result_.points.colors[i][k] = uint8_t(std::lround(colors[i][k] * scale));
     }
-    ImageRecords take() { return std::move(result_); }
+    ImageRecords take() {
+        for (size_t i = 0; i < errors_.size(); ++i)
+            result_.images[i].point_error = scene::quantile(errors_[i], 0.5);
+        return std::move(result_);
+    }
 
   private:
+    struct Feature {
+        uint32_t number = 0;
+        glm::vec2 at{0};  // px
+    };
+    /// Adds how far the point's image is from the feature that shows it.
+    void add_error(size_t image, uint32_t feature, const glm::dvec3& position);
+
     struct CameraModel {
         Camera camera;
         Distortion distortion;
     };
     std::map<uint32_t, CameraModel> cameras_;
     std::map<uint32_t, size_t> image_of_;  // by id: of result_.images
+    // Of each image: the features that show points, and the errors of these, px. Empty where the file has none.
+    std::vector<std::vector<Feature>> features_;
+    std::vector<std::vector<float>> errors_;
     ImageRecords result_;
 };
+
+void ColmapBuilder::add_error(size_t image, uint32_t feature, const glm::dvec3& position) {
+    const auto found = std::ranges::lower_bound(features_[image], feature, {}, &Feature::number);
+    if (found == features_[image].end() || found->number != feature) return;
+    const ImageRecord& record = result_.images[image];
+    const Camera& camera = record.camera;
+    const glm::dvec3 seen = camera.rotation * position + camera.translation;
+    if (record.distortion.lens == Lens::equirectangular || !(seen.z > 0)) return;
+    const glm::dvec2 bent = scene::distort(record.distortion, {seen.x / seen.z, seen.y / seen.z});
+    const double error = glm::distance(
+        glm::dvec2(camera.fx * bent.x + camera.cx, camera.fy * bent.y + camera.cy), glm::dvec2(found->at));
+    if (std::isfinite(error)) errors_[image].push_back(float(error));
+}
 
 constexpr uint64_t kMaxSize = 1u << 20;  // px
 
@@ -116,6 +158,8 @@ void ColmapBuilder::add_image(uint32_t id, const std::array<double, 7>& pose, ui
     image.camera.translation = {pose[4], pose[5], pose[6]};
     image_of_.emplace(id, result_.images.size());
     result_.images.push_back(std::move(image));
+    features_.emplace_back();
+    errors_.emplace_back();
 }
 
 /// Gives the images their paths.
@@ -132,6 +176,7 @@ void find_images(const ImageFinder& finder, const std::string& where, ImageRecor
 }
 
 constexpr size_t kMaxName = 4096;
+constexpr uint64_t kNoPoint = std::numeric_limits<uint64_t>::max();  // of a feature that shows none
 // Bytes of the shortest entry of each list, and of each item that an entry counts.
 constexpr uint64_t kCameraBytes = 4 + 4 + 8 + 8 + 2 * 8, kImageBytes = 4 + 7 * 8 + 4 + 1 + 8;
 constexpr uint64_t kPointBytes = 8 + 3 * 8 + 3 + 8 + 8, kObservationBytes = 3 * 8, kTrackBytes = 2 * 4;
@@ -173,7 +218,11 @@ void read_binary_images(const std::filesystem::path& path, ColmapBuilder& builde
         const std::string name = reader.read_zero_terminated(kMaxName, "the name of an image");
         builder.add_image(id, pose, camera_id, name, fail);
         const uint64_t observations = read_count(reader, kObservationBytes, "observations");
-        reader.skip(observations * kObservationBytes, "observations");
+        for (uint64_t number = 0; number < observations; ++number) {
+            const auto x = reader.read<double>("an observation"), y = reader.read<double>("an observation");
+            if (reader.read<uint64_t>("an observation") != kNoPoint)
+                builder.add_feature(uint32_t(number), {x, y});
+        }
     }
 }
 
@@ -189,12 +238,12 @@ void read_binary_points(const std::filesystem::path& path, ColmapBuilder& builde
         for (uint8_t& channel : color) channel = reader.read<uint8_t>("a point");
         reader.skip(sizeof(double), "a point");  // its reprojection error
         const uint64_t track = read_count(reader, kTrackBytes, "entries of a track");
-        std::vector<uint32_t> images;
-        for (uint64_t entry = 0; entry < track; ++entry) {
-            images.push_back(reader.read<uint32_t>("a track"));
-            reader.skip(sizeof(uint32_t), "a track");  // which of the image's observations it is
+        std::vector<TrackEntry> entries(track);
+        for (TrackEntry& entry : entries) {
+            entry.image = reader.read<uint32_t>("a track");
+            entry.feature = reader.read<uint32_t>("a track");
         }
-        builder.add_point(position, color, images, [&] {
+        builder.add_point(position, color, entries, [&] {
             return core::one_line(path.string()) + ": the point at byte " + std::to_string(begin);
         });
     }
@@ -337,12 +386,10 @@ void read_text_points(const std::filesystem::path& path, ColmapBuilder& builder)
         }
         // Other programs write other tracks, or neither an error nor a track.
         if (!lines.rest().empty()) lines.value<double>("reprojection error");
-        std::vector<uint32_t> images;
-        while (const auto id = core::parse_integer<uint32_t>(lines.word())) {
-            images.push_back(*id);
-            lines.word();  // which of the image's observations it is
-        }
-        if (builder.add_point(position, {}, images, [&] { return lines.where(); })) colors.push_back(color);
+        std::vector<TrackEntry> track;
+        while (const auto id = core::parse_integer<uint32_t>(lines.word()))
+            track.push_back({*id, core::parse_integer<uint32_t>(lines.word()).value_or(0)});
+        if (builder.add_point(position, {}, track, [&] { return lines.where(); })) colors.push_back(color);
     }
     builder.set_colors(colors, !whole && largest <= 1 ? 255 : 1);
 }

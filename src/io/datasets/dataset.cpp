@@ -498,6 +498,7 @@ Dataset load_dataset(const std::filesystem::path& given, const DatasetOptions& o
         Frame& frame = dataset.frames.back();
         frame.depth_unit = image.depth_unit;
         if (!image.seen.empty()) frame.seen = std::make_shared<const std::vector<uint32_t>>(image.seen);
+        frame.point_error = image.point_error;
     }
     if (dataset.format == "COLMAP" || dataset.format == "transforms") note_photos_outside(dataset);
     note_corner(model, dataset.notes);

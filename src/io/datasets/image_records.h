@@ -26,6 +26,7 @@ struct ImageRecord {
     Distortion distortion;
     int split = 0;                 // Frame::split
     std::vector<uint32_t> seen{};  // Frame::seen; empty: the model does not say
+    float point_error = 0;         // Frame::point_error
 };
 
 /// Points that are skipped: float32, in which splats are stored, cannot hold a coordinate as a finite number.
