@@ -8,8 +8,12 @@
 #include <utility>
 
 #include "core/folders.h"
+#include "image/metric.h"
 #include "report/pictures.h"
 #include "report/views.h"
+#include "run/refined_cameras.h"
+#include "run/wrong_cameras.h"
+#include "scene/statistics.h"
 
 namespace ewa::train {
 namespace {
@@ -85,6 +89,7 @@ bool FinalEvaluation::evaluate(RunCameras& cameras, const RunFolder& folder) {
                       spread_out(scene_.appearances, kTrainViewsEvaluated), !held_out, {})
                 .psnr;
         if (!std::isnan(train_psnr)) report_.summary.train_psnr = train_psnr;
+        if (held_out && !cameras.refine()) check_test_cameras(train_psnr);
     });
     for (std::future<void>& saved : saving_) saved.get();
     if (!done) report_.views.clear();
@@ -98,6 +103,47 @@ void FinalEvaluation::evaluate_test_views() {
     if (of_test_views_->frames.empty()) return;  // no pixel counts
     report_.summary.test_psnr = of_test_views_->psnr;
     report_.summary.test_ssim = of_test_views_->ssim;
+}
+
+void FinalEvaluation::check_test_cameras(double train_psnr) {
+    std::vector<ViewFigure> views;
+    std::vector<double> usual;
+    for (const report::ReportView& view : report_.views) {
+        views.push_back({view.frame, view.psnr});
+        usual.push_back(view.psnr);
+    }
+    const auto fitted = [&](const Camera& camera, int index) {
+        const RenderedView view = rendered_through(camera, index);
+        return psnr(image::affine_fitted(view.rendering, view.photo, view.weights), view.photo, view.weights);
+    };
+    // Only views that stay far below with their colours fitted: an exposure is no fault of a camera.
+    for (const ViewFigure& view : far_below(views, train_psnr)) {
+        const auto listed = std::ranges::find(views, view.frame, &ViewFigure::frame);
+        listed->psnr = fitted(input_.dataset.frames[size_t(view.frame)].camera, view.frame);
+    }
+    std::vector<int> frames;
+    const std::vector<ViewFigure> low = far_below(views, train_psnr);
+    for (const ViewFigure& view : low) frames.push_back(view.frame);
+    if (frames.empty()) return;
+    const double extent = scene_extent(input_.dataset, input_.split.train);
+    const std::vector<CameraMotion> motions = align_cameras(scene_.device, scene_.gaussians, input_.dataset,
+                                                            frames, input_.options.train, extent, [&] {
+                                                                stop_if_asked(observer_);
+                                                                keep_waiting_();
+                                                            });
+    std::vector<DoubtfulView> doubtful;
+    for (size_t i = 0; i < frames.size(); ++i) {
+        const Frame& frame = input_.dataset.frames[size_t(frames[i])];
+        const Camera better = moved(frame.camera, motions[i]);
+        const CameraDistance distance = distance_between(frame.camera, better);
+        doubtful.push_back({.name = frame.name,
+                            .psnr = low[i].psnr,
+                            .moved_psnr = fitted(better, frames[i]),
+                            .degrees = distance.degrees,
+                            .share = distance.length / extent});
+    }
+    report_.remarks.push_back(wrong_cameras_text(doubtful, scene::quantile(usual, 0.5)));
+    observer_.on_note(report_.remarks.back());
 }
 
 /// shown: the report shows these views. They are the held-out ones, or the training views without a test set.
@@ -158,17 +204,21 @@ const NewViewAppearance& FinalEvaluation::of_new_views() {
     return *of_new_views_;
 }
 
+RenderedView FinalEvaluation::rendered_through(const Camera& camera, int index) {
+    const auto appearance = of_new_views().at(camera.position());
+    return with_photo(std::move(scene_.renderer.images(std::span(&camera, 1)).front()),
+                      input_.dataset.frames[size_t(index)], input_.options.train.render,
+                      appearance ? &*appearance : nullptr);
+}
+
 RenderedView FinalEvaluation::drawn_again(int index) {
     const std::vector<int>& train = input_.split.train;
     const auto place = std::find(train.begin(), train.end(), index);
     const bool known = !scene_.appearances.empty() && place != train.end();
+    if (!known) return rendered_through(input_.dataset.frames[size_t(index)].camera, index);
     const Frame& frame = input_.dataset.frames[size_t(index)];
-    const auto of_new_view = of_new_views().at(frame.camera.position());
     return with_photo(std::move(scene_.renderer.images(std::span(&frame.camera, 1)).front()), frame,
-                      input_.options.train.render,
-                      known         ? &scene_.appearances[size_t(place - train.begin())]
-                      : of_new_view ? &*of_new_view
-                                    : nullptr);
+                      input_.options.train.render, &scene_.appearances[size_t(place - train.begin())]);
 }
 
 /// Returns the bytes that it adds.

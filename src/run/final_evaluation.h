@@ -65,6 +65,10 @@ class FinalEvaluation {
   private:
     bool done_unless_stopped(const std::function<void()>& work) const;
     void evaluate_test_views();
+    /// Adds a remark on held-out views whose cameras may be wrong. train_psnr: of the training views.
+    void check_test_cameras(double train_psnr);
+    /// The image of a frame through a camera, and the render.
+    RenderedView rendered_through(const Camera& camera, int index);
     Evaluation evaluated(const std::vector<int>& frames, const std::vector<Appearance>& appearances,
                          bool shown, const Measures& measures);
     void add_view(int index, const RenderedView& view, const EvalFrame& figures);

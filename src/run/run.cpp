@@ -425,6 +425,7 @@ void Run::finish(std::unique_ptr<Trainer> trainer) {
     first_render_ = evaluation.first_render();
     fill_summary();
     if (options().robust) report_.left_out = train::left_out_views(input_);
+    report_.cameras = train::camera_rows(input_.dataset);
     report_.metrics = progress_.metrics;
     folder_.save_report(report_);
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run/run_cameras.h"
 
+#include <algorithm>
+#include <functional>
 #include <utility>
 
 #include "run/refined_cameras.h"
@@ -37,6 +39,18 @@ CameraMoves RunCameras::moves() const {
 
 void RunCameras::save(const RunFolder& folder, bool aligned) const {
     folder.save_cameras(input_.dataset, input_.split, given_, world_, extent_, aligned);
+}
+
+std::vector<report::CameraRow> camera_rows(const Dataset& dataset) {
+    std::vector<report::CameraRow> rows;
+    const std::vector<CameraSupport> supports = camera_support(dataset);
+    for (size_t i = 0; i < supports.size(); ++i)
+        rows.push_back({.name = dataset.frames[i].name,
+                        .points = supports[i].points,
+                        .error = supports[i].error,
+                        .together = neighbors_text(dataset, supports[i])});
+    std::ranges::stable_sort(rows, std::greater<>(), &report::CameraRow::error);
+    return rows;
 }
 
 }  // namespace ewa::train

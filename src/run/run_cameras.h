@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "report/html.h"
 #include "run/run_files.h"
 #include "run/run_input.h"
 
@@ -34,5 +35,8 @@ class RunCameras {
     Similarity world_;           // of the refined cameras
     double extent_ = 1;          // Trainer::extent
 };
+
+/// What the reconstruction says of each photo, for the report: the largest error first. Empty: nothing.
+std::vector<report::CameraRow> camera_rows(const Dataset& dataset);
 
 }  // namespace ewa::train

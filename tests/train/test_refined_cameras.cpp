@@ -15,6 +15,8 @@
 #include "io/datasets/image_records.h"
 #include "io/datasets/refined_cameras.h"
 #include "run/refined_cameras.h"
+#include "run/wrong_cameras.h"
+#include "support/temp_folder.h"
 #include "train/synthetic.h"
 
 namespace ewa::test {
@@ -211,25 +213,31 @@ TEST(RefinedCameras, HeldOutCamerasFollowTheTrainingCameras) {
     }
 }
 
-/// A dataset on disk with disturbed cameras: the run's files, its figures, and the model that is read back.
-TEST(RefinedCameras, ARunWritesThemAndAlignsWhatItHeldOut) {
-    const Dataset wrong = disturbed(small_capture().dataset);
-    TempFolder folder;
+/// A run in the folder, from the true splats, over the small capture's images with these cameras.
+RunOptions run_over(const Dataset& cameras, const TempFolder& folder) {
     std::vector<io::ImageRecord> records;
-    for (const Frame& frame : wrong.frames)
+    for (const Frame& frame : cameras.frames)
         records.push_back({.name = frame.name,
                            .path = {},
                            .camera = frame.camera,
                            .mask = {},
                            .depth = {},
                            .distortion = {}});
-    io::write_colmap(folder / "data/sparse/0", records, wrong.points);
+    io::write_colmap(folder / "data/sparse/0", records, cameras.points);
     std::filesystem::create_directory_symlink(small_capture().folder / "images", folder / "data/images");
     RunOptions options;
     options.dataset = folder / "data";
     options.output = folder / "run";
     save_splats(folder / "truth.ply", small_capture().truth);
     options.init = (folder / "truth.ply").string();
+    return options;
+}
+
+/// A dataset on disk with disturbed cameras: the run's files, its figures, and the model that is read back.
+TEST(RefinedCameras, ARunWritesThemAndAlignsWhatItHeldOut) {
+    const Dataset wrong = disturbed(small_capture().dataset);
+    TempFolder folder;
+    RunOptions options = run_over(wrong, folder);
     options.train = refining(400);
     options.train.means_rate = options.train.means_rate_final = 1e-5;
     options.test_every = 4;
@@ -282,6 +290,49 @@ TEST(RefinedCameras, ARunWritesThemAndAlignsWhatItHeldOut) {
         EXPECT_NEAR(d.length, 0, 1e-9);
     }
     EXPECT_EQ(model.points.positions.size(), given.points.positions.size());
+}
+
+TEST(WrongCameras, AreFarBelowOthersAndTheTrainingViews) {
+    const std::vector<train::ViewFigure> views{{0, 25}, {8, 14}, {16, 26}, {24, 12}, {32, 24}};
+    const auto low = train::far_below(views, 30);
+    ASSERT_EQ(low.size(), 2u);
+    EXPECT_EQ(low[0].frame, 24);
+    EXPECT_EQ(low[1].frame, 8);
+    EXPECT_TRUE(train::far_below(views, 19).empty()) << "the training views are no better";
+    EXPECT_TRUE(train::far_below({{0, 25}, {8, 5}}, 30).empty()) << "two views have no usual figure";
+    EXPECT_EQ(train::wrong_cameras_text({}, 20), "");
+    const std::string text =
+        train::wrong_cameras_text({{"a.jpg", 12, 17, 2.5, 0.031}, {"b.jpg", 13, 13.5, 9, 0.2}}, 24.3);
+    EXPECT_EQ(text,
+              "some cameras are probably wrong: a.jpg has 12.0 dB, and 17.0 dB turned by 2.5 degrees and "
+              "moved by 3.1 % of "
+              "the extent. far worse than other held-out views (24.3 dB): b.jpg (13.0 dB). The camera is "
+              "wrong, or no "
+              "training image shows what is there");
+}
+
+/// A run over true cameras but one, which was held out.
+TEST(WrongCameras, ARunNamesAHeldOutOne) {
+    const auto remark_of = [](const Dataset& dataset) {
+        const TempFolder folder;
+        RunOptions options = run_over(dataset, folder);
+        options.train = quick(1);
+        options.automatic_background = false;  // the true splats are transparent in places
+        options.test_every = 3;
+        run_training(options);
+        const std::string html = file_bytes(folder / "run/report.html");
+        const size_t at = html.find("some cameras are probably wrong: ");
+        return at == std::string::npos ? std::string() : html.substr(at, 300);
+    };
+    Dataset cameras = small_capture().dataset;
+    EXPECT_EQ(remark_of(cameras), "");
+    cameras.frames[3].camera = moved(cameras.frames[3].camera, {{0, glm::radians(2.0), 0}, 0, {}});
+    const std::string remark = remark_of(cameras);
+    EXPECT_TRUE(remark.starts_with("some cameras are probably wrong: " + cameras.frames[3].name + " has "))
+        << remark;
+    const size_t turned = remark.find("turned by ");
+    ASSERT_NE(turned, std::string::npos) << remark;
+    EXPECT_NEAR(std::stod(remark.substr(turned + std::string("turned by ").size())), 2, 0.4) << remark;
 }
 
 }  // namespace

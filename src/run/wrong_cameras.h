@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// Held-out views that a run shows far worse than others, since their cameras may be wrong.
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "ewa/camera.h"
+
+namespace ewa::train {
+
+/// The PSNR of a held-out view, dB, with the render's colours fitted to the image.
+struct ViewFigure {
+    int frame = 0;  // index into Dataset::frames
+    double psnr = 0;
+};
+
+/// The views, at most three, whose PSNR is far below the median of all and below that of the training views: the worst first. None of
+/// fewer than three views.
+std::vector<ViewFigure> far_below(std::vector<ViewFigure> views, double train_psnr);
+
+/// A view that is far below others, and what it has when its camera moves to where the splats fit its image best.
+struct DoubtfulView {
+    std::string name;
+    double psnr = 0, moved_psnr = 0;  // dB
+    double degrees = 0;               // by which the camera turns
+    double share = 0;                 // of the scene's extent, by which it moves
+};
+
+/// A line for the user. usual: the median PSNR of the held-out views, dB. Empty without views.
+std::string wrong_cameras_text(const std::vector<DoubtfulView>& views, double usual);
+
+}  // namespace ewa::train
