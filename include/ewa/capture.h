@@ -25,6 +25,7 @@ inline constexpr int kFewestVideoFrames = 3, kMostVideoFrames = 100000;
 struct CaptureOptions {
     int frames = 300;  // of a video, about; the sharpest of each of as many equal parts is taken
     Matching matching = Matching::automatic;
+    bool level = true;  // false: the world keeps COLMAP's axes
 };
 
 /// The work, in this order. Without a video there are no frames.
@@ -46,6 +47,8 @@ struct Capture {
     bool interrupted = false;             // the other members are then not known
     std::vector<std::string> not_placed;  // names
     std::vector<std::string> remarks;     // for the user: a line each
+    std::string
+        axes;  // a line on the world's axes and scale; empty: they are COLMAP's, or of an earlier search
 };
 
 /// Whether the path is a video by its extension, a zip archive, or a folder with photos or videos that load_dataset does not
@@ -94,6 +97,8 @@ void check_training_input(const std::filesystem::path& path);
 /// - masks: those that lie among the photos, or in masks/ beside their folder.
 /// - sparse/0: COLMAP's model, made last. A lens has one radial term, or OpenCV's radial and tangential terms where many photos
 ///   share it and determine them. 360° photos get the lens of all directions.
+///   With `level`, y of its world points down. Where the photos' GPS says so, x points east, z north, and a unit is a metre.
+/// - place.json: the place of the world's origin on the globe, where GPS says it.
 /// - colmap/: what COLMAP needs to continue, and log.txt with what the programs print.
 /// - capture.json: input, options, and what distinguishes the contents of the photos or the video. A folder with the
 ///   same ones is continued; what is done is kept.

@@ -49,6 +49,7 @@ struct RunOptions {
     double init_opacity = 0.1;   // of first splats that come from points or at random; above 0, below 1
     double init_scale = 1;       // factor of their scales, which are the distance to their neighbours
     std::string frames = "all";  // or a list, as scene::frames_named reads it: other frames are not used
+    bool level = true;           // of photos whose cameras are searched: as CaptureOptions::level
     int downscale = 1;           // divides the images' width and height
     int max_width = 0;           // px; images that are wider after `downscale` are reduced to it; 0: none are
     MaskUse masks = MaskUse::automatic;

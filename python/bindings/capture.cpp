@@ -57,13 +57,14 @@ class Watch {
 };
 
 LoadedDataset find_cameras(const fs::path& photos, const fs::path& output, int frames,
-                           const std::string& matching, nb::handle progress) {
+                           const std::string& matching, bool level, nb::handle progress) {
     if (frames < kFewestVideoFrames || frames > kMostVideoFrames)
         throw InputError("frames is not from " + std::to_string(kFewestVideoFrames) + " to " +
                          std::to_string(kMostVideoFrames));
-    const CaptureOptions options{.frames = frames, .matching = of_argument("matching", [&] {
-                                                       return core::value_of(kMatchings, matching);
-                                                   })};
+    const CaptureOptions options{
+        .frames = frames,
+        .matching = of_argument("matching", [&] { return core::value_of(kMatchings, matching); }),
+        .level = level};
     Watch watch(progress);
     Capture capture;
     {
@@ -82,14 +83,16 @@ LoadedDataset find_cameras(const fs::path& photos, const fs::path& output, int f
 void bind_capture(nb::module_& module) {
     module.def(
         "find_cameras", find_cameras, nb::arg("photos"), nb::arg("output"), nb::kw_only(),
-        nb::arg("frames") = CaptureOptions().frames, nb::arg("matching") = "auto",
+        nb::arg("frames") = CaptureOptions().frames, nb::arg("matching") = "auto", nb::arg("level") = true,
         nb::arg("progress") = nb::none(),
         nb::sig("def find_cameras(photos: str | os.PathLike[str], output: str | os.PathLike[str], *, frames: "
-                "int = 300, matching: typing.Literal['auto', 'sequence', 'unordered'] = 'auto', progress: "
+                "int = 300, matching: typing.Literal['auto', 'sequence', 'unordered'] = 'auto', level: bool "
+                "= True, progress: "
                 "collections.abc.Callable[[str, int, int], object] | None = None) -> Dataset"),
         "Finds the cameras of a folder of photos, a zip archive of them or a video by COLMAP and ffmpeg, "
         "which must be installed. The dataset is written to the folder output, where an interrupted search "
-        "continues. frames: of a video. progress: called with what is done, how many and of how many. Photos "
+        "continues. frames: of a video. level: false "
+        "keeps COLMAP's axes. progress: called with what is done, how many and of how many. Photos "
         "that cannot be placed are warnings. Ctrl-C ends it. Raises InputError, or DeviceError where a "
         "program is missing or fails.");
 }

@@ -27,6 +27,7 @@
 #include "io/datasets/image_records.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/importer.h"
+#include "io/splats/place.h"
 #include "io/splats/zip_files.h"
 
 namespace ewa {
@@ -130,6 +131,7 @@ Json record_of(const fs::path& input, const CaptureOptions& options, bool video)
     Json record{{"input", core::one_line(fs::canonical(input).string())},
                 {"matching", name_of(options.matching)}};
     if (video) record["frames"] = options.frames;
+    if (!options.level) record["level"] = "off";  // older records say nothing
     return record;
 }
 
@@ -225,18 +227,20 @@ void say(const std::vector<std::string>& lines, const capture::ProgressFunction&
 Capture search(const fs::path& folder, const capture::Chosen& chosen, const CaptureOptions& options,
                const capture::ProgressFunction& progress) {
     const fs::path model = folder / "sparse/0";
-    std::vector<std::string> remarks;
+    capture::Found found;
     if (!is_folder(model)) {
         capture::require_photos(folder / "images", chosen.names.size(), {});
         core::make_folder(model.parent_path());
         const fs::path masks = is_folder(folder / "masks") ? folder / "masks" : fs::path();
-        remarks = capture::place_photos(
-            {folder / "images", chosen.names, pairing_of(options.matching, chosen.names.size()), masks},
-            folder / "colmap", model, progress);
+        found =
+            capture::place_photos({folder / "images", chosen.names,
+                                   pairing_of(options.matching, chosen.names.size()), masks, options.level},
+                                  folder / "colmap", model, folder / io::kPlaceFile, progress);
     }
     if (!chosen.gone.empty()) capture::remove_views(model, chosen.gone);
     Capture result = result_of(folder, chosen.names);
-    result.remarks.insert(result.remarks.begin(), remarks.begin(), remarks.end());
+    result.remarks.insert(result.remarks.begin(), found.remarks.begin(), found.remarks.end());
+    result.axes = std::move(found.axes);
     return result;
 }
 

@@ -15,6 +15,7 @@
 #include "capture/mapping.h"
 #include "capture/panoramas.h"
 #include "capture/steps.h"
+#include "capture/world_axes.h"
 #include "core/atomic_file.h"
 #include "core/file_reader.h"
 #include "core/folders.h"
@@ -407,8 +408,8 @@ void require_colmap() {
             "photos without cameras need COLMAP, which is not installed (Debian: apt install colmap)");
 }
 
-std::vector<std::string> place_photos(const Photos& given, const fs::path& work, const fs::path& model,
-                                      const ProgressFunction& progress) {
+Found place_photos(const Photos& given, const fs::path& work, const fs::path& model, const fs::path& place,
+                   const ProgressFunction& progress) {
     const Colmap colmap(work, progress);
     const fs::path views_folder = work / "views";
     // A search that has begun continues with the same images.
@@ -449,8 +450,11 @@ std::vector<std::string> place_photos(const Photos& given, const fs::path& work,
         if (checked) more = complete(colmap, mapping, placing, database, work, partial);
     }
     remarks.insert(remarks.end(), more.begin(), more.end());
+    fs::remove(place);  // of an earlier model
+    Found found{std::move(remarks),
+                given.level ? set_world_axes(partial, given.folder, place) : std::string()};
     fs::rename(partial, model);
-    return remarks;
+    return found;
 }
 
 }  // namespace ewa::capture

@@ -140,6 +140,17 @@ Camera camera_of(const SparseModel& model, const SparseImage& image) {
     return camera;
 }
 
+void move(SparseModel& model, double scale, const glm::dmat3& rotation, const glm::dvec3& shift) {
+    for (auto& [id, image] : model.images) {
+        const Camera camera = camera_of(model, image);
+        const glm::dmat3 turned = camera.rotation * glm::transpose(rotation);
+        const glm::dvec3 t = -(turned * (scale * (rotation * camera.position()) + shift));
+        const glm::dquat q = glm::normalize(glm::quat_cast(turned));
+        image.pose = {q.w, q.x, q.y, q.z, t.x, t.y, t.z};
+    }
+    for (auto& [id, point] : model.points) point.position = scale * (rotation * point.position) + shift;
+}
+
 double reprojection_error(const Camera& camera, const glm::dvec3& point, const glm::dvec2& at) {
     const glm::dvec3 seen = camera.rotation * point + camera.translation;
     if (!(seen.z > 0)) return std::numeric_limits<double>::infinity();

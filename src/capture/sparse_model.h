@@ -61,6 +61,9 @@ void write_sparse(const SparseModel& model, const std::filesystem::path& folder)
 /// The image's camera, with its lens.
 Camera camera_of(const SparseModel& model, const SparseImage& image);
 
+/// Moves cameras and points: x becomes scale * rotation * x + shift.
+void move(SparseModel& model, double scale, const glm::dmat3& rotation, const glm::dvec3& shift);
+
 /// How far a feature is from the image of the point that it shows, px. Infinite for a point behind the camera.
 double reprojection_error(const Camera& camera, const glm::dvec3& point, const glm::dvec2& at);
 

@@ -186,12 +186,20 @@ struct Photos {
     std::vector<std::filesystem::path> names;  // relative to it
     Pairing pairing = Pairing::all;
     std::filesystem::path masks = {};  // NAME.png of each name; empty: none
+    bool level = true;                 // as CaptureOptions::level
+};
+
+/// What the user gets to know of the cameras that were found.
+struct Found {
+    std::vector<std::string> remarks;
+    std::string axes;  // as Capture::axes
 };
 
 /// Runs COLMAP in `work` and leaves its largest model in `model` (cameras.bin, images.bin, points3D.bin). Throws
-/// InputError if nothing can be placed, RunError, Stopped. Returns remarks. COLMAP gets views of
-/// 360° photos, and the model is that of the photos.
-std::vector<std::string> place_photos(const Photos& photos, const std::filesystem::path& work,
-                                      const std::filesystem::path& model, const ProgressFunction& progress);
+/// InputError if nothing can be placed, RunError, Stopped. COLMAP gets views of 360° photos, and the model is that of the photos.
+/// place: the file that gets the place of the model's origin, if it is known.
+Found place_photos(const Photos& photos, const std::filesystem::path& work,
+                   const std::filesystem::path& model, const std::filesystem::path& place,
+                   const ProgressFunction& progress);
 
 }  // namespace ewa::capture

@@ -56,6 +56,7 @@ void place_with_progress(const fs::path& input, const fs::path& folder, const Ca
         throw Interrupted();
     }
     for (const std::string& remark : capture.remarks) progress.note(remark);
+    if (!capture.axes.empty()) progress.note(capture.axes);
     progress.note(
         fmt::format("{}: {} of {} photos have cameras", folder.string(), capture.placed, capture.images));
 }
@@ -91,6 +92,12 @@ Action add_cameras(CLI::App& app) {
         ->transform(one_of({"auto", "sequence", "unordered"}))
         ->type_name("ORDER")
         ->default_str("auto");
+    app.add_option_function<std::string>(
+           "--level", [&options](const std::string& word) { options.level = word == "on"; },
+           "Level the world, with scale, north and place where the photos' GPS says them. off: COLMAP's axes")
+        ->transform(one_of({"on", "off"}))
+        ->type_name("on|off")
+        ->default_str("on");
     add_quiet_option(app, arguments->quiet);
     return [&app, arguments] { return run(app, *arguments); };
 }

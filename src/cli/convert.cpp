@@ -26,6 +26,7 @@
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
 #include "io/splats/formats.h"
+#include "io/splats/place.h"
 #include "report/run_file_names.h"
 #include "scene/edits.h"
 
@@ -104,6 +105,12 @@ void bake_sky(const fs::path& file, Gaussians& gaussians) {
     append_splats(gaussians, sky_splats(load_sky(sky), gaussians));
 }
 
+/// The world's origin is at another place, or at several.
+void drop_place(Work& work) {
+    if (std::erase_if(work.save.comments, io::is_place_comment) > 0)
+        work.lost.emplace_back("the place on the globe is dropped: splats are elsewhere than there");
+}
+
 /// Reads the inputs and appends each to the one before.
 Work read_all(const ConvertArguments& arguments) {
     Work work;
@@ -135,6 +142,9 @@ Work read_all(const ConvertArguments& arguments) {
             append_splats(work.gaussians, scene.gaussians);
     }
     work.save.antialiased = marks.contains(true);
+    const bool moved = std::ranges::any_of(
+        arguments.placements, [](const glm::dmat4& placement) { return placement != glm::dmat4(1); });
+    if (moved || (arguments.files.size() > 2 && !io::place_in(work.save.comments))) drop_place(work);
     if (marks.size() > 1)
         work.lost.push_back(
             "some inputs were trained with --antialias and others not; the output is marked as anti-aliased");
@@ -250,6 +260,7 @@ int run(const ConvertArguments& arguments) {
     Work work = read_all(arguments);
     const size_t read = work.gaussians.size();
     const bool in_place = edits.transform == glm::dmat4(1);
+    if (!in_place) drop_place(work);
     scene::place_splats(work.gaussians, edits.transform,
                         arguments.scale_to.empty()    ? "--transform"
                         : arguments.transform.empty() ? "--scale-to"

@@ -31,6 +31,7 @@
 #include "io/datasets/importers/importer.h"
 #include "io/gltf/mesh.h"
 #include "io/splats/formats.h"
+#include "io/splats/place.h"
 #include "io/splats/zip_files.h"
 #include "io/splats/zipped_splats.h"
 #include "report/summary.h"
@@ -232,6 +233,9 @@ Json dataset_json(const Dataset& dataset, const Split& split, double extent,
               {"extent", extent},
               {"train", split.train.size()},
               {"test", split.test.size()}};
+    if (const auto place = io::read_place(dataset.root))
+        json["place"] = {
+            {"latitude", place->latitude}, {"longitude", place->longitude}, {"height", place->height}};
     if (const auto rolling = rolling_of(dataset))
         json["rolling_shutter"] = {{"frames", rolling->frames},
                                    {"order", rolling->order},
@@ -306,6 +310,9 @@ void info_dataset(const fs::path& path, const fs::path& named, const InfoArgumen
     fmt::print("{}\nkind            {}\n", core::one_line(named.string()), dataset.format);
     if (!dataset.program.empty()) fmt::print("program         {}\n", core::one_line(dataset.program));
     for (const std::string& note : dataset.notes) fmt::print("note            {}\n", core::one_line(note));
+    if (const auto place = io::read_place(dataset.root))
+        fmt::print("place           latitude {}, longitude {}, height {:.1f} m, of the world's origin\n",
+                   place->latitude, place->longitude, place->height);
     if (!dataset.used.empty()) fmt::print("used            {}\n", used_text(dataset));
     for (const std::string& warning : warnings) fmt::print("warning         {}\n", core::one_line(warning));
     if (dataset.frame_rate > 0)  // a path, which is drawn and not trained on

@@ -172,7 +172,7 @@ std::unique_ptr<Progress> place_photos(TrainArguments& arguments) {
     run.output = output_folder(run);
     run.dataset = run.output / live::kMadeDataset;
     train::check_free(run.output, run);
-    CaptureOptions capture;
+    CaptureOptions capture{.level = run.level};
     if (has_videos(run.scene)) {
         capture.frames = video_frames(run.frames);
         run.frames = "all";

@@ -285,11 +285,51 @@ class Exif {
         const std::string all(reinterpret_cast<const char*>(bytes_ + at), length);
         return all.substr(0, all.find('\0'));
     }
+    /// The number of values that a tag has. 0: the directory has no such tag.
+    uint64_t count(uint64_t directory, uint64_t tag) const {
+        const uint64_t value = find(directory, tag);
+        return value == 0 ? 0 : number(value - 4, 4);
+    }
+    /// A tag's value k, which is a fraction: its two numbers, or zeros.
+    std::pair<uint64_t, uint64_t> fraction(uint64_t directory, uint64_t tag, uint64_t k = 0) const {
+        const uint64_t entry = find(directory, tag), at = entry == 0 ? 0 : number(entry, 4);
+        if (at == 0) return {};
+        return {number(at + 8 * k, 4), number(at + 8 * k + 4, 4)};
+    }
 
   private:
     const std::byte* bytes_;
     uint64_t size_;
 };
+
+double ratio(const std::pair<uint64_t, uint64_t>& fraction) {
+    return double(fraction.first) / double(fraction.second);
+}
+
+/// The place of an EXIF block (EXIF 2.32, table 15). Receivers without a fix write zeros, or fractions 0/0.
+std::optional<GpsFix> gps_of(const Exif& block) {
+    constexpr uint64_t kGps = 34853, kLatitude = 2, kLongitude = 4, kBelowSea = 5, kAltitude = 6, kStatus = 9;
+    constexpr double kDeepest = -1000, kHighest = 20000;  // m
+    const uint64_t entry = block.find(block.first(), kGps), gps = entry == 0 ? 0 : block.number(entry, 4);
+    if (gps == 0 || block.text(gps, kStatus) == "V") return {};
+    // Degrees, minutes and seconds; the tag before says on which side.
+    const auto angle = [&](uint64_t tag, const std::string& positive, const std::string& negative) {
+        const std::string side = block.text(gps, tag - 1);
+        if (block.count(gps, tag) != 3 || (side != positive && side != negative)) return std::nan("");
+        const double degrees = ratio(block.fraction(gps, tag)) + ratio(block.fraction(gps, tag, 1)) / 60 +
+                               ratio(block.fraction(gps, tag, 2)) / 3600;
+        return side == negative ? -degrees : degrees;
+    };
+    GpsFix fix{angle(kLatitude, "N", "S"), angle(kLongitude, "E", "W"), {}};
+    const bool valid = std::abs(fix.latitude) <= 90 && std::abs(fix.longitude) <= 180;
+    if (!valid || (fix.latitude == 0 && fix.longitude == 0)) return {};
+    const uint64_t below = block.find(gps, kBelowSea);
+    const double altitude =
+        (below != 0 && block.number(below, 1) == 1 ? -1 : 1) *
+        (block.count(gps, kAltitude) == 1 ? ratio(block.fraction(gps, kAltitude)) : std::nan(""));
+    if (altitude >= kDeepest && altitude <= kHighest) fix.altitude = altitude;
+    return fix;
+}
 
 }  // namespace
 
@@ -308,23 +348,17 @@ Shot exif_shot(const void* exif, uint64_t size) {
     Shot shot;
     shot.lens = block.text(first, kMake);
     shot.lens.append("/").append(block.text(first, kModel));
+    shot.gps = gps_of(block);
     const uint64_t photo = block.find(first, kPhoto), details = photo == 0 ? 0 : block.number(photo, 4);
     if (details == 0) return shot;
     const auto small = [&](uint64_t tag) {
         const uint64_t at = block.find(details, tag);
         return at == 0 ? 0 : block.number(at, 2);
     };
-    const auto fraction = [&](uint64_t tag) {
-        const uint64_t entry = block.find(details, tag), at = entry == 0 ? 0 : block.number(entry, 4);
-        return at == 0 ? std::pair<uint64_t, uint64_t>()
-                       : std::pair(block.number(at, 4), block.number(at + 4, 4));
-    };
+    const auto fraction = [&](uint64_t tag) { return block.fraction(details, tag); };
     const auto [focal, unit] = fraction(kFocal);
     for (const uint64_t number : {focal, unit, small(kFocal35)})
         shot.lens.append("/").append(std::to_string(number));
-    const auto ratio = [](const std::pair<uint64_t, uint64_t>& f) {
-        return double(f.first) / double(f.second);
-    };
     const double aperture = ratio(fraction(kAperture));
     const double exposure = std::log2(ratio(fraction(kTime)) * double(small(kIso)) / (aperture * aperture));
     if (std::isfinite(exposure)) shot.exposure = exposure;

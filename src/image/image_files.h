@@ -55,10 +55,17 @@ bool reads_heif();
 /// As OpenImageIO::jpeg_of_heif. Returns whether it has written the JPEG.
 bool write_jpeg_of_heif(const std::filesystem::path& heif, const std::filesystem::path& jpeg);
 
+/// A place by a satellite receiver: WGS 84, degrees. Finite, and within the ranges of the globe.
+struct GpsFix {
+    double latitude = 0, longitude = 0;
+    std::optional<double> altitude;  // m above the sea
+};
+
 /// What a JPEG's EXIF says of how it was taken. Empty for other files.
 struct Shot {
     std::string lens;  // text for the camera and its focal length: equal for photos of one lens at one zoom
     std::optional<double> exposure;  // log2(time * ISO / f-number^2), stops
+    std::optional<GpsFix> gps;
 };
 Shot shot_of(const std::filesystem::path& path);
 

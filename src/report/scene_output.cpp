@@ -95,9 +95,17 @@ std::vector<std::string> write_page(const fs::path& path, Gaussians gaussians, c
     return remarks;
 }
 
-std::vector<std::string> write_tiles(const std::filesystem::path& path, Gaussians gaussians,
-                                     const SaveOptions& options, const std::optional<glm::dmat4>& earth) {
+/// On the globe where --geo says, else where the scene's comments say.
+std::vector<std::string> write_tiles(const SceneOutput& output, Gaussians gaussians, SaveOptions options) {
     std::vector<std::string> remarks;
+    std::optional<glm::dmat4> earth = output.earth;
+    if (const auto place = earth ? std::nullopt : io::place_in(options.comments)) {
+        earth = io::earth_of_place(*place);
+        remarks.push_back("on the globe at latitude " + std::to_string(place->latitude) + ", longitude " +
+                          std::to_string(place->longitude) + " and height " +
+                          std::to_string(int(std::lround(place->height))) + " m, by the GPS of the photos");
+    }
+    std::erase_if(options.comments, io::is_place_comment);
     if (gaussians.density) {
         fit_opacities(gaussians, false);
         remarks.emplace_back("opacities of --kernel density are fitted to 3DGS's kernel");
@@ -113,7 +121,7 @@ std::vector<std::string> write_tiles(const std::filesystem::path& path, Gaussian
     }
     if (!scene::is_computable(gaussians)) gaussians = scene::computable(std::move(gaussians));
     const std::vector<std::string> more =
-        io::write_tileset(path, std::move(gaussians), {.save = options, .earth = earth});
+        io::write_tileset(output.file, std::move(gaussians), {.save = options, .earth = earth});
     remarks.insert(remarks.end(), more.begin(), more.end());
     if (!options.comments.empty()) remarks.emplace_back("comments are dropped");
     return remarks;
@@ -167,7 +175,7 @@ std::vector<std::string> write_output(const SceneOutput& output, const OutputOpt
     save.gltf_spz = options.gltf_spz;
     save.levels = options.levels;
     if (output.page) return write_page(output.file, std::move(gaussians), save, options, cameras);
-    if (output.tiles) return write_tiles(output.file, std::move(gaussians), save, output.earth);
+    if (output.tiles) return write_tiles(output, std::move(gaussians), save);
     if (output.format == SplatFormat::sog_levels) return save_levels(output.file, std::move(gaussians), save);
     return save_splats(output.file, gaussians, save);
 }

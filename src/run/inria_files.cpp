@@ -96,7 +96,8 @@ void save_inria(const fs::path& folder, const RunInput& input, const Gaussians& 
     io::write_points_ply(without_link(model / "input.ply"), input.dataset.points);
     const fs::path splats =
         made_without_links(made_without_links(model / kSplats) / fmt::format("iteration_{}", step));
-    write_splats(without_link(splats / "point_cloud.ply"), gaussians, step, input.options.train.render);
+    write_splats(without_link(splats / "point_cloud.ply"), gaussians, step, input.options.train.render,
+                 io::read_place(input.dataset.root));
 }
 
 void remove_inria_splats(const fs::path& folder) {

@@ -49,6 +49,19 @@ RunOption frames_option() {
     return option;
 }
 
+const core::Words<bool> kOnOff = {{"on", true}, {"off", false}};
+
+/// The search for cameras follows it. The dataset decides the training's result.
+RunOption level_option() {
+    RunOption option = choice<bool>(
+        "level",
+        "Level the world of photos whose cameras are searched, with scale, north and place where their GPS "
+        "says them. off: COLMAP's axes",
+        [](RunOptions& o) -> bool& { return o.level; }, kOnOff);
+    option.decides_result = kDoesNotDecide;
+    return option;
+}
+
 RunOption dataset_option() {
     RunOption option{"dataset", "PATH",
                      "Images with cameras: a COLMAP folder or transforms.json. Or photos or a video, whose "
@@ -347,6 +360,7 @@ std::vector<Row> rows() {
              "its own",
              [](RunOptions& o) -> double& { return o.init_scale; }, 0.001, 1000)},
         {"Data", "", frames_option()},
+        {"Data", "", level_option()},
         {"Data", "",
          number<int>(
              "downscale", "K", "Divide the images' width and height by this", kDecides,

@@ -14,15 +14,16 @@
 #include "ewa/run_options.h"
 #include "ewa/sky_map.h"
 #include "ewa/summary.h"
+#include "io/splats/place.h"
 #include "report/html.h"
 #include "report/run_file_names.h"
 #include "run/refined_cameras.h"
 
 namespace ewa::train {
 
-/// Writes splats with comments that say what made them. Throws RunError.
+/// Writes splats with comments that say what made them, and where on the globe they are. Throws RunError.
 void write_splats(const std::filesystem::path& file, const Gaussians& gaussians, int step,
-                  const RenderOptions& render);
+                  const RenderOptions& render, const std::optional<io::Place>& place);
 
 /// Removes a symbolic link at the path, through which nothing is to be written. Returns the path.
 const std::filesystem::path& without_link(const std::filesystem::path& path);
@@ -35,6 +36,9 @@ class RunFolder {
   public:
     /// Creates the folder. Throws RunError if it cannot be created or another process uses it.
     explicit RunFolder(const std::filesystem::path& path);
+
+    /// The place of the splats that are saved from here on.
+    void set_place(const std::optional<io::Place>& place) { place_ = place; }
 
     const std::filesystem::path& path() const { return path_; }
     std::filesystem::path checkpoint() const { return path_ / report::kCheckpointFile; }
@@ -68,6 +72,7 @@ class RunFolder {
 
     std::filesystem::path path_;
     core::FolderLock lock_;
+    std::optional<io::Place> place_;
 };
 
 /// The largest memory of the process so far, in bytes. Without the memory of a CPU device, which

@@ -19,15 +19,11 @@
 
 #include "ewa/gaussians.h"
 #include "ewa/splat_scene.h"
+#include "io/splats/place.h"
 
 namespace ewa::io {
 
 inline constexpr const char* kTilesetName = "tileset.json";
-
-/// A place on the globe: WGS 84, degrees and metres above the ellipsoid. heading: of the scene's z axis, clockwise from north.
-struct Place {
-    double latitude = 0, longitude = 0, height = 0, heading = 0;
-};
 
 /// From an INRIA PLY's frame at the place to earth-centred, earth-fixed coordinates (EPSG 4978), metres: x east, z north, y down.
 glm::dmat4 earth_of_place(const Place& place);

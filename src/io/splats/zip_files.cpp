@@ -28,7 +28,7 @@ constexpr size_t kMostEntries = 100'000;
 constexpr uint64_t kMostTimes = 200, kAlwaysAllowed = uint64_t(16) << 20;
 constexpr size_t kLongestEntry = 1024, kLongestPart = 255;
 constexpr std::ptrdiff_t kMostFolders = 64;  // folders in folders
-constexpr size_t kShownName = 200;           // of a wrong one
+constexpr size_t kShownOfName = 200;         // of a wrong one
 constexpr size_t kZipPiece = size_t(1) << 18;
 constexpr uint64_t kEncryptedFlag = 1, kDeflated = 8;
 
@@ -106,7 +106,8 @@ struct ZipFiles::State {
 void ZipFiles::State::add(const std::string& entry, const unz_file_info64& info) {
     const bool folder = entry.ends_with('/') || entry.ends_with('\\');
     const std::string plain = entry.substr(0, entry.size() - (folder ? 1 : 0));
-    if (const std::string wrong = wrong_name(plain); !wrong.empty()) fail(entry.substr(0, kShownName), wrong);
+    if (const std::string wrong = wrong_name(plain); !wrong.empty())
+        fail(entry.substr(0, kShownOfName), wrong);
     const auto kind = mode_t(info.external_fa >> 16) & S_IFMT;
     if (kind != 0 && kind != S_IFREG && kind != S_IFDIR) fail(entry, "is a link or a device, not a file");
     const fs::path inside = *core::name_inside(plain);
