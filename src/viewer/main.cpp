@@ -95,17 +95,22 @@ std::vector<std::string> options_of_training(const Arguments& arguments) {
     return options;
 }
 
-/// The frames of a video that --frames names; ewa train checks the number.
-CaptureOptions capture_of(const Arguments& arguments) {
-    CaptureOptions capture;
-    const std::string name = "--frames";
-    const auto& options = arguments.train_options;
+/// The last value of an option of ewa train; empty if it is not given.
+std::string value_of(const std::vector<std::string>& options, const std::string& name) {
+    std::string value;
     for (size_t i = 0; i < options.size(); ++i) {
-        std::string value;
         if (options[i] == name && i + 1 < options.size()) value = options[i + 1];
         if (options[i].starts_with(name + "=")) value = options[i].substr(name.size() + 1);
-        capture.frames = core::parse_count<int>(value).value_or(capture.frames);
     }
+    return value;
+}
+
+/// The options of ewa train that the search for cameras follows; ewa train checks them.
+CaptureOptions capture_of(const Arguments& arguments) {
+    CaptureOptions capture;
+    const std::string frames = value_of(arguments.train_options, "--frames");
+    capture.frames = core::parse_count<int>(frames).value_or(capture.frames);
+    capture.level = value_of(arguments.train_options, "--level") != "off";
     return capture;
 }
 
