@@ -3,7 +3,7 @@
 // whose mean gradient reaches the threshold is cloned if it is small and split if it is large. A splat that has
 // become transparent is pruned, and one that is too large once prune_scale is set. The children of a split are judged
 // by their own size. A negative number of views prunes, whatever the splat is like. Outside of the region no splat
-// grows.
+// grows. A splat whose largest scale is above the distance of its mean to every point of the cameras' ball is pruned.
 #ifndef EWA_LIB_DENSIFY
 #define EWA_LIB_DENSIFY
 #include "region.glsl"
@@ -16,6 +16,8 @@ uint action_of(DensifyPush push, vec4 mean_logit, vec4 quaternion, vec4 scale_re
     const bool opaque = mean_logit.w >= push.prune_opacity;
     if (!(whole && opaque) || statistics.y < 0.0) return ACTION_PRUNE;
     const float size = exp(max(scale_red.x, max(scale_red.y, scale_red.z)));
+    const vec3 middle = vec3(push.ball[0], push.ball[1], push.ball[2]);
+    if (size > length(mean_logit.xyz - middle) + push.ball[3]) return ACTION_PRUNE;
     const bool limited = push.prune_scale > 0.0;
     const bool grow = statistics.y > 0.0 && statistics.x / statistics.y >= push.grow_gradient &&
                       in_region(push.region, mean_logit.xyz);

@@ -607,6 +607,8 @@ struct DensifyPush {
     uint split;  // SPLIT_*
     float
         region[6];  // low corner, then high corner: a splat whose mean is outside is neither cloned nor split
+    float ball
+        [4];  // of the cameras: middle, radius. A splat that is larger than its distance to all of it is pruned
 };
 
 struct ResetPush {

@@ -26,7 +26,7 @@ static_assert(sizeof(PpispPush) == 24 && sizeof(PpispUpdatePush) == 36 && sizeof
               sizeof(GridPush) == 24 && sizeof(GridUpdatePush) == 32);
 static_assert(sizeof(SkyPush) == 24 && sizeof(SkyGradientPush) == 28 && sizeof(SkyUpdatePush) == 24);
 static_assert(sizeof(MoveCameraPush) == 8 && sizeof(MotionUpdatePush) == 44);
-static_assert(sizeof(UpdatePush) == 76 && sizeof(DensifyPush) == 76 && sizeof(ResetPush) == 12);
+static_assert(sizeof(UpdatePush) == 76 && sizeof(DensifyPush) == 92 && sizeof(ResetPush) == 12);
 static_assert(sizeof(BandTilesPush) == 16 && sizeof(CollectVisiblePush) == 24 && sizeof(ReceivePush) == 12 &&
               sizeof(SumSlotsPush) == 8 && sizeof(UpdateViewsPush) == 92);
 static_assert(sizeof(McmcPush) == 92 && sizeof(PerturbPush) == 36);

@@ -46,8 +46,10 @@ shared::DensifyPush densify_push(const Model& model, const FrameBuffers& frame, 
                              .step = rules.step,
                              .first = model.first,
                              .split = rules.split,
-                             .region = {}};
+                             .region = {},
+                             .ball = {}};
     std::ranges::copy(rules.region, push.region);
+    std::ranges::copy(rules.ball, push.ball);
     return push;
 }
 

@@ -44,6 +44,10 @@ using Region = std::array<float, 6>;
 inline constexpr float kFarthest = std::numeric_limits<float>::max();
 inline constexpr Region kEverywhere{-kFarthest, -kFarthest, -kFarthest, kFarthest, kFarthest, kFarthest};
 
+/// A ball that has all cameras of the training in it: its middle, relative to the model's origin, and its radius.
+using Ball = std::array<float, 4>;
+inline constexpr Ball kUnlimited{0, 0, 0, kFarthest};
+
 /// The rules of adaptive density control.
 struct DensifyRules {
     float grow_gradient = 0;  // threshold of the mean gradient norm
@@ -55,6 +59,7 @@ struct DensifyRules {
     uint32_t step = 0;
     uint32_t max_splats = 0;  // hard cap: the threshold is raised until the next generation fits
     Region region = kEverywhere;
+    Ball ball = kUnlimited;  // a splat that is larger than its distance to all of it is pruned
 };
 
 /// The splats of a model's next generation, if mean gradient norms above `threshold` grow.

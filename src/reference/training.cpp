@@ -112,6 +112,7 @@ Decision decide(const Splat& splat, double mean_gradient, const DensifyOptions& 
     // With this comparison, an opacity of NaN is pruned.
     if (!(opacity >= options.prune_opacity)) return Decision::prune;
     const double scale = std::exp(std::max({splat.log_scale.x, splat.log_scale.y, splat.log_scale.z}));
+    if (scale > glm::length(splat.mean - options.ball.middle) + options.ball.radius) return Decision::prune;
     const bool grows = mean_gradient >= options.grow_gradient && options.region.contains(splat.mean);
     const bool splits = grows && scale > options.split_scale * options.extent;
     const double left = splits ? scale / SPLIT_SCALE : scale;

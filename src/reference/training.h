@@ -45,6 +45,7 @@ AdamMoments unpacked_moments(uint32_t word);
 // - It is cloned if its largest scale is at most split_scale * extent, else split in two.
 // - It is pruned if its opacity is below prune_opacity.
 // - Once opacity has been reset, it is also pruned if its largest scale is above prune_scale * extent.
+// - It is pruned, whatever its gradient, if its largest scale is above its distance to every point of the cameras' ball.
 // - The published code prunes after it grows, so this applies to a split's children with smaller scales.
 //
 // MCMC (Kheradmand et al. 2024): values of a splat that several share, choice of sources, noise of the means.
@@ -68,6 +69,12 @@ struct Region {
     bool contains(const glm::dvec3& point) const;
 };
 
+/// A ball that has all cameras in it. Usually without end.
+struct CameraBall {
+    glm::dvec3 middle{0};
+    double radius = std::numeric_limits<double>::infinity();
+};
+
 struct DensifyOptions {
     double extent = 1;  // of the scene, world units
     double grow_gradient = 2e-4;
@@ -76,6 +83,7 @@ struct DensifyOptions {
     double prune_scale = 0.1;  // share of extent
     bool prune_large = false;  // true once opacity has been reset
     Region region{};           // that splats grow in
+    CameraBall ball{};
     uint64_t max_splats = UINT64_MAX;
 };
 

@@ -28,6 +28,8 @@ constexpr int kLeastResetEvery = 1000;
 constexpr int kLeastShEvery = 50;
 // Longer runs have opacity resets, or time to recover from splits that change the picture: docs/training.md#short-runs.
 constexpr int kLongestEvenRun = 1000;
+// Longer runs are to end as before: docs/training.md#veils.
+constexpr int kLongestBoundedRun = 1000;
 // Share of the steps in which the rate of the poses rises from 0: the first splats say little of the cameras.
 constexpr double kPoseWarmUp = 0.1;
 // With few training images: how often each is seen by a run whose rates fade, and the rates' last factor.
@@ -217,6 +219,8 @@ Schedule schedule_for(const TrainOptions& options, size_t photos) {
     s.growth = std::pow(options.growth, std::max(1.0, s.relocate_every / (share * options.refine_every)));
     s.copy_spread = (1 - share) * options.copy_spread;
     s.even_splits = options.steps <= kLongestEvenRun && !options.revised_opacity && !options.render.points;
+    s.bounded = options.steps <= kLongestBoundedRun && !options.render.points &&
+                options.render.integrator == Integrator::splat;
     if (options.opacity_reset_every > 0 && !options.render.points)
         s.opacity_reset_every =
             scaled(options.opacity_reset_every, std::min(options.opacity_reset_every, kLeastResetEvery));

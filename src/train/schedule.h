@@ -32,6 +32,7 @@ struct Schedule {
     double growth = 1;       // of MCMC at each refinement, so that the whole run grows as much as a full run
     double copy_spread = 0;  // of MCMC
     bool even_splits = false;     // of adc: the picture stays as it was when splats are added
+    bool bounded = false;         // of adc: splats larger than their distance to all cameras go
     int opacity_reset_every = 0;  // 0: never
     int prune_step = 0;  // with TrainOptions::final_splats: the step after which splats are removed; 0: never
     int sh_degree_every = 0;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <glm/geometric.hpp>
 #include <utility>
 
 #include "ewa/error.h"
@@ -44,6 +45,20 @@ std::vector<uint32_t> cameras_of(const Dataset& dataset, const std::vector<int>&
         if (!lenses || seen.size() * kPhotosPerCamera <= frames.size() || seen.size() == 1) return cameras;
     }
     return {};
+}
+
+/// The middle of the cameras, and the largest distance of one from it. Without end if a camera has parallel rays: its projection is
+/// linear, whatever the size of a splat.
+CameraBall ball_of(const Dataset& dataset, const std::vector<int>& frames) {
+    CameraBall ball;
+    for (const int f : frames)
+        ball.middle += dataset.frames[size_t(f)].camera.position() / double(frames.size());
+    for (const int f : frames) {
+        const Camera& camera = dataset.frames[size_t(f)].camera;
+        if (camera.distortion.lens == Lens::orthographic) ball.radius = double(pipeline::kFarthest);
+        ball.radius = std::max(ball.radius, glm::length(camera.position() - ball.middle));
+    }
+    return ball;
 }
 
 /// Throws InputError where the training needs pinholes, and an image has another lens.
@@ -141,6 +156,7 @@ Training::Training(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
       options_(options),
       schedule_(schedule_for(options, frames.size())),
       extent_(extent),
+      cameras_(ball_of(dataset, frames)),
       tools_(*device_),
       images_(*device_, tools_.cache.config(), dataset, frames, options, ready.origin),
       plan_(plan_for(plan_request(ready, options, images_.full().any_masked(), frames.size(),

@@ -68,6 +68,12 @@ struct StepLog {
     StepTimes means() const;
 };
 
+/// A ball that has all cameras of the training in it, world units.
+struct CameraBall {
+    glm::dvec3 middle{0};
+    double radius = 0;
+};
+
 class Training {
   public:
     /// ready: prepared splats. extent: Trainer::extent. options: with concrete values.
@@ -166,6 +172,7 @@ class Training {
     TrainOptions options_;
     Schedule schedule_;
     double extent_;
+    CameraBall cameras_;
     FrameTools tools_;
     ImageLevels images_;
     const pipeline::Plan plan_;

@@ -33,6 +33,11 @@ Region region_of(const TrainOptions& options, const glm::dvec3& origin) {
     return region;
 }
 
+Ball ball_of(const CameraBall& cameras, const glm::dvec3& origin) {
+    const glm::vec3 middle(cameras.middle - origin);
+    return {middle.x, middle.y, middle.z, float(cameras.radius)};
+}
+
 /// What the step's splats are drawn over.
 std::array<float, 3> background_of(int step, const TrainOptions& options) {
     const bool random = options.random_background;
@@ -400,6 +405,7 @@ void Training::control_density(int step) {
         rules.step = uint32_t(step);
         rules.max_splats = options_.max_splats;
         rules.region = region_of(options_, portions_.origin());
+        if (schedule_.bounded) rules.ball = ball_of(cameras_, portions_.origin());
         refine([&](const Phase& phase) { densify(portions_, phase, rules); });
     }
     if (schedule_.resets_opacity(step)) {

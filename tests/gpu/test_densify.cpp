@@ -77,7 +77,9 @@ reference::DensifyOptions options_for(const DensifyRules& rules) {
     for (size_t axis = 0; axis < 3; ++axis) {
         options.region.low[int(axis)] = double(rules.region[axis]);
         options.region.high[int(axis)] = double(rules.region[3 + axis]);
+        options.ball.middle[int(axis)] = double(rules.ball[axis]);
     }
+    options.ball.radius = double(rules.ball[3]);
     return options;
 }
 
@@ -203,7 +205,8 @@ TEST(DensifyEdges, WritesNothingPastItsCapacity) {
                                    3,
                                    0,
                                    0,
-                                   {-far, -far, -far, far, far, far}};
+                                   {-far, -far, -far, far, far, far},
+                                   {0, 0, 0, far}};
     };
     const uint64_t bytes = pipeline::parameter_bytes(capacity, 1);
     Guarded params("params", bytes), moments("moments", bytes);
@@ -317,6 +320,38 @@ TEST(DensifyEdges, WhatIsNotFiniteGoesAndAnEmptyGenerationIsNotWritten) {
     const auto result = run_densify(model, rules);
     EXPECT_EQ(result.after, 50u);
     EXPECT_EQ(download_model(model, model.params).means, start.gaussians.means);
+}
+
+/// Every other splat is a little larger than its distance to the far side of the cameras' ball, along each axis in turn.
+TEST(DensifyEdges, WhatIsLargerThanItsDistanceToAllCamerasGoes) {
+    Start start(2340, 600, 0);
+    Gaussians& splats = start.gaussians;
+    DensifyRules rules = rules_for(1u << 20);
+    rules.prune_scale = 0;
+    rules.ball = {0.5f, -1, 2, 1.5f};
+    std::vector<float> kept;
+    for (size_t i = 0; i < 600; ++i) {
+        double square = 0;
+        for (size_t k = 0; k < 3; ++k) {
+            const double off = double(splats.means[3 * i + k]) - double(rules.ball[k]);
+            square += off * off;
+            splats.log_scales[3 * i + k] = -9;
+        }
+        const double distance = std::sqrt(square) + double(rules.ball[3]);
+        splats.log_scales[3 * i + i % 3] = float(std::log((i % 2 ? 1.001 : 0.999) * distance));
+        splats.opacity_logits[i] = 1;
+        if (i % 2 == 0) kept.insert(kept.end(), &splats.means[3 * i], &splats.means[3 * i] + 3);
+    }
+    const reference::Values old = splats;
+    const auto decisions = decide(old, reference::DensifyStatistics(600), options_for(rules));
+    EXPECT_EQ(std::ranges::count(decisions, Decision::keep), 300);
+    pipeline::Model model = pipeline::upload_model(*device(), splats, 2, true);
+    EXPECT_EQ(run_densify(model, rules).after, 300u);
+    EXPECT_EQ(download_model(model, model.params).means, kept);
+
+    rules.ball = pipeline::kUnlimited;
+    model = pipeline::upload_model(*device(), splats, 2, true);
+    EXPECT_EQ(run_densify(model, rules).after, 600u);
 }
 
 TEST(DensifyEdges, ANegativeNumberOfViewsPrunesAndNoneKeeps) {

@@ -177,6 +177,22 @@ TEST(Schedule, PointsAreNotResetAndHaveNoMcmc) {
     EXPECT_EQ(resolve(options, {}, {}).strategy, Strategy::mcmc);
 }
 
+TEST(Schedule, SplatsAreBoundedByTheirDistanceInShortRuns) {
+    TrainOptions options;
+    options.strategy = Strategy::adc;
+    options.steps = 1000;
+    EXPECT_TRUE(schedule_for(options).bounded);
+    options.steps = 1001;
+    EXPECT_FALSE(schedule_for(options).bounded);
+    options.steps = 250;
+    EXPECT_TRUE(schedule_for(options).bounded);
+    options.render.integrator = Integrator::fast_ray;  // no linearisation
+    EXPECT_FALSE(schedule_for(options).bounded);
+    options.render.integrator = Integrator::splat;
+    options.render.points = true;
+    EXPECT_FALSE(schedule_for(options).bounded);
+}
+
 TEST(Schedule, RelocationsStopWhereMcmcsCodeStopsThem) {
     TrainOptions options;
     const Schedule full = schedule_for(options);

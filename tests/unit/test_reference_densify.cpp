@@ -51,6 +51,20 @@ TEST(ReferenceDensify, LargeOnesGoOnceOpacityHasBeenReset) {
     EXPECT_EQ(decide(make(1.7, 0.5), 1, options), Decision::prune);
 }
 
+TEST(ReferenceDensify, WhatIsLargerThanItsDistanceToAllCamerasGoes) {
+    DensifyOptions options;
+    options.extent = 10;
+    Splat splat = make(3.1, 0.5);
+    splat.mean = {1, 2, 5};
+    EXPECT_EQ(decide(splat, 0, options), Decision::keep);
+    options.ball = {{1, 2, 3}, 1};
+    EXPECT_EQ(decide(splat, 0, options), Decision::prune);
+    EXPECT_EQ(decide(splat, 1, options), Decision::prune);  // it does not split, either
+    splat.log_scale = make(2.9, 0.5).log_scale;
+    EXPECT_EQ(decide(splat, 0, options), Decision::keep);
+    EXPECT_EQ(decide(splat, 1, options), Decision::split);
+}
+
 TEST(ReferenceDensify, StatisticsAreInDeviceCoordinatesOverViews) {
     Camera camera;
     camera.width = 200;
