@@ -27,7 +27,8 @@ std::vector<ViewFigure> far_below(std::vector<ViewFigure> views, double train_ps
     if (views.size() < kLeastViews) return {};
     std::vector<double> values;
     for (const ViewFigure& view : views) values.push_back(view.psnr);
-    const double most = std::min(scene::quantile(values, 0.5) - kFarBelowOthers, train_psnr - kFarBelowTraining);
+    const double most =
+        std::min(scene::quantile(values, 0.5) - kFarBelowOthers, train_psnr - kFarBelowTraining);
     std::erase_if(views, [&](const ViewFigure& view) { return !(view.psnr < most); });
     std::ranges::stable_sort(views, {}, &ViewFigure::psnr);
     if (views.size() > kMostChecked) views.resize(kMostChecked);
@@ -39,16 +40,18 @@ std::string wrong_cameras_text(const std::vector<DoubtfulView>& views, double us
     for (const DoubtfulView& view : views)
         if (view.moved_psnr >= view.psnr + kExplained)
             wrong.push_back(fmt::format(
-                "{} has {:.1f} dB, and {:.1f} dB turned by {:.1f} degrees and moved by {:.1f} % of the extent",
+                "{} has {:.1f} dB, and {:.1f} dB turned by {:.1f} degrees and moved by {:.1f} % of the "
+                "extent",
                 core::one_line(view.name), view.psnr, view.moved_psnr, view.degrees, 100 * view.share));
         else
             open.push_back(fmt::format("{} ({:.1f} dB)", core::one_line(view.name), view.psnr));
     std::string text;
     if (!wrong.empty()) text = "some cameras are probably wrong: " + list_of(wrong);
     if (!open.empty())
-        text += fmt::format("{}far worse than other held-out views ({:.1f} dB): {}. The camera is wrong, or no training "
-                            "image shows what is there",
-                            text.empty() ? "" : ". ", usual, list_of(open));
+        text += fmt::format(
+            "{}far worse than other held-out views ({:.1f} dB): {}. The camera is wrong, or no training "
+            "image shows what is there",
+            text.empty() ? "" : ". ", usual, list_of(open));
     return text;
 }
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """bench/captures.py searches the cameras of each capture once, trains it once for each seed, and its table says what came out."""
-import contextlib, io, json, math, pathlib, struct, sys, tempfile, unittest
+import contextlib, importlib.util, io, json, math, pathlib, struct, subprocess, sys, tempfile, unittest
 
 PROJECT = pathlib.Path(__file__).resolve().parents[2]
 SCRIPT = PROJECT / "bench/captures.py"
@@ -32,6 +32,16 @@ if words[0] == "cameras":
     print("placed 2 of 4 photos in 1 s", file=sys.stderr)
     print("some cameras may be wrong, or things look alike: 1 pair", file=sys.stderr)
     print(f"{{capture}}: 3 of 4 photos have cameras")
+if words[0] == "dataset":
+    scene = json.loads(pathlib.Path(words[1]).read_text())
+    names = [node["name"] for node in scene["nodes"] if "camera" in node]
+    (out / "images").mkdir(parents=True)
+    for name in names:
+        (out / "images" / (name + ".png")).write_text(option("--lens") if "--lens" in words else "pinhole")
+    # A quarter turn to the left, so that the camera looks along -x, three units to the right of the origin.
+    matrix = [[0, 0, 1, 3], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]]
+    (out / "transforms.json").write_text(json.dumps({{"frames": [dict(file_path="images/" + name + ".png", transform_matrix=matrix)
+                                                                for name in names]}}))
 if words[0] == "train":
     seed = int(option("--seed"))
     out.mkdir(parents=True)
@@ -136,6 +146,44 @@ class Captures(unittest.TestCase):
             status, _, complaint = self.run_script(*words)
             self.assertEqual((status, complaint.count("\n"), text in complaint), (2, 1, True), complaint)
             self.assertTrue(complaint.startswith("captures: "), complaint)
+
+
+@unittest.skipUnless(importlib.util.find_spec("numpy"), "scenes are made with numpy")
+class RenderedCaptures(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.ewa = self.folder / "ewa"
+        self.ewa.write_text(PROGRAM.format(python=sys.executable, log=str(self.folder / "log")))
+        self.ewa.chmod(0o755)
+
+    def make(self, *words):
+        subprocess.run([sys.executable, SCRIPT.parent / "rendered_captures.py", self.folder / "out", "--ewa", self.ewa, *words], check=True,
+                       capture_output=True)
+
+    def test_references_have_the_axes_of_opencv(self):
+        self.make("--only", "twins")
+        cameras = json.loads((self.folder / "out/twins/reference_cameras.json").read_text())
+        photos = sorted(path.stem for path in (self.folder / "out/twins/photos").iterdir())
+        self.assertEqual(sorted(cameras), photos)
+        self.assertEqual(len(photos), 32)
+        rotation, centre = cameras[photos[0]]
+        self.assertEqual(centre, [3, 0, 0])
+        self.assertEqual([abs(value) + 0 for value in rotation[6:]], [1, 0, 0])  # it looks along -x
+        self.assertEqual(rotation[6], -1)
+        self.assertEqual(rotation[3:6], [0, -1, 0])  # its y points down
+
+    def test_strangers_have_three_lenses_in_turn(self):
+        self.make("--only", "strangers,twins")
+        photos = sorted((self.folder / "out/strangers/photos").iterdir())
+        lenses = [path.read_text() for path in photos]
+        self.assertEqual(len(set(lenses)), 3)
+        self.assertEqual(lenses[:3] * 10, lenses[:30])
+        self.assertEqual({path.read_text() for path in (self.folder / "out/twins/photos").iterdir()}, {"pinhole"})
+        before = (self.folder / "log").read_text()
+        self.make("--only", "twins")
+        self.assertEqual((self.folder / "log").read_text(), before)  # what is there is not rendered again
 
 
 if __name__ == "__main__":
