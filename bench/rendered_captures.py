@@ -13,7 +13,7 @@ forward     a wall with things before it, from places side by side
 turntable   round a table with things on it
 barrel      the same through a lens with barrel distortion
 pincushion  the same through a lens with pincushion distortion
-strangers   the same through three lenses, one after the other
+strangers   the same through three lenses in turn
 """
 import argparse, json, pathlib, shutil, subprocess, sys, tempfile
 

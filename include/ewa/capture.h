@@ -97,7 +97,7 @@ void check_training_input(const std::filesystem::path& path);
 /// - masks: those that lie among the photos, or in masks/ beside their folder.
 /// - sparse/0: COLMAP's model, made last. A lens has one radial term, or OpenCV's radial and tangential terms where many photos
 ///   share it and determine them. 360° photos get the lens of all directions.
-///   With `level`, y of its world points down. Where the photos' GPS says so, x points east, z north, and a unit is a metre.
+///   With `level`, y of its world points down where the photos determine it. Where the photos' GPS says so, x points east, z north, and a unit is a metre.
 /// - place.json: the place of the world's origin on the globe, where GPS says it.
 /// - colmap/: what COLMAP needs to continue, and log.txt with what the programs print.
 /// - capture.json: input, options, and what distinguishes the contents of the photos or the video. A folder with the

@@ -62,7 +62,8 @@ struct Frame {
     std::optional<std::array<float, 3>> behind;
     /// Indices in Dataset::points of the points that the reconstruction saw in this image. Null: the dataset does not say.
     std::shared_ptr<const std::vector<uint32_t>> seen;
-    /// The median distance between these points' images and where the reconstruction saw them, px of the file. 0: not known.
+    /// The median distance between these points' images and where the reconstruction saw them, px of its image, whose size may not
+    /// be that of the file. 0: not known.
     float point_error = 0;
     Distortion distortion;  // of the file, which load_frame_image takes out; none with LensUse::native
     Camera pinhole;         // `camera` before downscaling

@@ -156,6 +156,10 @@ Json check_claim(const fs::path& folder, Json record, bool video) {
     for (Json* each : {&options, &record})
         if (each->is_object())
             for (const char* contents : {"files", "skipped", "archive"}) each->erase(contents);
+    // A world that is there stays as it is.
+    if (is_folder(folder / "sparse/0"))
+        for (Json* each : {&options, &record})
+            if (each->is_object()) each->erase("level");
     if (options != record)
         throw InputError(name + " is the dataset of another input, or was made with other options" +
                          ways_out);

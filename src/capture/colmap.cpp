@@ -149,9 +149,10 @@ void extract_features(const Colmap& colmap, const Photos& photos, const Panorama
                    });
         before += int(group.photos.size());
     }
-    if (FeatureDatabase database(work / "database.db"); database.is_known() && database.has_plain_images()) {
+    if (FeatureDatabase database(work / "database.db");
+        photos.names.size() <= kSameEachTime && database.is_known() && database.has_plain_images()) {
         database.clear_unwritten_descriptors();
-        if (photos.names.size() <= kSameEachTime) database.number_by_name();
+        database.number_by_name();
         database.commit();
     }
     part.mark();

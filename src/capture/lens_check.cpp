@@ -95,8 +95,12 @@ Grade grade_of(const SparseModel& model, const std::map<std::string, double>& ex
 }
 
 bool is_better(const Grade& first, const Grade& second) {
-    return std::tuple(first.credible(), first.placed, second.contradictions, second.error) >
-           std::tuple(second.credible(), second.placed, first.contradictions, first.error);
+    // A path that jumps may be right. So one without the jump wins only if it is nearly as long.
+    const bool comparable =
+        10 * std::min(first.sound, second.sound) >= 9 * std::max(first.sound, second.sound);
+    const auto worth = [&](const Grade& grade) { return comparable ? grade.credible() : grade.sound; };
+    return std::tuple(worth(first), first.placed, second.contradictions, second.error) >
+           std::tuple(worth(second), second.placed, first.contradictions, first.error);
 }
 
 bool is_enough(const Grade& grade, size_t photos) {

@@ -30,7 +30,7 @@ struct Grade {
 /// Without contradictions and parted photos, which the model does not know. expected: focal lengths by EXIF by the photos' names, px.
 Grade grade_of(const SparseModel& model, const std::map<std::string, double>& expected);
 
-/// Whether the first model is worth more: it has more credible photos, else more photos, else fewer contradictions, else a smaller
+/// Whether the first model is worth more: it has more sound photos, or more credible ones if the other has nearly as many, else more photos, else fewer contradictions, else a smaller
 /// error. More observations say nothing: those of a photo in a wrong place count, too.
 bool is_better(const Grade& first, const Grade& second);
 

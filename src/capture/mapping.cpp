@@ -191,7 +191,7 @@ void Mapping::say(const Placing& placing) const {
     if (placing.grade.sound < placing.grade.placed)
         text += "; " + std::to_string(placing.grade.placed - placing.grade.sound) + " cannot be right";
     if (placing.grade.parted > 0)
-        text += "; their path jumps, with " + std::to_string(placing.grade.parted) + " beyond";
+        text += "; " + std::to_string(placing.grade.parted) + " beyond a jump of the path";
     colmap_.say(text);
 }
 

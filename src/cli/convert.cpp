@@ -115,6 +115,7 @@ void drop_place(Work& work) {
 Work read_all(const ConvertArguments& arguments) {
     Work work;
     std::set<bool> marks, densities;
+    size_t placed = 0;  // inputs that know their place
     for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
         const fs::path& path = arguments.files[i];
         SplatScene scene =
@@ -130,6 +131,7 @@ Work read_all(const ConvertArguments& arguments) {
                                {"splats", scene.gaussians.size()},
                                {"sh_degree", scene.gaussians.sh_degree}});
         for (const std::string& remark : scene.remarks) work.lost.push_back(path.string() + ": " + remark);
+        placed += io::place_in(scene.comments).has_value();
         for (std::string& comment : scene.comments)
             if (std::find(work.save.comments.begin(), work.save.comments.end(), comment) ==
                 work.save.comments.end())
@@ -144,7 +146,7 @@ Work read_all(const ConvertArguments& arguments) {
     work.save.antialiased = marks.contains(true);
     const bool moved = std::ranges::any_of(
         arguments.placements, [](const glm::dmat4& placement) { return placement != glm::dmat4(1); });
-    if (moved || (arguments.files.size() > 2 && !io::place_in(work.save.comments))) drop_place(work);
+    if (moved || placed + 1 < arguments.files.size() || !io::place_in(work.save.comments)) drop_place(work);
     if (marks.size() > 1)
         work.lost.push_back(
             "some inputs were trained with --antialias and others not; the output is marked as anti-aliased");

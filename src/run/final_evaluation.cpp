@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/folders.h"
+#include "ewa/error.h"
 #include "image/metric.h"
 #include "report/pictures.h"
 #include "report/views.h"
@@ -89,10 +90,11 @@ bool FinalEvaluation::evaluate(RunCameras& cameras, const RunFolder& folder) {
                       spread_out(scene_.appearances, kTrainViewsEvaluated), !held_out, {})
                 .psnr;
         if (!std::isnan(train_psnr)) report_.summary.train_psnr = train_psnr;
-        if (held_out && !cameras.refine()) check_test_cameras(train_psnr);
     });
     for (std::future<void>& saved : saving_) saved.get();
     if (!done) report_.views.clear();
+    if (done && held_out && !cameras.refine() && report_.summary.train_psnr)
+        done_unless_stopped([&] { check_test_cameras(*report_.summary.train_psnr); });
     return done;
 }
 
@@ -103,6 +105,27 @@ void FinalEvaluation::evaluate_test_views() {
     if (of_test_views_->frames.empty()) return;  // no pixel counts
     report_.summary.test_psnr = of_test_views_->psnr;
     report_.summary.test_ssim = of_test_views_->ssim;
+}
+
+bool FinalEvaluation::can_align() const {
+    const RunOptions& options = input_.options;
+    // What --refine-poses cannot do either, and what may not fit on the device beside the renderer.
+    return options.train.render.integrator == Integrator::splat && !options.train.render.points &&
+           !scene_.sky && options.train.device_memory_bytes == 0 && options.ranks->size() == 1;
+}
+
+std::vector<CameraMotion> FinalEvaluation::motions_of(const std::vector<int>& frames, double extent) const {
+    std::vector<CameraMotion> still(frames.size());
+    if (!can_align()) return still;
+    try {
+        return align_cameras(scene_.device, scene_.gaussians, input_.dataset, frames, input_.options.train,
+                             extent, [&] {
+                                 stop_if_asked(observer_);
+                                 keep_waiting_();
+                             });
+    } catch (const RunError&) {
+        return still;  // too little memory ends no run that is trained
+    }
 }
 
 void FinalEvaluation::check_test_cameras(double train_psnr) {
@@ -126,11 +149,7 @@ void FinalEvaluation::check_test_cameras(double train_psnr) {
     for (const ViewFigure& view : low) frames.push_back(view.frame);
     if (frames.empty()) return;
     const double extent = scene_extent(input_.dataset, input_.split.train);
-    const std::vector<CameraMotion> motions = align_cameras(scene_.device, scene_.gaussians, input_.dataset,
-                                                            frames, input_.options.train, extent, [&] {
-                                                                stop_if_asked(observer_);
-                                                                keep_waiting_();
-                                                            });
+    const std::vector<CameraMotion> motions = motions_of(frames, extent);
     std::vector<DoubtfulView> doubtful;
     for (size_t i = 0; i < frames.size(); ++i) {
         const Frame& frame = input_.dataset.frames[size_t(frames[i])];

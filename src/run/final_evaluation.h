@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "ewa/camera_motion.h"
 #include "ewa/run_observer.h"
 #include "report/html.h"
 #include "run/evaluation.h"
@@ -67,6 +68,10 @@ class FinalEvaluation {
     void evaluate_test_views();
     /// Adds a remark on held-out views whose cameras may be wrong. train_psnr: of the training views.
     void check_test_cameras(double train_psnr);
+    /// Whether the cameras of views can be moved to where the splats fit their images best.
+    bool can_align() const;
+    /// Those that do so; none where they cannot be moved. extent: of the scene.
+    std::vector<CameraMotion> motions_of(const std::vector<int>& frames, double extent) const;
     /// The image of a frame through a camera, and the render.
     RenderedView rendered_through(const Camera& camera, int index);
     Evaluation evaluated(const std::vector<int>& frames, const std::vector<Appearance>& appearances,

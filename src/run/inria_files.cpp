@@ -97,7 +97,7 @@ void save_inria(const fs::path& folder, const RunInput& input, const Gaussians& 
     const fs::path splats =
         made_without_links(made_without_links(model / kSplats) / fmt::format("iteration_{}", step));
     write_splats(without_link(splats / "point_cloud.ply"), gaussians, step, input.options.train.render,
-                 io::read_place(input.dataset.root));
+                 place_of(input));
 }
 
 void remove_inria_splats(const fs::path& folder) {

@@ -145,7 +145,7 @@ void Run::read_checkpoint(const RunOptions& asked) {
 /// Called as late as possible, since it ends an earlier run that is replaced.
 void Run::begin_files() {
     folder_.begin(train::to_config(options()), earlier_.has_value());
-    folder_.set_place(io::read_place(input_.dataset.root));
+    folder_.set_place(train::place_of(input_));
     if (options().robust) train::save_masks(input_);
     if (!earlier_) train::remove_inria_splats(folder_.path());
     files_.emplace(MetricsFiles{report::MetricsLog(folder_.metrics(), progress_.metrics), {}});

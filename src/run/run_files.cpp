@@ -32,6 +32,10 @@ const fs::path& made(const fs::path& folder) {
 
 }  // namespace
 
+std::optional<io::Place> place_of(const RunInput& input) {
+    return input.options.level ? io::read_place(input.dataset.root) : std::nullopt;
+}
+
 void write_splats(const fs::path& file, const Gaussians& gaussians, int step, const RenderOptions& render,
                   const std::optional<io::Place>& place) {
     std::vector<std::string> comments{

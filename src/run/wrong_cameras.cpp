@@ -40,18 +40,19 @@ std::string wrong_cameras_text(const std::vector<DoubtfulView>& views, double us
     for (const DoubtfulView& view : views)
         if (view.moved_psnr >= view.psnr + kExplained)
             wrong.push_back(fmt::format(
-                "{} has {:.1f} dB, and {:.1f} dB turned by {:.1f} degrees and moved by {:.1f} % of the "
-                "extent",
+                "{}: {:.1f} dB, and {:.1f} dB with its camera turned by {:.1f} degrees and "
+                "moved by {:.1f} % of the scene's extent",
                 core::one_line(view.name), view.psnr, view.moved_psnr, view.degrees, 100 * view.share));
         else
             open.push_back(fmt::format("{} ({:.1f} dB)", core::one_line(view.name), view.psnr));
     std::string text;
     if (!wrong.empty()) text = "some cameras are probably wrong: " + list_of(wrong);
+    if (!wrong.empty() && !open.empty()) text += ". ";
     if (!open.empty())
         text += fmt::format(
-            "{}far worse than other held-out views ({:.1f} dB): {}. The camera is wrong, or no training "
-            "image shows what is there",
-            text.empty() ? "" : ". ", usual, list_of(open));
+            "some cameras may be wrong, or no training image shows what these held-out views do: {}. "
+            "The median view has {:.1f} dB",
+            list_of(open), usual);
     return text;
 }
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which points hold a frame's camera, and which frames it shares them with.
-#include <spdlog/fmt/fmt.h>
-
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <vector>
 
 #include "core/text.h"
 #include "core/typing.h"
@@ -10,17 +12,41 @@
 
 namespace ewa {
 
-std::vector<CameraSupport> camera_support(const Dataset& dataset, size_t most) {
-    const size_t count = dataset.frames.size();
-    std::vector<std::vector<uint32_t>> frames_of;  // by point
-    for (size_t i = 0; i < count; ++i) {
-        if (!dataset.frames[i].seen) continue;
-        for (const uint32_t point : *dataset.frames[i].seen) {
-            if (point >= frames_of.size()) frames_of.resize(size_t(point) + 1);
-            frames_of[point].push_back(uint32_t(i));
+namespace {
+
+/// The frames that see each point: those of point i are frames[first[i]] to frames[first[i + 1] - 1]. Two arrays for all points: there
+/// may be ten millions.
+struct Sightings {
+    std::vector<uint64_t> first;
+    std::vector<uint32_t> frames;
+};
+
+Sightings sightings_of(const Dataset& dataset) {
+    Sightings sightings;
+    auto& [first, frames] = sightings;
+    for (const Frame& frame : dataset.frames) {
+        if (!frame.seen) continue;
+        for (const uint32_t point : *frame.seen) {
+            if (first.size() < size_t(point) + 2) first.resize(size_t(point) + 2);
+            ++first[size_t(point) + 1];
         }
     }
-    if (frames_of.empty()) return {};
+    for (size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
+    if (first.empty()) return sightings;
+    frames.resize(first.back());
+    std::vector<uint64_t> next = first;
+    for (size_t i = 0; i < dataset.frames.size(); ++i)
+        if (dataset.frames[i].seen)
+            for (const uint32_t point : *dataset.frames[i].seen) frames[next[point]++] = uint32_t(i);
+    return sightings;
+}
+
+}  // namespace
+
+std::vector<CameraSupport> camera_support(const Dataset& dataset, size_t most) {
+    const size_t count = dataset.frames.size();
+    const Sightings sightings = sightings_of(dataset);
+    if (sightings.frames.empty()) return {};
     std::vector<CameraSupport> supports(count);
     std::vector<size_t> shared(count);
     for (size_t i = 0; i < count; ++i) {
@@ -31,7 +57,8 @@ std::vector<CameraSupport> camera_support(const Dataset& dataset, size_t most) {
         support.error = frame.point_error;
         std::ranges::fill(shared, size_t(0));
         for (const uint32_t point : *frame.seen)
-            for (const uint32_t other : frames_of[point]) ++shared[other];
+            for (uint64_t k = sightings.first[point]; k < sightings.first[size_t(point) + 1]; ++k)
+                ++shared[sightings.frames[k]];
         for (size_t other = 0; other < count; ++other)
             if (other != i && shared[other] > 0) support.neighbors.push_back({int(other), shared[other]});
         std::ranges::stable_sort(support.neighbors, std::greater<>(), &CameraSupport::Neighbor::points);
@@ -45,14 +72,14 @@ std::string neighbors_text(const Dataset& dataset, const CameraSupport& support)
     for (size_t k = 0; k < support.neighbors.size(); ++k) {
         const auto& [frame, points] = support.neighbors[k];
         if (k > 0) text += k + 1 == support.neighbors.size() ? " and " : ", ";
-        text += fmt::format("{} ({})", core::one_line(dataset.frames[size_t(frame)].name), points);
+        text += core::one_line(dataset.frames[size_t(frame)].name) + " (" + std::to_string(points) + ")";
     }
     return text;
 }
 
 std::string support_text(const Dataset& dataset, const CameraSupport& support) {
     std::string text = core::counted(support.points, "point");
-    if (support.error > 0) text += fmt::format(", {:.2f} px", support.error);
+    if (support.error > 0) text += ", " + core::shown_number(std::round(100 * support.error) / 100) + " px";
     const std::string neighbors = neighbors_text(dataset, support);
     return neighbors.empty() ? text : text + "; most in common with " + neighbors;
 }

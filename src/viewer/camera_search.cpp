@@ -52,6 +52,7 @@ void CameraSearch::start(const fs::path& photos, const fs::path& folder, const C
         OpenedScene scene = open_scene(folder, {});
         scene.photos = photos;
         scene.title = scene_title(photos);
+        if (!capture.axes.empty()) scene.remark = capture.axes + "; " + scene.remark;
         for (const std::string& remark : capture.remarks) scene.remark = remark + "; " + scene.remark;
         return scene;
     });

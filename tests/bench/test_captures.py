@@ -38,8 +38,8 @@ if words[0] == "dataset":
     (out / "images").mkdir(parents=True)
     for name in names:
         (out / "images" / (name + ".png")).write_text(option("--lens") if "--lens" in words else "pinhole")
-    # A quarter turn to the left, so that the camera looks along -x, three units to the right of the origin.
-    matrix = [[0, 0, 1, 3], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]]
+    # The camera's right, up and back are the world's y, z and x: it looks along -x, three units from the origin.
+    matrix = [[0, 0, 1, 3], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
     (out / "transforms.json").write_text(json.dumps({{"frames": [dict(file_path="images/" + name + ".png", transform_matrix=matrix)
                                                                 for name in names]}}))
 if words[0] == "train":
@@ -170,9 +170,7 @@ class RenderedCaptures(unittest.TestCase):
         self.assertEqual(len(photos), 32)
         rotation, centre = cameras[photos[0]]
         self.assertEqual(centre, [3, 0, 0])
-        self.assertEqual([abs(value) + 0 for value in rotation[6:]], [1, 0, 0])  # it looks along -x
-        self.assertEqual(rotation[6], -1)
-        self.assertEqual(rotation[3:6], [0, -1, 0])  # its y points down
+        self.assertEqual([rotation[3 * k:3 * k + 3] for k in range(3)], [[0, 1, 0], [0, 0, -1], [-1, 0, 0]])  # right, down, forward
 
     def test_strangers_have_three_lenses_in_turn(self):
         self.make("--only", "strangers,twins")

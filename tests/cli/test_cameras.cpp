@@ -72,10 +72,9 @@ TEST_F(Cameras, ComeFromComparingWhatLooksAlike) {
     fs::remove(folder_ / "calls");
     make_model("0", {"0.png", "1.png", "2.png"});
     ASSERT_EQ(cameras(features).status, 0);
-    // Three of four are so few that another way is tried, too. At last the fourth may come with fewer matches.
-    EXPECT_EQ(
-        calls(),
-        "feature_extractor\nmatches_importer\nmapper\nmapper\nmatches_importer\nmapper\nmapper\nmapper\n");
+    // Three of four are so few that all are compared, then another way is tried. At last the fourth may come with fewer matches.
+    EXPECT_EQ(calls(),
+              "feature_extractor\nmatches_importer\nmapper\nmatches_importer\nmapper\nmapper\nmapper\n");
     EXPECT_TRUE(first_and_last());
 
     // A search that failed at the end continues there.
@@ -104,7 +103,7 @@ esac
     EXPECT_NE(outcome.out.find("placed 4 of 4 photos with forward motion in "), std::string::npos)
         << outcome.out;
     EXPECT_NE(outcome.out.find("4 of 4 photos have cameras"), std::string::npos) << outcome.out;
-    EXPECT_EQ(calls(), "feature_extractor\nmatches_importer\nmapper\nmapper\n");
+    EXPECT_EQ(calls(), "feature_extractor\nmatches_importer\nmapper\nmatches_importer\nmapper\nmapper\n");
 }
 
 /// A mapper that adds a photo to its model where that may have fewer matches.

@@ -37,6 +37,37 @@ TEST(Convert, FromEachFormatToEach) {
     }
 }
 
+/// A place in a PLY's comments stays while the splats stay there, and tiles are put there.
+TEST(Convert, KeepsThePlaceOfSplatsThatStayThere) {
+    const Folder folder;
+    make_splats(folder / "plain.ply", 50, 0);
+    const std::string comment = "ewa place 47.5 8.25 410", dropped = "the place on the globe is dropped";
+    ewa::save_splats(folder / "here.ply", ewa::load_splats(folder / "plain.ply"), {comment});
+    const auto says_place = [&](const std::string& file) {
+        return run_ewa({"info", folder / file}).out.find(comment) != std::string::npos;
+    };
+    const auto convert = [&](const Names& words) {
+        Names command{"convert"};
+        command.insert(command.end(), words.begin(), words.end());
+        const Outcome outcome = run_ewa(command);
+        expect_success(outcome);
+        return outcome.out.find(dropped) != std::string::npos;
+    };
+    EXPECT_FALSE(convert({folder / "here.ply", folder / "copy.ply"}));
+    EXPECT_TRUE(says_place("copy.ply"));
+    EXPECT_TRUE(convert({folder / "here.ply", folder / "moved.ply", "--transform", "move=1,0,0"}));
+    EXPECT_FALSE(says_place("moved.ply"));
+    EXPECT_TRUE(convert({folder / "here.ply", folder / "plain.ply", folder / "joined.ply"}))
+        << "the other input knows no place";
+    EXPECT_FALSE(says_place("joined.ply"));
+    EXPECT_FALSE(convert({folder / "here.ply", folder / "copy.ply", folder / "both.ply"}));
+    EXPECT_TRUE(says_place("both.ply"));
+    convert({folder / "here.ply", folder / "tiles/tileset.json"});
+    convert({folder / "plain.ply", folder / "same/tileset.json", "--geo", "47.5,8.25,410"});
+    EXPECT_EQ(read_json(folder / "tiles/tileset.json")["root"]["transform"],
+              read_json(folder / "same/tileset.json")["root"]["transform"]);
+}
+
 TEST(Convert, SaysWhatIsLostAndMeasuresIt) {
     const Folder folder;
     make_splats(folder / "s.ply", 300, 2);

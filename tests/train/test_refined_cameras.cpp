@@ -304,11 +304,11 @@ TEST(WrongCameras, AreFarBelowOthersAndTheTrainingViews) {
     const std::string text =
         train::wrong_cameras_text({{"a.jpg", 12, 17, 2.5, 0.031}, {"b.jpg", 13, 13.5, 9, 0.2}}, 24.3);
     EXPECT_EQ(text,
-              "some cameras are probably wrong: a.jpg has 12.0 dB, and 17.0 dB turned by 2.5 degrees and "
-              "moved by 3.1 % of "
-              "the extent. far worse than other held-out views (24.3 dB): b.jpg (13.0 dB). The camera is "
-              "wrong, or no "
-              "training image shows what is there");
+              "some cameras are probably wrong: a.jpg: 12.0 dB, and 17.0 dB with its camera turned by 2.5 "
+              "degrees and moved "
+              "by 3.1 % of the scene's extent. some cameras may be wrong, or no training image shows what "
+              "these held-out "
+              "views do: b.jpg (13.0 dB). The median view has 24.3 dB");
 }
 
 /// A run over true cameras but one, which was held out.
@@ -328,7 +328,7 @@ TEST(WrongCameras, ARunNamesAHeldOutOne) {
     EXPECT_EQ(remark_of(cameras), "");
     cameras.frames[3].camera = moved(cameras.frames[3].camera, {{0, glm::radians(2.0), 0}, 0, {}});
     const std::string remark = remark_of(cameras);
-    EXPECT_TRUE(remark.starts_with("some cameras are probably wrong: " + cameras.frames[3].name + " has "))
+    EXPECT_TRUE(remark.starts_with("some cameras are probably wrong: " + cameras.frames[3].name + ": "))
         << remark;
     const size_t turned = remark.find("turned by ");
     ASSERT_NE(turned, std::string::npos) << remark;

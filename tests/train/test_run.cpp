@@ -431,6 +431,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                              {"masks", "cut"},
                                              {"lens", "native"},
                                              {"test-every", "5"},
+                                             {"level", "off"},
                                              {"skip-blurred", "true"},
                                              {"weigh-blurred", "true"},
                                              {"robust", "true"},

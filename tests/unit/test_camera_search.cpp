@@ -127,6 +127,8 @@ TEST(LensCheck, SoundPhotosCountFirst) {
     EXPECT_TRUE(is_better(exact, right));
     EXPECT_TRUE(is_better(right, jumping));
     EXPECT_FALSE(is_enough(jumping, 30));
+    const Grade two_rounds{.placed = 80, .sound = 80, .parted = 40}, one_round{.placed = 42, .sound = 42};
+    EXPECT_TRUE(is_better(two_rounds, one_round));
     EXPECT_FALSE(is_better(right, right));
     EXPECT_TRUE(is_enough(right, 30));
     EXPECT_FALSE(is_enough(right, 31));
@@ -287,7 +289,7 @@ TEST(CameraSupports, AreThoseOfTheModel) {
     EXPECT_EQ(supports[0].neighbors[0].points, 300u);
     EXPECT_EQ(supports[3].neighbors[0].points, 200u);
     EXPECT_EQ(support_text(dataset, supports[1]),
-              "300 points, 3.00 px; most in common with p11.jpg (300) and p13.jpg (300)");
+              "300 points, 3 px; most in common with p11.jpg (300) and p13.jpg (300)");
     EXPECT_TRUE(camera_support(Dataset{}).empty());
 }
 

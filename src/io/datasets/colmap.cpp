@@ -176,6 +176,7 @@ void find_images(const ImageFinder& finder, const std::string& where, ImageRecor
 }
 
 constexpr size_t kMaxName = 4096;
+constexpr uint64_t kMostFeatures = 10000;                            // of an image, whose errors are measured
 constexpr uint64_t kNoPoint = std::numeric_limits<uint64_t>::max();  // of a feature that shows none
 // Bytes of the shortest entry of each list, and of each item that an entry counts.
 constexpr uint64_t kCameraBytes = 4 + 4 + 8 + 8 + 2 * 8, kImageBytes = 4 + 7 * 8 + 4 + 1 + 8;
@@ -218,10 +219,13 @@ void read_binary_images(const std::filesystem::path& path, ColmapBuilder& builde
         const std::string name = reader.read_zero_terminated(kMaxName, "the name of an image");
         builder.add_image(id, pose, camera_id, name, fail);
         const uint64_t observations = read_count(reader, kObservationBytes, "observations");
-        for (uint64_t number = 0; number < observations; ++number) {
+        // As many as a median needs.
+        const uint64_t step = observations / kMostFeatures + 1;
+        for (uint64_t number = 0; number < observations; number += step) {
             const auto x = reader.read<double>("an observation"), y = reader.read<double>("an observation");
             if (reader.read<uint64_t>("an observation") != kNoPoint)
                 builder.add_feature(uint32_t(number), {x, y});
+            reader.skip((std::min(step, observations - number) - 1) * kObservationBytes, "observations");
         }
     }
 }

@@ -16,6 +16,8 @@ namespace ewa::io {
 namespace {
 
 constexpr std::string_view kComment = "ewa place ";
+constexpr const char* kAxes =
+    "x east, y down, z north, metres";  // of the world; files of others have other axes
 
 /// Latitude, longitude and height. Empty unless they are on the globe.
 std::optional<Place> checked(const std::array<double, 3>& values) {
@@ -35,20 +37,25 @@ std::optional<Place> place_of(std::string_view comment) {
 std::optional<Place> read_place(const std::filesystem::path& folder) {
     const std::filesystem::path file = folder / kPlaceFile;
     if (!core::is_file(file)) return {};
-    const auto json = core::read_json_file<nlohmann::json>(file, {.bytes = 1u << 16});
+    nlohmann::json json;
+    try {
+        json = core::read_json_file<nlohmann::json>(file, {.bytes = 1u << 16});
+    } catch (const InputError&) {
+        return {};  // another program's
+    }
+    if (!json.is_object() || json.value("axes", nlohmann::json()) != kAxes) return {};
     std::array values{std::nan(""), std::nan(""), std::nan("")};
     const std::array names{"latitude", "longitude", "height"};
     for (size_t i = 0; i < names.size(); ++i)
-        if (json.is_object() && json.contains(names[i]) && json[names[i]].is_number())
-            values[i] = json[names[i]].get<double>();
-    if (const auto place = checked(values)) return place;
-    throw InputError(core::one_line(file.string()) +
-                     ": not a place; expected numbers latitude, longitude and height");
+        if (json.contains(names[i]) && json[names[i]].is_number()) values[i] = json[names[i]].get<double>();
+    return checked(values);
 }
 
 void write_place(const std::filesystem::path& file, const Place& place) {
-    core::write_json(
-        file, {{"latitude", place.latitude}, {"longitude", place.longitude}, {"height", place.height}});
+    core::write_json(file, {{"axes", kAxes},
+                            {"latitude", place.latitude},
+                            {"longitude", place.longitude},
+                            {"height", place.height}});
 }
 
 std::string place_comment(const Place& place) {

@@ -11,12 +11,12 @@ namespace ewa::io {
 
 inline constexpr const char* kPlaceFile = "place.json";
 
-/// A place on the globe: WGS 84, degrees and metres above the ellipsoid. heading: of the scene's z axis, clockwise from north.
+/// A place on the globe: degrees of WGS 84, and metres above the ellipsoid. Heights by EXIF are above the sea. heading: of the scene's z axis, clockwise from north.
 struct Place {
     double latitude = 0, longitude = 0, height = 0, heading = 0;
 };
 
-/// The place of the dataset in a folder; empty if it has none. Throws InputError where the file is damaged.
+/// The place of the dataset in a folder; empty if it has none. A file that write_place has not written, or a damaged one, is none.
 std::optional<Place> read_place(const std::filesystem::path& folder);
 /// Throws RunError.
 void write_place(const std::filesystem::path& file, const Place& place);
