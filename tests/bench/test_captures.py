@@ -59,7 +59,9 @@ def about_vertical(angle):
     return [math.cos(angle), 0, math.sin(angle), 0, 1, 0, -math.sin(angle), 0, math.cos(angle)]
 
 
-class Captures(unittest.TestCase):
+class WithProgram(unittest.TestCase):
+    """A folder with PROGRAM in it."""
+
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
@@ -67,6 +69,11 @@ class Captures(unittest.TestCase):
         self.ewa = self.folder / "ewa"
         self.ewa.write_text(PROGRAM.format(python=sys.executable, log=str(self.folder / "log")))
         self.ewa.chmod(0o755)
+
+
+class Captures(WithProgram):
+    def setUp(self):
+        super().setUp()
         for name in ("right", "turned"):
             self.capture(name)
         (self.folder / "photos/notes").mkdir()
@@ -149,15 +156,7 @@ class Captures(unittest.TestCase):
 
 
 @unittest.skipUnless(importlib.util.find_spec("numpy"), "scenes are made with numpy")
-class RenderedCaptures(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-        self.ewa = self.folder / "ewa"
-        self.ewa.write_text(PROGRAM.format(python=sys.executable, log=str(self.folder / "log")))
-        self.ewa.chmod(0o755)
-
+class RenderedCaptures(WithProgram):
     def make(self, *words):
         subprocess.run([sys.executable, SCRIPT.parent / "rendered_captures.py", self.folder / "out", "--ewa", self.ewa, *words], check=True,
                        capture_output=True)
