@@ -10,18 +10,22 @@
 #include <variant>
 #include <vector>
 
-#include "ewa/exposure.h"
 #include "ewa/image.h"
 
 namespace ewa {
 
 enum class AppearanceModel {
     none,
-    affine,    // an affine map of colours for each image: Exposure
+    affine,    // an affine map of colours for each image, as 3DGS learns exposures: Exposure
     ppisp,     // exposure and colours of each image, vignette and response of each camera: Ppisp
     grid,      // a bilateral grid of affine maps for each image: ColorGrid
     automatic  // ppisp if the training images disagree on the colours of the points or by EXIF, else none
 };
+
+/// An affine map of colours: three rows of a 3x3 matrix M, each followed by its offset in b. The training image shows M c + b
+/// where the splats have colour c.
+using Exposure = std::array<float, 12>;
+inline constexpr Exposure kIdentityExposure{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
 /// PPISP: an image's exposure and colour map, and its camera's vignette and response, in this order
 /// (shaders/lib/ppisp.glsl has the formulas). Without arguments it changes no colour of 0 to 1.
@@ -79,11 +83,11 @@ class NewViewAppearance {
     std::optional<Appearance> of_all_;
 };
 
-/// The appearances of training images under their Frame::name: appearance.json or exposures.json of a run's folder. Throws
-/// InputError if the file cannot be read, or values are missing or not finite.
+/// The appearances of training images under their Frame::name: appearance.json of a run's folder, or the exposures.json of older
+/// ones. Throws InputError if the file cannot be read, or values are missing or not finite.
 std::map<std::string, Appearance> load_appearances(const std::filesystem::path& path);
-/// Writes appearance.json. names: one for each of the appearances, which have one model and are not Exposure. Throws
-/// RunError (disk), InputError (others).
+/// Writes appearance.json. names: one for each of the appearances, which have one model. Throws RunError (disk), InputError
+/// (others).
 void save_appearances(const std::filesystem::path& path, const std::vector<std::string>& names,
                       const std::vector<Appearance>& appearances);
 

@@ -23,7 +23,6 @@ struct RunResult {
 /// - splats.ply: the splats.
 /// - cameras.json and the COLMAP model cameras/sparse/0, with TrainOptions::refine_poses: the refined cameras.
 /// - passers_by/*.png, with `robust`: the masks of what single training images show.
-/// - exposures.json, with TrainOptions::exposure: three rows of four numbers for each training image.
 /// - splats_007000.ply and so on, with `keep`: the splats after these steps.
 /// - inria/, with `inria`: cfg_args, cameras.json, input.ply, point_cloud/iteration_N/point_cloud.ply.
 /// - test/*.png: renders of some test views (train/*.png without a test set).

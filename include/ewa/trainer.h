@@ -13,7 +13,6 @@
 #include "ewa/camera_motion.h"
 #include "ewa/dataset.h"
 #include "ewa/device.h"
-#include "ewa/exposure.h"
 #include "ewa/gaussians.h"
 #include "ewa/ranks.h"
 #include "ewa/renderer.h"

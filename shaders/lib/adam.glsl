@@ -6,6 +6,7 @@
 #include "lib/params.glsl"
 #include "lib/step_limits.glsl"
 #include "lib/moments.glsl"
+#include "lib/adam_step.glsl"
 #include "lib/sh.glsl"
 
 #ifdef ADAM_OF_PUSH
@@ -35,8 +36,7 @@ const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;
 
 uint index_of(uint plane, uint i) { return param_texel(push.planes, plane, i); }
 
-// Adam's step of one texel of parameters (Kingma and Ba 2015, algorithm 1), or that with Nesterov's momentum (Dozat 2016,
-// algorithm 2).
+// Adam's step of one texel of parameters.
 // random: rounds packed moments.
 void move_rounded(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, float depth, uvec4 random) {
     const uint at = index_of(plane, i);
@@ -61,7 +61,7 @@ void move_rounded(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, 
     const vec4 old_v = PACKED_MOMENTS ? second_moment(words) : uintBitsToFloat(fetch(moments2, at));
     const vec4 v = DECAYED(gradient * gradient, old_v, BETA2);
 #endif
-    vec4 moved = value - rate * (m * push.moment_share + gradient * push.gradient_share) / (sqrt(v * push.bias2) + EPSILON);
+    vec4 moved = adam_moved(value, m, v, gradient, rate, vec2(push.moment_share, push.gradient_share), push.bias2, EPSILON);
     const bool limited = limit_step(plane, value, depth, moved);
     if (is_finite(moved) && is_finite(m) && is_finite(v)) {
         if (limited) ++limited_steps;

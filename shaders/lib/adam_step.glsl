@@ -1,16 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-// A step of Adam of one value, as the passes take it whose values are few.
+// Adam's step: of splats, and of all that training learns beside them.
 #ifndef EWA_LIB_ADAM_STEP
 #define EWA_LIB_ADAM_STEP
-// state: value and both moments. bias: 1 / (1 - beta^step) of each moment. A step that is not finite changes nothing.
-// Returns whether it was taken.
-bool adam_step(inout vec3 state, float gradient, float rate, vec2 bias) {
-    const float m = mix(gradient, state.y, float(ADAM_BETA1));
-    const float v = mix(gradient * gradient, state.z, float(ADAM_BETA2));
-    const float moved = state.x - rate * (m * bias.x) / (sqrt(v * bias.y) + float(ADAM_EPSILON));
-    const vec3 next = vec3(moved, m, v);
-    if (!is_finite(next)) return false;
-    state = next;
+// Where a step goes with these moments (Kingma and Ba 2015, algorithm 1). shares: what the step takes of the first moment and of
+// the gradient, corrected for their bias. A share of the gradient gives Nesterov's momentum (Dozat 2016, algorithm 2).
+vec4 adam_moved(vec4 value, vec4 m, vec4 v, vec4 gradient, vec4 rate, vec2 shares, float bias2, float epsilon) {
+    return value - rate * (m * shares.x + gradient * shares.y) / (sqrt(v * bias2) + epsilon);
+}
+
+struct AdamState {
+    vec4 value, m, v;
+};
+
+// bias: 1 / (1 - beta^step) of each moment. A step that is not finite changes nothing. Returns whether it was taken.
+bool adam_step(inout AdamState state, vec4 gradient, float rate, vec2 bias) {
+    const vec4 m = mix(gradient, state.m, float(ADAM_BETA1));
+    const vec4 v = mix(gradient * gradient, state.v, float(ADAM_BETA2));
+    const vec4 moved = adam_moved(state.value, m, v, vec4(0.0), vec4(rate), vec2(bias.x, 0.0), bias.y, float(ADAM_EPSILON));
+    if (!(is_finite(moved) && is_finite(m) && is_finite(v))) return false;
+    state = AdamState(moved, m, v);
     return true;
 }
 #endif

@@ -6,7 +6,6 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/image.glsl"
-#include "lib/exposure.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Image { float image[]; };
@@ -21,6 +20,6 @@ void main() {
     const uint at = pixel_offset(push.image, i);
     const uvec3 planes = uvec3(PLANE_R, PLANE_G, PLANE_B) * push.image.plane_floats + at;
     const vec3 color = vec3(image[planes.r], image[planes.g], image[planes.b]);
-    const vec3 shown = exposed_color(slice_at(i, color).rows, color);
+    const vec3 shown = mapped(slice_at(i, color).rows, color);
     [[unroll]] for (uint c = 0; c < 3; ++c) exposed[planes[c]] = shown[c];
 }

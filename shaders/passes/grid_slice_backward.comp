@@ -28,6 +28,6 @@ void main() {
         back += gradient[c] * slice.rows[c].xyz;
         by_level += gradient[c] * dot(slice.by_level[c], vec4(color, 1.0));
     }
-    if (grey >= 0.0 && grey <= 1.0) back += by_level * float(GRID_DEPTH - 1u) * GREY;
+    if (!ONE_CELL && grey >= 0.0 && grey <= 1.0) back += by_level * float(GRID_DEPTH - 1u) * GREY;
     [[unroll]] for (uint c = 0; c < 3; ++c) image_gradient[planes[c]] = back[c];
 }

@@ -6,6 +6,7 @@
 // An update that is not finite is dropped and counted. A frame whose instances did not fit changes nothing.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
+#include "lib/adam_step.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Sums { vec4 sums[]; };
@@ -24,14 +25,12 @@ void main() {
     const vec4 value = grids[at];
     const vec4 identity = vec4(row == 0u, row == 1u, row == 2u, 0.0);
     const vec4 gradient = sum + push.pull * (value - identity);
-    const vec4 m = mix(gradient, moments1[at], float(ADAM_BETA1));
-    const vec4 v = mix(gradient * gradient, moments2[at], float(ADAM_BETA2));
-    const vec4 moved = value - push.rate * (m * push.bias1) / (sqrt(v * push.bias2) + float(ADAM_EPSILON));
-    if (!(is_finite(moved) && is_finite(m) && is_finite(v))) {
+    AdamState state = AdamState(value, moments1[at], moments2[at]);
+    if (!adam_step(state, gradient, push.rate, vec2(push.bias1, push.bias2))) {
         atomicAdd(counts.dropped_updates, 1u);
         return;
     }
-    grids[at] = moved;
-    moments1[at] = m;
-    moments2[at] = v;
+    grids[at] = state.value;
+    moments1[at] = state.m;
+    moments2[at] = state.v;
 }

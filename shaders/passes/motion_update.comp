@@ -9,6 +9,7 @@
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
 #include "lib/motion.glsl"
+#include "lib/adam_step.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Sums { float sums[]; };
@@ -52,8 +53,9 @@ void main() {
         [[unroll]] for (uint i = 0; i < MOTION_VALUES; ++i) g += bases[basis + MOTION_VALUES * i + j] * gradient[i];
         m[j] = mix(g, moments1[at + j], push.beta1);
         v[j] = mix(g * g, moments2[at + j], push.beta2);
-        const float step = push.rate * (m[j] * push.bias1) / (sqrt(v[j] * push.bias2) + float(ADAM_EPSILON));
-        [[unroll]] for (uint i = 0; i < MOTION_VALUES; ++i) moved[i] -= bases[basis + MOTION_VALUES * i + j] * step;
+        const float step = adam_moved(vec4(0.0), vec4(m[j]), vec4(v[j]), vec4(0.0), vec4(push.rate), vec2(push.bias1, 0.0),
+                                      push.bias2, float(ADAM_EPSILON)).x;
+        [[unroll]] for (uint i = 0; i < MOTION_VALUES; ++i) moved[i] += bases[basis + MOTION_VALUES * i + j] * step;
         finite = finite && is_finite(m[j]) && is_finite(v[j]);
     }
     [[unroll]] for (uint i = 0; i < MOTION_VALUES; ++i) finite = finite && is_finite(moved[i]);

@@ -1,7 +1,7 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
 // Applies a training image's PPISP to the render, before the loss compares the two.
-// One workgroup is one subgroup and owns EXPOSURE_BLOCK pixels. It reads the render's planes and the values of the photo and
+// One workgroup is one subgroup and owns PPISP_BLOCK pixels. It reads the render's planes and the values of the photo and
 // its camera, and writes the planes as the photo shows them.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
@@ -18,7 +18,7 @@ layout(push_constant, scalar) uniform Push { PpispPush push; };
 void main() {
     const uint block = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     const uint pixels = push.image.size[0] * push.image.size[1];
-    const uint begin = block * EXPOSURE_BLOCK, end = min(begin + EXPOSURE_BLOCK, pixels);
+    const uint begin = block * PPISP_BLOCK, end = min(begin + PPISP_BLOCK, pixels);
     const Ppisp ppisp = pushed_ppisp();
     for (uint i = begin + LANE; i < end; i += SUBGROUP) {
         const uint at = pixel_offset(push.image, i);

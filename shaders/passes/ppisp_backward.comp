@@ -1,6 +1,6 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Gradient of ppisp. One workgroup is one subgroup and owns EXPOSURE_BLOCK pixels. It reads the render and the values of the
+// Gradient of ppisp. One workgroup is one subgroup and owns PPISP_BLOCK pixels. It reads the render and the values of the
 // photo and its camera, updates dL/d(image) in place, and writes its block's partial sums: PPISP_SUM_FLOATS.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
@@ -23,7 +23,7 @@ void write_sum(uint at, float value) {
 void main() {
     const uint block = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     const uint pixels = push.image.size[0] * push.image.size[1];
-    const uint begin = block * EXPOSURE_BLOCK, end = min(begin + EXPOSURE_BLOCK, pixels);
+    const uint begin = block * PPISP_BLOCK, end = min(begin + PPISP_BLOCK, pixels);
     if (begin >= pixels) return;
     const Ppisp ppisp = pushed_ppisp();
     PpispSums own;

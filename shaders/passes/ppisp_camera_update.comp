@@ -7,7 +7,6 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
-#include "lib/adam_step.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Slots { float slots[]; };
@@ -16,6 +15,7 @@ layout(set = 0, binding = 2, scalar) buffer Moments1 { float moments1[]; };
 layout(set = 0, binding = 3, scalar) buffer Moments2 { float moments2[]; };
 layout(set = 0, binding = 4, scalar) buffer CountsBlock { Counts counts; };
 layout(push_constant, scalar) uniform Push { PpispCameraPush push; };
+#include "lib/table_step.glsl"
 
 // Gradient of the penalties by value k of the camera.
 float penalty_gradient(uint k) {
@@ -52,15 +52,6 @@ void main() {
     const float number = values[push.camera + PPISP_CAMERA_VALUES] + 1.0;
     const vec2 bias = 1.0 / (1.0 - pow(vec2(ADAM_BETA1, ADAM_BETA2), vec2(number)));
     values[push.camera + PPISP_CAMERA_VALUES] = number;
-    [[unroll]] for (uint k = 0u; k < PPISP_CAMERA_VALUES; ++k) {
-        const uint at = push.camera + k;
-        vec3 state = vec3(values[at], moments1[at], moments2[at]);
-        if (adam_step(state, gradient[k], push.rate, bias)) {
-            values[at] = state.x;
-            moments1[at] = state.y;
-            moments2[at] = state.z;
-        } else {
-            atomicAdd(counts.dropped_updates, 1u);
-        }
-    }
+    [[unroll]] for (uint k = 0u; k < PPISP_CAMERA_VALUES; ++k)
+        table_step(push.camera + k, gradient[k], push.rate, bias);
 }

@@ -8,7 +8,6 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
-#include "lib/adam_step.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Sums { float sums[]; };
@@ -19,20 +18,13 @@ layout(set = 0, binding = 4, scalar) writeonly buffer Slots { float slots[]; };
 layout(set = 0, binding = 5, scalar) buffer CountsBlock { Counts counts; };
 layout(push_constant, scalar) uniform Push { PpispUpdatePush push; };
 #include "lib/ppisp_values.glsl"
+#include "lib/table_step.glsl"
 
 // Derivative of smooth L1.
 float smooth_sign(float x, float beta) { return clamp(x / beta, -1.0, 1.0); }
 
 void step_of(uint k, float gradient) {
-    const uint at = push.photo + k;
-    vec3 state = vec3(values[at], moments1[at], moments2[at]);
-    if (adam_step(state, gradient, push.rate, vec2(push.bias1, push.bias2))) {
-        values[at] = state.x;
-        moments1[at] = state.y;
-        moments2[at] = state.z;
-    } else {
-        atomicAdd(counts.dropped_updates, 1u);
-    }
+    table_step(push.photo + k, gradient, push.rate, vec2(push.bias1, push.bias2));
 }
 
 void main() {

@@ -7,7 +7,6 @@
 // An update that is not finite is dropped and counted. A frame whose instances did not fit changes nothing.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
-#include "lib/adam_step.glsl"
 #include "lib/sky.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
@@ -18,6 +17,7 @@ layout(set = 0, binding = 3, scalar) buffer Moments1 { float moments1[]; };
 layout(set = 0, binding = 4, scalar) buffer Moments2 { float moments2[]; };
 layout(set = 0, binding = 5, scalar) buffer CountsBlock { Counts counts; };
 layout(push_constant, scalar) uniform Push { SkyUpdatePush push; };
+#include "lib/table_step.glsl"
 
 float neighbour(ivec2 at, uint channel) { return before[3u * sky_texel(at, push.size) + channel]; }
 
@@ -31,12 +31,5 @@ void main() {
     const float apart = 4.0 * before[i] - neighbour(at + ivec2(1, 0), channel) - neighbour(at - ivec2(1, 0), channel) -
                         neighbour(at + ivec2(0, 1), channel) - neighbour(at - ivec2(0, 1), channel);
     const float gradient = sum / (float(SKY_UNITS) * float(push.views)) + float(SKY_PULL) * apart;
-    vec3 state = vec3(values[i], moments1[i], moments2[i]);
-    if (adam_step(state, gradient, push.rate, vec2(push.bias1, push.bias2))) {
-        values[i] = state.x;
-        moments1[i] = state.y;
-        moments2[i] = state.z;
-    } else {
-        atomicAdd(counts.dropped_updates, 1u);
-    }
+    table_step(i, gradient, push.rate, vec2(push.bias1, push.bias2));
 }

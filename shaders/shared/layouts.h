@@ -195,12 +195,6 @@ EWA_UINT(LOSS_TEXELS, 4u);
 EWA_UINT(MOMENT_PLANES, 4u);      // of 4 c + 0: mean x; 1: mean y; 2: mean x^2 + y^2; 3: mean x y
 EWA_UINT(DERIVATIVE_PLANES, 3u);  // of 3 c + 0: dS/d(mean x); 1: dS/d(mean x^2); 2: dS/d(mean x y)
 
-// ---- Exposure: a training image's affine map of colours ----
-// 3 texels of (row of the matrix, offset) at 3 * image.
-EWA_UINT(EXPOSURE_FLOATS, 12u);
-EWA_UINT(EXPOSURE_TEXELS, 3u);
-EWA_UINT(EXPOSURE_BLOCK, 4096u);  // pixels whose gradient one subgroup sums
-
 // ---- PPISP: exposure and colours of a training image, vignette and response of a camera ----
 // The buffer has PPISP_PHOTO_FLOATS for each photo: exposure in stops; latent offsets x y of blue, red, green, grey; 0 0 0.
 // Then it has PPISP_CAMERA_FLOATS for each camera. PPISP_CHANNEL_FLOATS for each channel: the vignette's centre x y and
@@ -214,8 +208,12 @@ EWA_UINT(PPISP_CAMERA_FLOATS, 28u);
 // What a pass sums over pixels: dL/d(exposure), dL/d(colour map) by columns, dL/d(camera's values, of the response after
 // their mapping).
 EWA_UINT(PPISP_SUM_FLOATS, 37u);
+EWA_UINT(PPISP_BLOCK, 4096u);  // pixels whose gradient one subgroup sums
 
 // ---- A bilateral grid: cell (x, y, z) at x + GRID_WIDTH (y + GRID_HEIGHT z), 3 texels of (row of the matrix, offset) ----
+// A grid of one cell is an affine map of colours, the same at all pixels.
+EWA_UINT(GRID_ONE_CELL, 1u);  // bit of SPEC_MODE
+EWA_UINT(GRID_CELL_FLOATS, 12u);
 EWA_UINT(GRID_CELLS, 2048u);
 EWA_UINT(GRID_FLOATS, 24576u);      // of a photo
 EWA_UINT(GRID_LEVELS, 4u);          // levels of grey that a subgroup sums at once
@@ -418,20 +416,6 @@ struct PackPush {
     uint plane_floats;
 };
 
-struct ExposurePush {
-    ImageLayout image;
-    uint photo;  // index of the training image
-};
-
-struct ExposureUpdatePush {
-    uint photo;
-    uint blocks;  // of partial sums
-    float rate;
-    float pull;          // d(loss)/d(value) for a value 1 away from the identity's
-    float bias1, bias2;  // 1 / (1 - beta^visit); each training image has its own number of steps
-    uint instance_capacity;
-};
-
 struct PpispPush {
     ImageLayout image;
     uint photo, camera;  // where their values begin, in floats
@@ -456,8 +440,9 @@ struct PpispCameraPush {
 
 struct GridPush {
     ImageLayout image;
-    uint photo;  // index of the training image
-    uint parts;  // into which the rows of pixels of a column of cells are divided
+    uint photo;            // index of the training image
+    uint parts;            // into which the rows of pixels of a column of cells are divided
+    uint columns, stacks;  // of cells; of GRID_LEVELS of a column
 };
 
 struct GridUpdatePush {

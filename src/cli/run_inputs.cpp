@@ -59,10 +59,9 @@ void use_options_of(const live::Run& run, CLI::App& app, const fs::path& other) 
 }
 
 void add_appearance_options(CLI::App& app, AppearanceArguments& arguments) {
-    app.add_option(
-           "--exposures", arguments.file,
-           "Appearance of training images, as ewa train --appearance writes it. auto: exposures.json or "
-           "appearance.json of the run SPLATS, with its own dataset")
+    app.add_option("--exposures", arguments.file,
+                   "Appearance of training images, as ewa train --appearance writes it. auto: that of the "
+                   "run SPLATS, with its own dataset")
         ->type_name("auto|none|FILE")
         ->capture_default_str();
     app.add_option("--appearance-of", arguments.of,
@@ -76,7 +75,7 @@ namespace {
 fs::path appearance_file(const std::string& which, const std::optional<live::Run>& run) {
     if (which != "auto") return which == "none" ? fs::path() : fs::path(which);
     if (!run) return {};
-    for (const char* name : {report::kExposuresFile, report::kAppearanceFile})
+    for (const char* name : {report::kAppearanceFile, report::kOldExposuresFile})
         if (core::is_file(run->folder / name)) return run->folder / name;
     return {};
 }

@@ -129,6 +129,17 @@ Exposure slice(const ColorGrid& grid, const glm::dvec3& place) {
     return map;
 }
 
+Image with_exposure(Image image, const Exposure& exposure) {
+    for (size_t p = 0; p < image.pixels.size(); p += size_t(image.channels)) {
+        float* color = &image.pixels[p];
+        const float r = color[0], g = color[1], b = color[2];
+        for (size_t c = 0; c < 3; ++c)
+            color[c] =
+                exposure[4 * c] * r + exposure[4 * c + 1] * g + exposure[4 * c + 2] * b + exposure[4 * c + 3];
+    }
+    return image;
+}
+
 Image with_grid(Image image, const ColorGrid& grid) {
     for (int y = 0; y < image.height; ++y)
         for (int x = 0; x < image.width; ++x) {
@@ -258,23 +269,11 @@ void check(const Appearance& appearance) {
         throw core::wrong_length("cells", grid->cells.size(), "a bilateral grid needs", GRID_FLOATS);
 }
 
-Image exposed(Image image, const Exposure& exposure) {
-    check_colors(image);
-    for (size_t p = 0; p < image.pixels.size(); p += size_t(image.channels)) {
-        float* color = &image.pixels[p];
-        const float r = color[0], g = color[1], b = color[2];
-        for (size_t c = 0; c < 3; ++c)
-            color[c] =
-                exposure[4 * c] * r + exposure[4 * c + 1] * g + exposure[4 * c + 2] * b + exposure[4 * c + 3];
-    }
-    return image;
-}
-
 Image with_appearance(Image image, const Appearance& appearance) {
     check(appearance);
     check_colors(image);
     if (const auto* exposure = std::get_if<Exposure>(&appearance))
-        return exposed(std::move(image), *exposure);
+        return with_exposure(std::move(image), *exposure);
     if (const auto* ppisp = std::get_if<Ppisp>(&appearance)) return with_ppisp(std::move(image), *ppisp);
     return with_grid(std::move(image), std::get<ColorGrid>(appearance));
 }

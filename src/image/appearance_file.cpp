@@ -12,7 +12,6 @@
 #include "core/typing.h"
 #include "ewa/appearance.h"
 #include "ewa/error.h"
-#include "ewa/exposure.h"
 
 namespace ewa {
 namespace {
@@ -41,6 +40,15 @@ Exposure exposure_of(const json& rows, const std::string& where) {
     return exposure;
 }
 
+/// An older run's exposures.json: three rows for each image.
+std::map<std::string, Appearance> read_exposures(const json& all, const std::string& file) {
+    if (!all.is_object()) throw InputError(file + ": the JSON is not an object of appearances");
+    std::map<std::string, Appearance> exposures;
+    for (const auto& [name, rows] : all.items())
+        exposures[name] = exposure_of(rows, file + ": \"" + core::one_line(name) + "\"");
+    return exposures;
+}
+
 /// `count` finite numbers.
 void read_numbers(const json& values, size_t count, float* into, const std::string& where) {
     bool right = is_list(values, count);
@@ -49,6 +57,12 @@ void read_numbers(const json& values, size_t count, float* into, const std::stri
         right = std::isfinite(into[k]);
     }
     if (!right) throw InputError(where + ": expected " + std::to_string(count) + " finite numbers");
+}
+
+Appearance affine_of(const json& image, const std::string& where) {
+    Exposure exposure;
+    read_numbers(image, exposure.size(), exposure.data(), where);
+    return exposure;
 }
 
 Appearance grid_of(const json& image, const std::string& where) {
@@ -70,26 +84,29 @@ Appearance ppisp_of(const json& image, const json& cameras, const std::string& w
     return ppisp;
 }
 
+enum : size_t { kAffine, kPpisp, kGrid };  // as in Appearance
+constexpr std::array<const char*, 3> kModels{"affine", "ppisp", "grid"};
+
 }  // namespace
 
 std::map<std::string, Appearance> load_appearances(const std::filesystem::path& path) {
     const auto all = core::read_json_file<json>(path);
     const std::string file = core::one_line(path.string());
     std::map<std::string, Appearance> appearances;
-    const auto model = all.is_object() ? all.find("model") : all.end();
-    if (!all.is_object() || model == all.end() || !model->is_string()) {
-        for (const auto& [name, exposure] : load_exposures(path)) appearances[name] = exposure;
-        return appearances;
-    }
-    const bool grid = *model == "grid";
-    if (!grid && *model != "ppisp") throw InputError(file + ": \"model\" is neither \"ppisp\" nor \"grid\"");
+    const auto word = all.is_object() ? all.find("model") : all.end();
+    if (!all.is_object() || word == all.end() || !word->is_string()) return read_exposures(all, file);
+    const auto model = size_t(std::ranges::find(kModels, word->get<std::string>()) - kModels.begin());
+    if (model == kModels.size())
+        throw InputError(file + ": \"model\" is none of \"affine\", \"ppisp\" and \"grid\"");
     const auto images = all.find("images"), cameras = all.find("cameras");
     if (images == all.end() || !images->is_object()) throw InputError(file + ": \"images\" is not an object");
-    if (!grid && (cameras == all.end() || !cameras->is_array()))
+    if (model == kPpisp && (cameras == all.end() || !cameras->is_array()))
         throw InputError(file + ": \"cameras\" is not an array");
     for (const auto& [name, image] : images->items()) {
         const std::string where = file + ": \"" + core::one_line(name) + "\"";
-        appearances[name] = grid ? grid_of(image, where) : ppisp_of(image, *cameras, where);
+        appearances[name] = model == kAffine ? affine_of(image, where)
+                            : model == kGrid ? grid_of(image, where)
+                                             : ppisp_of(image, *cameras, where);
     }
     return appearances;
 }
@@ -100,36 +117,23 @@ void save_appearances(const std::filesystem::path& path, const std::vector<std::
     if (names.size() != appearances.size())
         throw InputError(core::counted(names.size(), "name") + " for " +
                          core::counted(appearances.size(), "appearance"));
-    if (!appearances.empty() && std::holds_alternative<Exposure>(appearances.front()))
-        throw InputError("exposures are no appearance.json");
     nlohmann::ordered_json all;
-    const bool grid = !appearances.empty() && std::holds_alternative<ColorGrid>(appearances.front());
-    all["model"] = grid ? "grid" : "ppisp";
+    all["model"] = kModels[appearances.empty() ? size_t(kPpisp) : appearances.front().index()];
     std::vector<std::array<float, 27>> cameras;
     auto images = nlohmann::ordered_json::object();
     for (size_t i = 0; i < appearances.size(); ++i) {
-        if (grid) {
-            images[names[i]] = std::get<ColorGrid>(appearances[i]).cells;
-            continue;
-        }
-        const Ppisp& ppisp = std::get<Ppisp>(appearances[i]);
-        const auto camera = std::ranges::find(cameras, ppisp.camera);
-        images[names[i]] = {{"camera", camera - cameras.begin()}, {"photo", ppisp.photo}};
-        if (camera == cameras.end()) cameras.push_back(ppisp.camera);
+        auto& image = images[names[i]];
+        if (const auto* exposure = std::get_if<Exposure>(&appearances[i])) image = *exposure;
+        if (const auto* grid = std::get_if<ColorGrid>(&appearances[i])) image = grid->cells;
+        const auto* ppisp = std::get_if<Ppisp>(&appearances[i]);
+        if (!ppisp) continue;
+        const auto camera = std::ranges::find(cameras, ppisp->camera);
+        image = {{"camera", camera - cameras.begin()}, {"photo", ppisp->photo}};
+        if (camera == cameras.end()) cameras.push_back(ppisp->camera);
     }
-    if (!grid) all["cameras"] = cameras;
+    if (all["model"] == "ppisp") all["cameras"] = cameras;
     all["images"] = std::move(images);
     core::write_json(path, all);
-}
-
-std::map<std::string, Exposure> load_exposures(const std::filesystem::path& path) {
-    const auto all = core::read_json_file<json>(path);
-    const std::string file = core::one_line(path.string());
-    if (!all.is_object()) throw InputError(file + ": the JSON is not an object of exposures");
-    std::map<std::string, Exposure> exposures;
-    for (const auto& [name, rows] : all.items())
-        exposures[name] = exposure_of(rows, file + ": \"" + core::one_line(name) + "\"");
-    return exposures;
 }
 
 }  // namespace ewa

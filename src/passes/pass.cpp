@@ -20,10 +20,9 @@ static_assert(sizeof(RayPush) == 56);
 static_assert(sizeof(CollectPush) == 20 && sizeof(GatherPush) == 12);
 static_assert(sizeof(UnpackPush) == 32 && sizeof(MaskPush) == 20 && sizeof(LossPush) == 36 &&
               sizeof(AlphaPush) == 32 && sizeof(DepthPush) == 20 && sizeof(ReducePush) == 20);
-static_assert(sizeof(ImageLayout) == 16 && sizeof(PackPush) == 4 && sizeof(ExposurePush) == 20 &&
-              sizeof(ExposureUpdatePush) == 28);
+static_assert(sizeof(ImageLayout) == 16 && sizeof(PackPush) == 4);
 static_assert(sizeof(PpispPush) == 24 && sizeof(PpispUpdatePush) == 36 && sizeof(PpispCameraPush) == 24 &&
-              sizeof(GridPush) == 24 && sizeof(GridUpdatePush) == 32);
+              sizeof(GridPush) == 32 && sizeof(GridUpdatePush) == 32);
 static_assert(sizeof(SkyPush) == 24 && sizeof(SkyGradientPush) == 28 && sizeof(SkyUpdatePush) == 24);
 static_assert(sizeof(MoveCameraPush) == 8 && sizeof(MotionUpdatePush) == 44);
 static_assert(sizeof(UpdatePush) == 76 && sizeof(DensifyPush) == 92 && sizeof(ResetPush) == 12);

@@ -339,7 +339,7 @@ struct Pack {
     gpu::BufferPart planes, packed;
 };
 
-// The loss of a render against a training image, its gradient, and the training image's mask and exposure.
+// The loss of a render against a training image, its gradient, and the training image's mask and appearance.
 
 /// Unpacks a training image into planes, over the background. Variant: SPEC_COLOR_FLOATS.
 struct UnpackTarget {
@@ -419,37 +419,12 @@ struct Reduce {
     gpu::BufferPart source, sums, counts;
 };
 
-/// Applies a training image's exposure to the render.
-struct Expose {
-    static constexpr char shader[] = "expose";
-    using Work = PerElement<pixels<shared::ExposurePush>>;
-    gpu::BufferPart image, exposures, exposed;
-};
-
-/// Gradient of Expose: by the render in place, by the exposure as partial sums.
-struct ExposeBackward {
-    static constexpr char shader[] = "expose_backward";
-    struct Work : OneSubgroup<shared::ExposurePush> {
-        static Groups groups(const KernelConfig& config, const Push& push) {
-            return block_groups(config, pixels(push), shared::EXPOSURE_BLOCK);
-        }
-    };
-    gpu::BufferPart image, exposures, image_gradient, sums;
-};
-
-/// Adam's step of one training image's exposure.
-struct ExposureUpdate {
-    static constexpr char shader[] = "exposure_update";
-    using Work = OneSubgroup<shared::ExposureUpdatePush>;
-    gpu::BufferPart sums, exposures, moments1, moments2, counts;
-};
-
 /// Applies a training image's PPISP to the render.
 struct Ppisp {
     static constexpr char shader[] = "ppisp";
     struct Work : OneSubgroup<shared::PpispPush> {
         static Groups groups(const KernelConfig& config, const Push& push) {
-            return block_groups(config, pixels(push), shared::EXPOSURE_BLOCK);
+            return block_groups(config, pixels(push), shared::PPISP_BLOCK);
         }
     };
     gpu::BufferPart image, values, exposed;
@@ -476,7 +451,7 @@ struct PpispCameraUpdate {
     gpu::BufferPart slots, values, moments1, moments2, counts;
 };
 
-/// Applies a training image's bilateral grid to the render.
+/// Applies a training image's bilateral grid to the render. Variant of the three: SPEC_MODE (0 or GRID_ONE_CELL).
 struct GridSlice {
     static constexpr char shader[] = "grid_slice";
     using Work = PerElement<pixels<shared::GridPush>>;
@@ -495,8 +470,7 @@ struct GridGradient {
     static constexpr char shader[] = "grid_gradient";
     struct Work : OneSubgroup<shared::GridPush> {
         static Groups groups(const KernelConfig&, const Push& push) {
-            return {shared::GRID_WIDTH * shared::GRID_HEIGHT, push.parts,
-                    shared::GRID_DEPTH / shared::GRID_LEVELS};
+            return {push.columns, push.parts, push.stacks};
         }
     };
     gpu::BufferPart image, grids, image_gradient, sums;

@@ -13,8 +13,9 @@
 namespace ewa::pipeline {
 namespace {
 
-// Weight of the regulariser of grids, as that of exposures, which is divided among the cells.
-constexpr float kGridPull = 1e-3f / float(shared::GRID_CELLS);
+// Weight of the regulariser of a grid, which is divided among its cells. The loss has gradients of the order of 0.1, so this is
+// too weak to matter, except where the loss is flat: all maps change one way, and the splats the other way.
+constexpr float kGridPull = 1e-3f;
 
 shared::PpispPush ppisp_push(const FrameBuffers& frame, const AppearanceUse& use) {
     const Appearances& a = *use.appearances;
@@ -23,17 +24,30 @@ shared::PpispPush ppisp_push(const FrameBuffers& frame, const AppearanceUse& use
             .camera = a.camera_at(a.camera_of[use.photo])};
 }
 
+bool one_cell(const Appearances& a) {
+    return a.model == AppearanceModel::affine;
+}
+
 shared::GridPush grid_push(const FrameBuffers& frame, const AppearanceUse& use) {
-    return {.image = frame.sizes.image(), .photo = use.photo, .parts = frame.sizes.grid_parts};
+    const bool one = one_cell(*use.appearances);
+    return {.image = frame.sizes.image(),
+            .photo = use.photo,
+            .parts = frame.sizes.grid_parts,
+            .columns = one ? 1 : shared::GRID_WIDTH * shared::GRID_HEIGHT,
+            .stacks = one ? 1 : shared::GRID_DEPTH / shared::GRID_LEVELS};
+}
+
+gpu::SpecConstant grid_mode(const Appearances& a) {
+    return {shared::SPEC_MODE, one_cell(a) ? shared::GRID_ONE_CELL : 0};
 }
 
 }  // namespace
 
 void FramePasses::apply_appearance(const AppearanceUse& use) const {
     const Appearances& a = *use.appearances;
-    if (a.model == AppearanceModel::grid)
+    if (a.model != AppearanceModel::ppisp)
         record(passes::GridSlice{.image = frame.planes, .grids = a.values, .exposed = frame.exposed},
-               grid_push(frame, use));
+               grid_push(frame, use), {grid_mode(a)});
     else
         record(passes::Ppisp{.image = frame.planes, .values = a.values, .exposed = frame.exposed},
                ppisp_push(frame, use));
@@ -43,27 +57,27 @@ void FramePasses::apply_appearance(const AppearanceUse& use) const {
 void FramePasses::appearance_backward(const AppearanceUse& use) const {
     const Appearances& a = *use.appearances;
     const auto [bias1, bias2] = adam_biases(use.visit);
-    if (a.model == AppearanceModel::grid) {
+    if (a.model != AppearanceModel::ppisp) {
         const shared::GridPush push = grid_push(frame, use);
         record(passes::GridGradient{.image = frame.planes,
                                     .grids = a.values,
                                     .image_gradient = frame.image_gradient,
-                                    .sums = frame.exposure_sums},
-               push);
+                                    .sums = frame.appearance_sums},
+               push, {grid_mode(a)});
         record(
             passes::GridSliceBackward{
                 .image = frame.planes, .grids = a.values, .image_gradient = frame.image_gradient},
-            push);
-        record(passes::GridUpdate{.sums = frame.exposure_sums,
+            push, {grid_mode(a)});
+        record(passes::GridUpdate{.sums = frame.appearance_sums,
                                   .grids = a.values,
                                   .moments1 = a.moments1,
                                   .moments2 = a.moments2,
                                   .counts = frame.counts},
-               {.texels = shared::GRID_FLOATS / 4,
+               {.texels = a.layout.row_floats / 4,
                 .photo = use.photo,
                 .parts = push.parts,
                 .rate = use.rate,
-                .pull = kGridPull,
+                .pull = kGridPull / float(a.layout.row_floats / shared::GRID_CELL_FLOATS),
                 .bias1 = bias1,
                 .bias2 = bias2,
                 .instance_capacity = frame.instance_capacity});
@@ -73,9 +87,9 @@ void FramePasses::appearance_backward(const AppearanceUse& use) const {
     record(passes::PpispBackward{.image = frame.planes,
                                  .values = a.values,
                                  .image_gradient = frame.image_gradient,
-                                 .sums = frame.exposure_sums},
+                                 .sums = frame.appearance_sums},
            push);
-    record(passes::PpispUpdate{.sums = frame.exposure_sums,
+    record(passes::PpispUpdate{.sums = frame.appearance_sums,
                                .values = a.values,
                                .moments1 = a.moments1,
                                .moments2 = a.moments2,
@@ -84,7 +98,7 @@ void FramePasses::appearance_backward(const AppearanceUse& use) const {
            {.photo = push.photo,
             .camera = push.camera,
             .means = a.camera_at(a.cameras),
-            .blocks = frame.sizes.exposure_blocks,
+            .blocks = frame.sizes.ppisp_blocks,
             .slot = use.slot,
             .rate = use.rate,
             .bias1 = bias1,

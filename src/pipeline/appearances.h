@@ -1,41 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
-// What training learns of the appearance of its images beside the splats: PPISP or bilateral grids. backward.h has the
-// third model, an affine map.
+// What training learns of the appearance of its images beside the splats: affine maps of colours, bilateral grids of them, or
+// PPISP. An affine map is a grid of one cell.
 #pragma once
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "ewa/appearance.h"
-#include "gpu/buffer.h"
 #include "passes/pass.h"
+#include "pipeline/learned_table.h"
 
 namespace ewa::pipeline {
 
 struct FrameBuffers;
 
-/// The values of all training images and their cameras, with Adam's moments: shared/layouts.h.
-struct Appearances {
+/// A row for each training image; with PPISP then the values of the cameras: shared/layouts.h. A slot has the gradient of the
+/// values of its view's camera.
+struct Appearances : LearnedTable {
     AppearanceModel model = AppearanceModel::none;
     std::vector<uint32_t> camera_of;  // of each photo; with PPISP
     uint32_t cameras = 0;
-    gpu::Buffer values, moments1, moments2;
-    gpu::Buffer slots;  // with PPISP: the gradient of its camera's values by each view of a step
 
     Appearances() = default;
     /// camera_of: of each photo, from 0 without a gap. views: of a step at most.
     Appearances(gpu::Device& device, AppearanceModel model, std::vector<uint32_t> camera_of, uint32_t views);
-    uint64_t bytes() const;  // of values and of each moment
-    uint32_t photo_floats() const;
     uint32_t camera_at(uint32_t camera) const;  // where its values begin, in floats
     std::vector<Appearance> download() const;
-    /// Replaces the exposures in stops.
+    /// Replaces PPISP's exposures in stops.
     void set_exposures(std::span<const float> stops);
-
-    /// What a step learns of a photo, for other ranks. slot: its view in the step.
-    size_t words_of_view() const;
-    std::vector<uint64_t> words(uint32_t photo, uint32_t slot) const;
-    void set(uint32_t photo, uint32_t slot, std::span<const uint64_t> words);
 };
 
 /// A step of one training image's appearance.
@@ -53,7 +45,10 @@ void record_cameras_update(const passes::Recorder& on, const Appearances& appear
                            const FrameBuffers& frame, std::span<const uint32_t> photos, float rate,
                            uint32_t capacity);
 
-/// Parts into which the pixels of a column of a grid's cells are divided.
-uint32_t grid_parts(uint32_t width, uint32_t height);
+/// Floats of a training image's row.
+uint32_t row_floats(AppearanceModel model);
+
+/// Parts into which the pixels of a column of a grid's cells are divided. 0 without a grid.
+uint32_t grid_parts(AppearanceModel model, uint32_t width, uint32_t height);
 
 }  // namespace ewa::pipeline

@@ -9,10 +9,6 @@
 namespace ewa::pipeline {
 namespace {
 
-// Weight of the regulariser of exposures. The loss has gradients of the order of 0.1, so this is too weak to
-// matter, except where the loss is flat: all exposures change one way, and the splats the other way.
-constexpr float kPull = 1e-3f;
-
 shared::UpdatePush update_push(const Model& model, const FrameBuffers& frame, const Rates& rates) {
     const AdamShares shares = adam_shares(rates.nesterov, rates.step);
     return {.splats = model.splats,
@@ -48,46 +44,6 @@ uint32_t update_mode(const Plan& plan) {
     return mode;
 }
 
-Exposures::Exposures(gpu::Device& device, size_t count)
-    : photos(uint32_t(count)),
-      values(device, "exposures", bytes()),
-      moments1(device, "exposure moments1", bytes()),
-      moments2(device, "exposure moments2", bytes()) {
-    const std::vector<Exposure> start(count, kIdentityExposure);
-    values.upload(std::span<const Exposure>(start));
-    zero(moments1);
-    zero(moments2);
-}
-
-std::vector<Exposure> Exposures::download() const {
-    return values.download<Exposure>(photos);
-}
-
-namespace {
-
-constexpr size_t kExposureWords = shared::EXPOSURE_FLOATS / 2;
-
-}  // namespace
-
-Exposures::Words Exposures::words(uint32_t photo) const {
-    Words words;
-    size_t at = 0;
-    for (const gpu::Buffer* buffer : {&values, &moments1, &moments2}) {
-        buffer->download(std::as_writable_bytes(std::span(words).subspan(at, kExposureWords)),
-                         8 * kExposureWords * photo);
-        at += kExposureWords;
-    }
-    return words;
-}
-
-void Exposures::set(uint32_t photo, std::span<const uint64_t> words) {
-    size_t at = 0;
-    for (gpu::Buffer* buffer : {&values, &moments1, &moments2}) {
-        buffer->upload(words.subspan(at, kExposureWords), 8 * kExposureWords * photo);
-        at += kExposureWords;
-    }
-}
-
 LossTerms terms_of(const shared::Counts& counts) {
     return {counts.l1, counts.l2, counts.ssim, counts.alpha, counts.depth};
 }
@@ -102,29 +58,6 @@ double loss_of(const LossWeights& weights, const LossTerms& terms) {
 
 double loss_of(const LossWeights& weights, const shared::Counts& counts) {
     return loss_of(weights, terms_of(counts));
-}
-
-/// Turns frame.image_gradient from dL/d(exposed image) into dL/d(image). The exposure takes a step of Adam.
-void FramePasses::expose_backward(const ExposureUse& use) const {
-    const Exposures& e = *use.exposures;
-    record(passes::ExposeBackward{.image = frame.planes,
-                                  .exposures = e.values,
-                                  .image_gradient = frame.image_gradient,
-                                  .sums = frame.exposure_sums},
-           {.image = frame.sizes.image(), .photo = use.photo});
-    const auto [bias1, bias2] = adam_biases(use.visit);
-    record(passes::ExposureUpdate{.sums = frame.exposure_sums,
-                                  .exposures = e.values,
-                                  .moments1 = e.moments1,
-                                  .moments2 = e.moments2,
-                                  .counts = frame.counts},
-           {.photo = use.photo,
-            .blocks = frame.sizes.exposure_blocks,
-            .rate = use.rate,
-            .pull = kPull,
-            .bias1 = bias1,
-            .bias2 = bias2,
-            .instance_capacity = frame.instance_capacity});
 }
 
 /// Adds `items` floats of each row of frame.partials, in two steps. target: shared::REDUCE_TO_*.
@@ -196,8 +129,8 @@ void FramePasses::compare_depth(const DepthUse& depths) const {
     mean_of_partials(shared::REDUCE_TO_DEPTH, frame.sizes.partials / 3, 1, float(share));
 }
 
-void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse* exposure,
-                       const AppearanceUse* appearance, bool cut, const DepthUse& depths) const {
+void FramePasses::loss(const gpu::Buffer& photo, bool masked, const AppearanceUse* appearance, bool cut,
+                       const DepthUse& depths) const {
     const shared::ImageLayout layout = frame.sizes.image();
     const Band whole{.rows = layout.size[1], .own_end = layout.size[1]};
     const Band& band = inputs.band.rows > 0 ? inputs.band : whole;
@@ -210,15 +143,10 @@ void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse*
                                 .own = {band.own_begin, band.own_end}};
     const uint32_t first_pixel = band.first * layout.size[0];
     const shared::MaskPush mask{.image = layout, .first_pixel = first_pixel};
-    const gpu::Buffer& render = exposure || appearance ? frame.exposed : frame.planes;
+    const gpu::Buffer& render = appearance ? frame.exposed : frame.planes;
     const gpu::Buffer& image = masked ? frame.masked : render;
     const passes::Constants colors{
         {shared::SPEC_COLOR_FLOATS, photo.texel() == gpu::Texel::rgba32f ? 1u : 0u}};
-    if (exposure)
-        record(
-            passes::Expose{
-                .image = frame.planes, .exposures = exposure->exposures->values, .exposed = frame.exposed},
-            {.image = layout, .photo = exposure->photo});
     if (appearance) apply_appearance(*appearance);
     if (masked)
         record(
@@ -237,7 +165,6 @@ void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse*
     mean_of_partials(shared::REDUCE_TO_L1, frame.sizes.partials, plan.loss.l2 > 0 ? 3 : 2, float(share));
     if (plan.loss.alpha > 0) compare_alpha(photo, cut, mask, push);
     if (plan.loss.depth > 0) compare_depth(depths);
-    if (exposure) expose_backward(*exposure);
     if (appearance) appearance_backward(*appearance);
 }
 

@@ -1,43 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the loss and the backward passes of FramePasses read besides a frame.
-//
-// Each training image may have an exposure: an affine map of colours, learned beside the splats. The
-// published code of 3DGS does the same for captures with automatic exposure; see include/ewa/exposure.h.
 #pragma once
-#include <array>
 #include <cstdint>
-#include <span>
-#include <vector>
 
-#include "ewa/exposure.h"
 #include "pipeline/forward.h"
 #include "pipeline/motions.h"
 
 namespace ewa::pipeline {
-
-/// Exposures of all training images, with Adam's moments.
-struct Exposures {
-    uint32_t photos = 0;
-    gpu::Buffer values, moments1, moments2;
-
-    Exposures() = default;
-    Exposures(gpu::Device& device, size_t photos);
-    uint64_t bytes() const { return 4ull * shared::EXPOSURE_FLOATS * photos; }  // of each buffer
-    std::vector<Exposure> download() const;
-
-    /// A photo's exposure and moments, for other ranks.
-    using Words = std::array<uint64_t, 3 * shared::EXPOSURE_FLOATS / 2>;
-    Words words(uint32_t photo) const;
-    void set(uint32_t photo, std::span<const uint64_t> words);
-};
-
-/// A step of one training image's exposure.
-struct ExposureUse {
-    const Exposures* exposures = nullptr;
-    uint32_t photo = 0;
-    float rate = 0;
-    uint32_t visit = 1;  // number of this image's step, from 1
-};
 
 struct Rates {
     float mean = 0, opacity = 0, quaternion = 0, scale = 0, sh0 = 0, sh_rest = 0;

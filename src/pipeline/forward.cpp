@@ -186,7 +186,7 @@ Sorted FramePasses::draw(uint32_t splats) const {
     } else {
         record(passes::Blend{buffers}, push, {mode, kernel(), wrap()});
     }
-    if (inputs.sky) add_sky();
+    if (inputs.sky.texels) add_sky();
     return {.splats = &frame.instance_splats[1],
             .indices = plan.gradients ? &frame.sorted_indices[1] : nullptr};
 }

@@ -12,7 +12,6 @@
 namespace ewa::pipeline {
 
 struct AppearanceUse;
-struct ExposureUse;
 struct LearnedSky;
 struct ListStart;
 struct MotionUse;
@@ -53,12 +52,12 @@ struct FramePasses : passes::Recorder {
     /// those of its bands add up to it, and so do their gradients.
     /// photo: width * height texels, RGBA. Its alpha composites it over the background or, if `masked`, is the
     /// weight of each pixel; `frame` must then be reserved with masks.
-    /// exposure, appearance: of the training image, one of them if it is learned. It takes its own step of Adam; `frame`
-    /// must be reserved with its model.
+    /// appearance: of the training image, if it is learned. It takes its own step of Adam; `frame` must be reserved with its
+    /// model.
     /// cut: the photo is composited, and its alpha is compared with the render's if the loss has that term.
     /// depths: of the photo, if the loss has that term.
-    void loss(const gpu::Buffer& photo, bool masked = false, const ExposureUse* exposure = nullptr,
-              const AppearanceUse* appearance = nullptr, bool cut = false, const DepthUse& depths = {}) const;
+    void loss(const gpu::Buffer& photo, bool masked = false, const AppearanceUse* appearance = nullptr,
+              bool cut = false, const DepthUse& depths = {}) const;
 
     /// After the loss: leaves the gradient by the sky in the slot of its view in the step.
     void sky_gradient(const LearnedSky& sky, uint32_t slot) const;
@@ -101,7 +100,6 @@ struct FramePasses : passes::Recorder {
                        const shared::LossPush& loss) const;
     void compare_depth(const DepthUse& depths) const;
     void mean_of_partials(uint32_t target, uint32_t items, uint32_t rows, float scale) const;
-    void expose_backward(const ExposureUse& use) const;
     void apply_appearance(const AppearanceUse& use) const;
     void appearance_backward(const AppearanceUse& use) const;
     void blend_backward(const Sorted& sorted) const;

@@ -41,9 +41,9 @@ void check_image(const passes::KernelConfig& config, const FrameRequest& request
 uint64_t appearance_sums(AppearanceModel model, const Sizes& s) {
     switch (model) {
         case AppearanceModel::affine:
-            return uint64_t(s.exposure_blocks) * shared::EXPOSURE_FLOATS;
+            return uint64_t(s.grid_parts) * shared::GRID_CELL_FLOATS;
         case AppearanceModel::ppisp:
-            return uint64_t(s.exposure_blocks) * shared::PPISP_SUM_FLOATS;
+            return uint64_t(s.ppisp_blocks) * shared::PPISP_SUM_FLOATS;
         case AppearanceModel::grid:
             return uint64_t(s.grid_parts) * shared::GRID_FLOATS;
         default:
@@ -125,7 +125,7 @@ std::vector<Allocation> allocations(FrameBuffers& f, const Sizes& s) {
         {&f.masked, "masked", s.masked, floats},
         {&f.image_gradient, "image gradient", s.image_gradient, floats},
         {&f.partials, "partials", s.partial_sums},
-        {&f.exposure_sums, "exposure sums", s.exposure_sums},
+        {&f.appearance_sums, "appearance sums", s.appearance_sums},
         {&f.motion_sums, "motion sums", s.motion_sums},
         {&f.motion_reduced, "motion reduced", s.motion_reduced},
         {&f.reduced, "reduced", s.reduced}};
@@ -202,9 +202,9 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
         s.target = uint64_t(s.plane_floats) * 3 * word;
         s.masked = request.masks ? s.target : 0;
         s.exposed = request.appearance != AppearanceModel::none ? s.target : 0;
-        s.exposure_blocks = divide_up(request.width * request.height, shared::EXPOSURE_BLOCK);
-        s.grid_parts = grid_parts(request.width, request.height);
-        s.exposure_sums = appearance_sums(request.appearance, s) * word;
+        s.ppisp_blocks = divide_up(request.width * request.height, shared::PPISP_BLOCK);
+        s.grid_parts = grid_parts(request.appearance, request.width, request.height);
+        s.appearance_sums = appearance_sums(request.appearance, s) * word;
         if (request.loss.ssim > 0) {
             s.moments = uint64_t(s.plane_floats) * 3 * shared::MOMENT_PLANES * word;
             s.derivatives = uint64_t(s.plane_floats) * 3 * shared::DERIVATIVE_PLANES * word;

@@ -47,16 +47,16 @@ struct Sizes {
     uint32_t image_planes = 0;
     uint32_t partials = 0;  // partial sums of a loss kernel
     uint32_t reduce_block = 0, reduce_blocks = 0;
-    uint32_t exposure_blocks = 0;  // of pixels, for the gradient of the exposure
-    uint32_t grid_parts = 0;       // of pixels, for the gradient of the bilateral grid
-    uint32_t motion_items = 0;     // subgroups that add the gradient of the camera's motion
+    uint32_t ppisp_blocks = 0;  // of pixels, for the gradient of PPISP's values
+    uint32_t grid_parts = 0;    // of pixels, for the gradient of the bilateral grid
+    uint32_t motion_items = 0;  // subgroups that add the gradient of the camera's motion
     uint32_t motion_blocks = 0;
 
     // Bytes.
     uint64_t records = 0, splat_words = 0, scan_totals = 0, counters = 0, digit_totals = 0;
     uint64_t instance_words = 0, tile_starts = 0, planes = 0, target = 0;
     uint64_t masked = 0, exposed = 0, moments = 0, derivatives = 0, image_gradient = 0, partial_sums = 0,
-             exposure_sums = 0, motion_sums = 0, motion_reduced = 0, reduced = 0, slots = 0, rays = 0;
+             appearance_sums = 0, motion_sums = 0, motion_reduced = 0, reduced = 0, slots = 0, rays = 0;
     uint64_t overlay = 0;  // of the memory that overlaid buffers share
 
     uint64_t total() const;  // of all buffers of a frame with this request
@@ -79,7 +79,7 @@ struct FrameBuffers {
     gpu::Buffer counters, counter_prefix, digit_totals;
     gpu::Buffer instance_keys[2], instance_splats[2], sorted_indices[2], tile_starts;
     gpu::Buffer planes, target, exposed, masked, moments, derivatives, blurred, image_gradient, partials,
-        exposure_sums, motion_sums, motion_reduced, reduced, slots, rays;
+        appearance_sums, motion_sums, motion_reduced, reduced, slots, rays;
     // With FrameRequest::overlaid. The buffers in it hold, one after another, the pairs of the depth sort, those of the
     // tile sort, the planes of the loss, and the gradient slots.
     gpu::Buffer overlay;

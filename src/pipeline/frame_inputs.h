@@ -26,7 +26,11 @@ struct CameraUse {
 /// The camera in this block of a buffer.
 CameraUse use_of(const gpu::Buffer& blocks, uint64_t offset, const Camera& camera);
 
-struct SkyTexels;
+/// The texels of a SkyMap.
+struct SkyUse {
+    const gpu::Buffer* texels = nullptr;  // null: no sky
+    uint32_t size = 0;                    // texels a side
+};
 
 /// Rows of a view that a render shows. The loss counts some of them: the others are a halo, which the windows of SSIM reach.
 struct Band {
@@ -38,7 +42,7 @@ struct Band {
 struct FrameInputs {
     CameraUse camera;
     std::array<float, 3> background{0, 0, 0};  // black with a sky
-    const SkyTexels* sky = nullptr;            // null: none
+    SkyUse sky{};
     bool keep_overflow = false;    // the frame before may not be done: if it overflows, this one does nothing
     int sh_degree = kMaxShDegree;  // evaluated: at most this, and at most what the plan stores
     uint32_t samples = 1;          // of a ray, with Integrator::march

@@ -186,24 +186,27 @@ MotionBases motion_bases(const std::vector<Camera>& cameras, const Gaussians& ga
 Motions::Motions(gpu::Device& device, const MotionBases& of_photos)
     : photos(uint32_t(of_photos.poses.size())),
       rolling(of_photos.rolling),
-      values(device, "motions", bytes()),
-      moments1(device, "motion moments1", bytes()),
-      moments2(device, "motion moments2", bytes()),
-      bases(device, "motion bases", basis_bytes()),
       camera(device, "moved camera", sizeof(shared::CameraBlock), gpu::Texel::none, true) {
-    zero(values);
-    zero(moments1);
-    zero(moments2);
+    static_cast<LearnedTable&>(*this) = LearnedTable(
+        device, {.name = "motions", .moments = "motion_moments", .row_floats = shared::MOTION_FLOATS},
+        std::vector<float>(shared::MOTION_FLOATS * count()));
     std::vector<MotionBasis> all = of_photos.poses;
     all.insert(all.end(), of_photos.readouts.begin(), of_photos.readouts.end());
+    bases = gpu::Buffer(device, "motion bases", std::as_bytes(std::span(all)).size());
     bases.upload(std::span<const MotionBasis>(all));
 }
 
+std::vector<LearnedTable::Array> Motions::arrays() {
+    std::vector<Array> arrays = LearnedTable::arrays();
+    if (!empty()) arrays.push_back({"motion_bases", &bases, 4ull * shared::MOTION_BASIS_FLOATS * count()});
+    return arrays;
+}
+
 std::vector<CameraMotion> Motions::download() const {
-    const auto floats = values.download<float>(size_t(shared::MOTION_FLOATS) * count());
+    const std::vector<float> all = LearnedTable::download();
     std::vector<CameraMotion> motions(photos);
     for (uint32_t i = 0; i < photos; ++i) {
-        const float* f = &floats[shared::MOTION_FLOATS * i];
+        const float* f = &all[shared::MOTION_FLOATS * i];
         motions[i] = {{f[0], f[1], f[2]}, f[3], {f[4], f[5], f[6]}, {}, {}};
         if (!has_readout(i)) continue;
         f += shared::MOTION_FLOATS * size_t(photos);

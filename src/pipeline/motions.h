@@ -13,6 +13,7 @@
 #include "ewa/gaussians.h"
 #include "pipeline/frame_buffers.h"
 #include "pipeline/frame_inputs.h"
+#include "pipeline/learned_table.h"
 
 namespace ewa::pipeline {
 
@@ -32,12 +33,12 @@ struct MotionBases {
 MotionBases motion_bases(const std::vector<Camera>& cameras, const Gaussians& gaussians, bool focal,
                          double extent);
 
-/// Motions of all training cameras, with Adam's moments.
-struct Motions {
+/// Motions of all training cameras: a row of each, then one of each readout.
+struct Motions : LearnedTable {
     uint32_t photos = 0;
     std::vector<bool>
         rolling;  // whether a photo's readout has a motion, the photos-th after that of its pose
-    gpu::Buffer values, moments1, moments2, bases;
+    gpu::Buffer bases;
     gpu::Buffer camera;  // the moved camera of the frame
 
     Motions() = default;
@@ -45,9 +46,8 @@ struct Motions {
     bool readouts() const { return !rolling.empty(); }
     bool has_readout(uint32_t photo) const { return readouts() && rolling[photo]; }
     uint64_t count() const { return readouts() ? 2ull * photos : photos; }
-    uint64_t bytes() const { return 4ull * shared::MOTION_FLOATS * count(); }  // of values and of each moment
-    uint64_t basis_bytes() const { return 4ull * shared::MOTION_BASIS_FLOATS * count(); }
     std::vector<CameraMotion> download() const;
+    std::vector<Array> arrays();  // with the bases
 };
 
 /// A step of one training camera's motion.

@@ -98,8 +98,8 @@ struct Renderer::State {
     void submit_parts(const Plan& plan, const FrameInputs& inputs, FrameRequest size, Record then);
 
     Plan plan_of(const DrawOptions& options) const;
-    /// The sky on the device; null: none.
-    const SkyTexels* sky_of(const RenderOptions& look);
+    /// The sky on the device.
+    SkyUse sky_of(const RenderOptions& look);
     /// then: what to record after the image.
     template <class Record>
     void submit(const Camera& camera, const Plan& plan, const RenderOptions& look, Record then);
@@ -210,11 +210,11 @@ Plan Renderer::State::plan_of(const DrawOptions& o) const {
     return plan_for(drawing);
 }
 
-const SkyTexels* Renderer::State::sky_of(const RenderOptions& look) {
-    if (!look.sky) return nullptr;
+SkyUse Renderer::State::sky_of(const RenderOptions& look) {
+    if (!look.sky) return {};
     if (look.sky != sky) sky_texels = SkyTexels(*device, *look.sky);
     sky = look.sky;
-    return &sky_texels;
+    return sky_texels.use();
 }
 
 /// To length 1; a zero stays.
@@ -387,7 +387,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
     }
     const SkyTexels sky = options.sky ? SkyTexels(*device, *options.sky) : SkyTexels();
     FrameInputs inputs = inputs_of(block, camera, options);
-    if (options.sky) inputs.sky = &sky;
+    if (options.sky) inputs.sky = sky.use();
     const FrameRequest size{.splats = model.splats,
                             .width = inputs.camera.width,
                             .height = inputs.camera.height,
@@ -404,7 +404,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
         run_until_it_fits(cache, executor, frame, size, [&](const passes::Recorder& recorder) {
             const FramePasses on{recorder, plan, frame, inputs};
             const Sorted sorted = on.forward(model);
-            on.loss(photo, plan.masks, nullptr, nullptr, cut, {map ? &map : nullptr});
+            on.loss(photo, plan.masks, nullptr, cut, {map ? &map : nullptr});
             on.backward(model, sorted, {});
         });
     LossGradient result;

@@ -5,7 +5,6 @@
 
 #include "passes/passes.h"
 #include "pipeline/adam.h"
-#include "pipeline/model.h"
 #include "shared/constants.h"
 
 namespace ewa::pipeline {
@@ -13,12 +12,8 @@ namespace {
 
 constexpr float kGrey = 0.5f;
 
-SkyMap grey_sky() {
-    return {int(kLearnedSkySize), std::vector<float>(3ull * kLearnedSkySize * kLearnedSkySize, kGrey)};
-}
-
-shared::SkyPush sky_push(const FrameBuffers& frame, const SkyTexels& sky, const Band& band) {
-    return {.image = frame.sizes.image(), .size = sky.size, .first_row = band.rows > 0 ? band.first : 0};
+shared::SkyPush sky_push(const FrameBuffers& frame, uint32_t size, const Band& band) {
+    return {.image = frame.sizes.image(), .size = size, .first_row = band.rows > 0 ? band.first : 0};
 }
 
 }  // namespace
@@ -29,30 +24,22 @@ SkyTexels::SkyTexels(gpu::Device& device, const SkyMap& map)
 }
 
 LearnedSky::LearnedSky(gpu::Device& device, uint32_t views)
-    : SkyTexels(device, grey_sky()),
-      moments1(device, "sky moments1", bytes()),
-      moments2(device, "sky moments2", bytes()),
-      slots(device, "sky slots", bytes() * views),
-      before(device, "sky before", bytes()) {
-    zero(moments1);
-    zero(moments2);
-}
+    : LearnedTable(device,
+                   {.name = "sky",
+                    .moments = "sky_moments",
+                    .slot_floats = 3 * kLearnedSkySize * kLearnedSkySize,
+                    .views = views},
+                   std::vector<float>(3ull * kLearnedSkySize * kLearnedSkySize, kGrey)),
+      size(kLearnedSkySize),
+      before(device, "sky before", bytes()) {}
 
 SkyMap LearnedSky::download() const {
-    return {int(size), values.download<float>(bytes() / sizeof(float))};
-}
-
-std::vector<uint64_t> LearnedSky::words(uint32_t slot) const {
-    return slots.download<uint64_t>(words_of_view(), bytes() * slot);
-}
-
-void LearnedSky::set(uint32_t slot, std::span<const uint64_t> words) {
-    slots.upload(words, bytes() * slot);
+    return {int(size), LearnedTable::download()};
 }
 
 void FramePasses::add_sky() const {
-    record(passes::AddSky{.planes = frame.planes, .camera = camera(), .sky = inputs.sky->values},
-           sky_push(frame, *inputs.sky, inputs.band), {lenses()});
+    record(passes::AddSky{.planes = frame.planes, .camera = camera(), .sky = *inputs.sky.texels},
+           sky_push(frame, inputs.sky.size, inputs.band), {lenses()});
 }
 
 void FramePasses::sky_gradient(const LearnedSky& sky, uint32_t slot) const {
@@ -62,7 +49,8 @@ void FramePasses::sky_gradient(const LearnedSky& sky, uint32_t slot) const {
                                .camera = camera(),
                                .slots = sky.slots,
                                .counts = frame.counts},
-           {.sky = sky_push(frame, sky, inputs.band), .slot = 3 * sky.size * sky.size * slot}, {lenses()});
+           {.sky = sky_push(frame, sky.size, inputs.band), .slot = 3 * sky.size * sky.size * slot},
+           {lenses()});
 }
 
 void record_sky_update(const passes::Recorder& on, const LearnedSky& sky, const FrameBuffers& frame,

@@ -7,6 +7,7 @@
 
 #include "ewa/sky_map.h"
 #include "pipeline/forward.h"
+#include "pipeline/learned_table.h"
 
 namespace ewa::pipeline {
 
@@ -20,22 +21,19 @@ struct SkyTexels {
     SkyTexels() = default;
     SkyTexels(gpu::Device& device, const SkyMap& map);
     uint64_t bytes() const { return 4ull * 3 * size * size; }
+    SkyUse use() const { return {&values, size}; }
 };
 
-/// With Adam's moments, and the gradient by each view of a step, in whole multiples of 1 / SKY_UNITS.
-struct LearnedSky : SkyTexels {
-    gpu::Buffer moments1, moments2, slots;
+/// A sky that training learns. A slot has the gradient by its view, in whole multiples of 1 / SKY_UNITS.
+struct LearnedSky : LearnedTable {
+    uint32_t size = 0;
     gpu::Buffer before;  // the values, while they change
 
     LearnedSky() = default;
     /// Grey. views: of a step at most.
     LearnedSky(gpu::Device& device, uint32_t views);
     SkyMap download() const;
-
-    /// What a step learns of a view, for other ranks. slot: its view in the step.
-    size_t words_of_view() const { return bytes() / 8; }
-    std::vector<uint64_t> words(uint32_t slot) const;
-    void set(uint32_t slot, std::span<const uint64_t> words);
+    SkyUse use() const { return {&values, size}; }
 };
 
 /// Adam's step after those of all views. step: of the optimiser, from 1. capacity: of instances; more in frame.counts change

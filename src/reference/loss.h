@@ -52,7 +52,7 @@ DepthLoss depth_loss(const Raster& depth_sum, const Raster& transmittance, const
 /// The window's 2 * SSIM_RADIUS + 1 taps along one axis.
 std::vector<double> ssim_window();
 
-// The exposure of a training image (include/ewa/exposure.h), and the gradient through it:
+// The exposure of a training image (include/ewa/appearance.h), and the gradient through it:
 //   c' = M c + b:   dL/dc = M^T dL/dc',   dL/dM = sum over pixels of dL/dc' c^T,   dL/db = sum of dL/dc'
 
 /// Three rows of (matrix row, offset).

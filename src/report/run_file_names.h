@@ -11,13 +11,13 @@ namespace ewa::report {
 inline constexpr const char *kConfigFile = "config.json", *kMetricsFile = "metrics.jsonl",
                             *kCheckpointFile = "checkpoint.ewa", *kTimesFile = "times.json",
                             *kSplatsFile = "splats.ply", *kSummaryFile = "summary.json",
-                            *kReportFile = "report.html", *kExposuresFile = "exposures.json",
+                            *kReportFile = "report.html", *kOldExposuresFile = "exposures.json",
                             *kAppearanceFile = "appearance.json", *kCamerasFile = "cameras.json",
                             *kSkyFile = "sky.json", *kEventsFile = "events.out.tfevents.0.ewa";
 
 /// The files that `ewa train` writes beside its renders.
 inline constexpr std::array kRunFiles{kConfigFile,  kMetricsFile, kCheckpointFile, kTimesFile,
-                                      kSplatsFile,  kSummaryFile, kReportFile,     kExposuresFile,
+                                      kSplatsFile,  kSummaryFile, kReportFile,     kOldExposuresFile,
                                       kCamerasFile, kEventsFile,  kAppearanceFile, kSkyFile};
 
 /// With --robust: a mask for each training image that shows what the others do not.

@@ -86,7 +86,7 @@ class Alignment {
                 .sh_degree = options_.render.sh_degree};
             const pipeline::FramePasses on{recorder, plan_, frame_, inputs};
             const auto sorted = on.forward(model_);
-            on.loss(photo.texels, photo.masked, nullptr, nullptr, photo.cut);
+            on.loss(photo.texels, photo.masked, nullptr, photo.cut);
             on.backward(model_, sorted, {}, &use);
         });
     }

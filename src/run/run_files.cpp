@@ -111,22 +111,9 @@ void RunFolder::keep_splats(const Gaussians& gaussians, int step, const RenderOp
 void RunFolder::save_appearances(const Dataset& dataset, const std::vector<int>& frames,
                                  const std::vector<Appearance>& appearances) const {
     if (appearances.empty()) return;
-    std::vector<Exposure> exposures;
     std::vector<std::string> names;
-    for (size_t i = 0; i < appearances.size(); ++i) {
-        names.push_back(dataset.frames[size_t(frames[i])].name);
-        if (const auto* exposure = std::get_if<Exposure>(&appearances[i])) exposures.push_back(*exposure);
-    }
-    if (exposures.empty()) return ewa::save_appearances(path_ / report::kAppearanceFile, names, appearances);
-    nlohmann::ordered_json json = nlohmann::ordered_json::object();
-    for (size_t i = 0; i < exposures.size(); ++i) {
-        auto& rows = json[dataset.frames[size_t(frames[i])].name];
-        for (size_t row = 0; row < 3; ++row) {
-            const float* r = &exposures[i][4 * row];
-            rows.push_back({r[0], r[1], r[2], r[3]});
-        }
-    }
-    core::write_json(path_ / report::kExposuresFile, json);
+    for (const int frame : frames) names.push_back(dataset.frames[size_t(frame)].name);
+    ewa::save_appearances(path_ / report::kAppearanceFile, names, appearances);
 }
 
 void RunFolder::save_sky(const std::shared_ptr<const SkyMap>& sky) const {

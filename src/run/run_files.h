@@ -60,7 +60,7 @@ class RunFolder {
     void save_splats(const Gaussians& gaussians, int step, const RenderOptions& render) const;
     /// The same as one of the last `count` kept splats. Removes those before.
     void keep_splats(const Gaussians& gaussians, int step, const RenderOptions& render, int count) const;
-    /// exposures.json, or appearance.json. appearances: one for each of the training frames; none: nothing.
+    /// appearance.json. appearances: one for each of the training frames; none: nothing.
     void save_appearances(const Dataset& dataset, const std::vector<int>& frames,
                           const std::vector<Appearance>& appearances) const;
     /// sky.json. sky: null: nothing.

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/parallel.h"
+#include "pipeline/appearances.h"
 #include "pipeline/frame_buffers.h"
 #include "pipeline/model.h"
 #include "pipeline/plan.h"
@@ -261,8 +262,7 @@ MemoryEstimate MemoryEstimator::up_to(uint32_t max_splats) {
         estimate.frame +=
             ViewBuffers::most_bytes(plan, estimate.splats, uint64_t(options.batch), uint64_t(options.bands));
     estimate.images = image_bytes(dataset_, frames_, options);
-    if (plan.appearance == AppearanceModel::grid)
-        estimate.images += 3 * 4ull * shared::GRID_FLOATS * frames_.size();  // with both moments
+    estimate.images += 3 * 4ull * row_floats(plan.appearance) * frames_.size();  // with both moments
     return estimate;
 }
 

@@ -198,14 +198,15 @@ std::optional<ChunkFigures> Trainer::chunk_figures() const {
 }
 std::vector<Exposure> Trainer::exposures() const {
     training_->finish_all();
-    return training_->plan().appearance == AppearanceModel::affine ? training_->learned().exposures.download()
-                                                                   : std::vector<Exposure>();
+    std::vector<Exposure> affine;
+    if (training_->plan().appearance != AppearanceModel::affine) return affine;
+    for (const Appearance& appearance : training_->learned().appearances.download())
+        affine.push_back(std::get<Exposure>(appearance));
+    return affine;
 }
 std::vector<Appearance> Trainer::appearances() const {
-    const std::vector<Exposure> affine = exposures();
-    if (!affine.empty()) return {affine.begin(), affine.end()};
-    const pipeline::Appearances& learned = training_->learned().appearances;
-    return learned.model == AppearanceModel::none ? std::vector<Appearance>() : learned.download();
+    training_->finish_all();
+    return training_->learned().appearances.download();
 }
 std::shared_ptr<const SkyMap> Trainer::sky() const {
     training_->finish_all();

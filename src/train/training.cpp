@@ -95,31 +95,28 @@ void check_bands(const TrainOptions& options, const passes::KernelConfig& config
 
 }  // namespace
 
-std::vector<Learned::Array> Learned::arrays() {
-    std::vector<Array> arrays;
-    if (exposures.photos > 0)
-        for (const auto& [name, buffer] : {std::pair{"exposures", &exposures.values},
-                                           {"exp_moments1", &exposures.moments1},
-                                           {"exp_moments2", &exposures.moments2}})
-            arrays.push_back({name, buffer, exposures.bytes()});
-    if (appearances.model != AppearanceModel::none)
-        for (const auto& [name, buffer] : {std::pair{"appearances", &appearances.values},
-                                           {"app_moments1", &appearances.moments1},
-                                           {"app_moments2", &appearances.moments2}})
-            arrays.push_back({name, buffer, appearances.bytes()});
-    if (sky.size > 0)
-        for (const auto& [name, buffer] : {std::pair{"sky", &sky.values},
-                                           {"sky_moments1", &sky.moments1},
-                                           {"sky_moments2", &sky.moments2}})
-            arrays.push_back({name, buffer, sky.bytes()});
-    if (motions.photos > 0) {
-        for (const auto& [name, buffer] : {std::pair{"motions", &motions.values},
-                                           {"motion_moments1", &motions.moments1},
-                                           {"motion_moments2", &motions.moments2}})
-            arrays.push_back({name, buffer, motions.bytes()});
-        arrays.push_back({"motion_bases", &motions.bases, motions.basis_bytes()});
-    }
-    return arrays;
+std::vector<LearnedTable::Array> Learned::arrays() {
+    std::vector<LearnedTable::Array> all;
+    for (const auto& arrays : {appearances.arrays(), sky.arrays(), motions.arrays()})
+        all.insert(all.end(), arrays.begin(), arrays.end());
+    return all;
+}
+
+size_t Learned::words_of_view() const {
+    return appearances.words_of_view() + sky.words_of_view();
+}
+
+std::vector<uint64_t> Learned::words(uint32_t photo, uint32_t slot) const {
+    std::vector<uint64_t> words = appearances.words(photo, slot);
+    const std::vector<uint64_t> of_sky = sky.words(photo, slot);
+    words.insert(words.end(), of_sky.begin(), of_sky.end());
+    return words;
+}
+
+void Learned::set(uint32_t photo, uint32_t slot, std::span<const uint64_t> words) {
+    const size_t own = appearances.words_of_view();
+    appearances.set(photo, slot, words.first(own));
+    sky.set(photo, slot, words.subspan(own));
 }
 
 void StepLog::add(const portions::StepSums& sums) {
@@ -181,9 +178,7 @@ Training::Training(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
         portions::check_portions(std::min(options.final_splats, portions_.splats()), portions_.all());
     // The first frame says how many there are. With a limit, a capacity for all splats might not fit.
     tools_.instance_capacity = first_capacity(portions_.streamed() ? 0 : ready.size());
-    if (plan_.appearance == AppearanceModel::affine)
-        learned_.exposures = Exposures(*device_, images_.count());
-    else if (plan_.appearance != AppearanceModel::none)
+    if (plan_.appearance != AppearanceModel::none)
         learned_.appearances =
             Appearances(*device_, plan_.appearance, cameras_of(dataset, frames), uint32_t(options.batch));
     if (plan_.appearance == AppearanceModel::ppisp && options.measure_exposures)

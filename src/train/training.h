@@ -41,19 +41,18 @@ struct FrameTools {
     uint32_t frames_in_flight() const { return cache.config().frames_in_flight; }
 };
 
-/// What a training learns besides the splats. All ranks have the same.
+/// What a training learns besides the splats. All ranks have the same. A table that is not learned is empty.
 struct Learned {
-    struct Array {
-        const char* name;
-        gpu::Buffer* buffer;
-        uint64_t bytes;
-    };
-    pipeline::Exposures exposures;
     pipeline::Appearances appearances;
     pipeline::Motions motions;
     pipeline::LearnedSky sky;
 
-    std::vector<Array> arrays();  // of a state
+    std::vector<pipeline::LearnedTable::Array> arrays();  // of a state
+
+    /// What a step learns of a view, for other ranks. photo: its training image. slot: its number in the step.
+    size_t words_of_view() const;
+    std::vector<uint64_t> words(uint32_t photo, uint32_t slot) const;
+    void set(uint32_t photo, uint32_t slot, std::span<const uint64_t> words);
 };
 
 /// What the steps have done and how long they took.
@@ -132,8 +131,8 @@ class Training {
     /// What is learned of all views of a step together. Every rank has their gradients.
     void update_learned(int first, int last);
     void record_update_sky(const passes::Recorder& on, int first, int last, uint32_t capacity);
-    /// The sky that is drawn; null: none.
-    const pipeline::SkyTexels* sky() const { return plan_.sky ? &learned_.sky : nullptr; }
+    /// The sky that is drawn.
+    pipeline::SkyUse sky() const { return plan_.sky ? learned_.sky.use() : pipeline::SkyUse{}; }
 
     /// All that changes from step to step is a pure function of the step's number: a step can be repeated.
     void record_fused(gpu::Recording& recording, int step, size_t index, const portions::StepView& view);
@@ -154,10 +153,6 @@ class Training {
     void optimise(int first, int last);
     void optimise_several(int first, int last);
     portions::StepParts step_parts();
-    /// What a view of a step learns, for other ranks.
-    std::vector<uint64_t> words_of(uint32_t photo, uint32_t slot) const;
-    void set_words(uint32_t photo, uint32_t slot, std::span<const uint64_t> words);
-    size_t words_of_appearance() const;
     /// The image through the camera of this rank's number; without pixels if there is none.
     Image render_own(std::span<const Camera> cameras);
 

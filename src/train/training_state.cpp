@@ -48,7 +48,7 @@ void Training::save(StateWriter* to) {
     finish_all();
     const auto learned = learned_.arrays();
     const bool moved = portions_.origin() != glm::dvec3(0);
-    const auto save_array = [to](const char* name, auto&& pass_on) {
+    const auto save_array = [to](const std::string& name, auto&& pass_on) {
         pass_on([=](uint64_t bytes, uint32_t checksum) { to->begin_array(name, bytes, checksum); },
                 [=](std::span<const std::byte> piece) { to->write(piece); });
     };
@@ -57,12 +57,12 @@ void Training::save(StateWriter* to) {
         save_array(portions::Portions::name_of(array),
                    [&](const auto& begin, const auto& take) { portions_.pass_on(array, begin, take); });
     if (!to) return;
-    const auto save_bytes = [&](const char* name, std::span<const std::byte> bytes) {
+    const auto save_bytes = [&](const std::string& name, std::span<const std::byte> bytes) {
         save_array(name, [&](const auto& begin, const auto& take) {
             portions::pass_on(*alone(), bytes, begin, take);
         });
     };
-    for (const Learned::Array& array : learned)
+    for (const LearnedTable::Array& array : learned)
         save_bytes(array.name, array.buffer->download<std::byte>(array.bytes));
     if (moved) save_bytes("origin", bytes_of(portions_.origin()));
 }
@@ -84,7 +84,7 @@ void Training::check_fits(StateReader& from) {
     std::vector<StateReader::Array> expected;
     for (const portions::Array array : portions_.kept())
         expected.push_back({portions::Portions::name_of(array), portions_.bytes_of(array, splats)});
-    for (const Learned::Array& array : learned_.arrays()) expected.push_back({array.name, array.bytes});
+    for (const LearnedTable::Array& array : learned_.arrays()) expected.push_back({array.name, array.bytes});
     if (arrays.size() != expected.size() + moved)
         throw InputError(std::string(kMisfit) + "it is of another strategy or has moments of other bits");
     for (size_t i = 0; i < expected.size(); ++i)
@@ -106,7 +106,7 @@ void Training::restore(StateReader* from) {
             array, [&](uint64_t offset, std::span<std::byte> into) { from->read(read, offset, into); });
         ++read;
     }
-    for (const Learned::Array& array : learned_.arrays()) {
+    for (const LearnedTable::Array& array : learned_.arrays()) {
         std::vector<std::byte> bytes(from ? array.bytes : 0);
         if (from) from->read(read++, 0, bytes);
         array.buffer->upload(std::span<const std::byte>(portions_.sent(bytes)));

@@ -205,58 +205,25 @@ portions::StepView Training::view_of(int step, ImageCache& seen, int sh_degree, 
     const CameraUse camera = seen.camera(index);
     const FrameInputs inputs{
         .camera = camera, .background = background_of(step, options_), .sky = sky(), .sh_degree = sh_degree};
-    const ExposureUse exposure{&learned_.exposures, uint32_t(index), float(schedule_.exposure_rate(step)),
-                               visit_of(step)};
-    const AppearanceUse appearance{&learned_.appearances, uint32_t(index), slot,
-                                   float(schedule_.appearance_rate(step)), visit_of(step)};
     const bool affine = plan_.appearance == AppearanceModel::affine;
-    const bool learned = learned_.appearances.model != AppearanceModel::none;
+    const double rate = affine ? schedule_.exposure_rate(step) : schedule_.appearance_rate(step);
+    const AppearanceUse appearance{&learned_.appearances, uint32_t(index), slot, float(rate), visit_of(step)};
+    const bool learned = !learned_.appearances.empty();
     const auto weight = std::make_shared<double>(1);
-    return {
-        .inputs = inputs,
-        .request = request_of(camera),
-        .record_loss =
-            [this, exposure, appearance, affine, learned, weight, index, slot, &seen](const FramePasses& on) {
-                const auto& photo = seen.photo(index);
-                *weight = photo.weight;
-                on.loss(photo.texels, photo.masked, affine ? &exposure : nullptr,
-                        learned ? &appearance : nullptr, photo.cut,
-                        {photo.depths ? &photo.depths : nullptr, photo.depth_pixels});
-                if (plan_.sky) on.sky_gradient(learned_.sky, slot);
-            },
-        .weight = [weight] { return *weight; },
-        .learned = [this, index, slot] { return words_of(uint32_t(index), slot); },
-        .learn = [this, index,
-                  slot](std::span<const uint64_t> words) { set_words(uint32_t(index), slot, words); }};
-}
-
-/// What a view learns: its appearance, then its gradient by the sky.
-std::vector<uint64_t> Training::words_of(uint32_t photo, uint32_t slot) const {
-    std::vector<uint64_t> words;
-    if (plan_.appearance == AppearanceModel::affine) {
-        const auto own = learned_.exposures.words(photo);
-        words.assign(own.begin(), own.end());
-    } else if (plan_.appearance != AppearanceModel::none) {
-        words = learned_.appearances.words(photo, slot);
-    }
-    if (!plan_.sky) return words;
-    const std::vector<uint64_t> of_sky = learned_.sky.words(slot);
-    words.insert(words.end(), of_sky.begin(), of_sky.end());
-    return words;
-}
-
-void Training::set_words(uint32_t photo, uint32_t slot, std::span<const uint64_t> words) {
-    const size_t appearance = words_of_appearance();
-    if (plan_.appearance == AppearanceModel::affine)
-        learned_.exposures.set(photo, words.first(appearance));
-    else if (appearance > 0)
-        learned_.appearances.set(photo, slot, words.first(appearance));
-    if (plan_.sky) learned_.sky.set(slot, words.subspan(appearance));
-}
-
-size_t Training::words_of_appearance() const {
-    if (plan_.appearance == AppearanceModel::affine) return std::tuple_size_v<Exposures::Words>;
-    return plan_.appearance == AppearanceModel::none ? 0 : learned_.appearances.words_of_view();
+    return {.inputs = inputs,
+            .request = request_of(camera),
+            .record_loss =
+                [this, appearance, learned, weight, index, slot, &seen](const FramePasses& on) {
+                    const auto& photo = seen.photo(index);
+                    *weight = photo.weight;
+                    on.loss(photo.texels, photo.masked, learned ? &appearance : nullptr, photo.cut,
+                            {photo.depths ? &photo.depths : nullptr, photo.depth_pixels});
+                    if (plan_.sky) on.sky_gradient(learned_.sky, slot);
+                },
+            .weight = [weight] { return *weight; },
+            .learned = [this, index, slot] { return learned_.words(uint32_t(index), slot); },
+            .learn = [this, index,
+                      slot](std::span<const uint64_t> words) { learned_.set(uint32_t(index), slot, words); }};
 }
 
 void Training::optimise_several(int first, int last) {
@@ -309,7 +276,7 @@ portions::StepParts Training::step_parts() {
             tools_.frame,
             tools_.instance_capacity,
             [this] { log_.add_passes(tools_.executor.timings()); },
-            words_of_appearance() + (plan_.sky ? learned_.sky.words_of_view() : 0)};
+            learned_.words_of_view()};
 }
 
 Image Training::render_own(std::span<const Camera> cameras) {

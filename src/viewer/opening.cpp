@@ -73,7 +73,7 @@ Look look_of(const live::Run& run) {
 }
 
 void add_appearances(OpenedScene& scene, const live::Run& run) {
-    for (const char* name : {report::kExposuresFile, report::kAppearanceFile}) {
+    for (const char* name : {report::kAppearanceFile, report::kOldExposuresFile}) {
         if (!core::is_file(run.folder / name)) continue;
         try {
             scene.appearances = load_appearances(run.folder / name);

@@ -163,7 +163,7 @@ TEST_F(Runs, EvalAndRenderUseTheExposures) {
     }
     EXPECT_GT(edges, 10u);
     expect_success(run_ewa({"render", run, "-o", folder / "auto"}));
-    expect_success(run_ewa({"render", run, "--exposures", run + "/exposures.json", "-o", folder / "file"}));
+    expect_success(run_ewa({"render", run, "--exposures", run + "/appearance.json", "-o", folder / "file"}));
     EXPECT_EQ(read_file(folder / "auto/1.png"), read_file(folder / "file/1.png"));
 }
 
@@ -594,7 +594,7 @@ TEST_F(Runs, FilesOfARunStayWhole) {
     };
     const std::string reason = "is a file of the training run in " + run;
     for (const char* file : {"config.json", "checkpoint.ewa", "times.json", "summary.json", "metrics.jsonl",
-                             "splats.ply", "report.html", "exposures.json", "cameras.json", "sky.json"})
+                             "splats.ply", "report.html", "appearance.json", "cameras.json", "sky.json"})
         refused({"eval", run, "--json", run + "/" + file}, reason);
     refused({"grad", run, "--frame", "0", "-o", folder / "x.ply", "--json", run + "/summary.json"}, reason);
     refused({"compare", run, other, "--json", run + "/metrics.jsonl"}, reason);
@@ -602,7 +602,7 @@ TEST_F(Runs, FilesOfARunStayWhole) {
     refused({"bench", "--cases", "none", "--json", run + "/summary.json"}, reason);
     // Also where the run is no input.
     refused({"convert", splats, run + "/splats.ply"}, "; name another file");
-    refused({"eval", splats, folder / "data", "--json", run + "/exposures.json"}, reason);
+    refused({"eval", splats, folder / "data", "--json", run + "/appearance.json"}, reason);
     fs::create_symlink(run + "/config.json", folder / "link.json");
     refused({"eval", run, "--json", folder / "link.json"}, reason);
     fs::create_hard_link(run + "/config.json", folder / "hard.json");

@@ -141,12 +141,6 @@ void check_scene(const SkyMap& sky) {
     EWA_REQUIRE(sky.texels.size() == size_t(3) * size_t(sky.size) * size_t(sky.size));
     for (const float value : sky.texels) EWA_REQUIRE(std::isfinite(value));
 }
-#elif defined(EWA_READ_EXPOSURES)
-void check_scene(const std::map<std::string, Exposure>& exposures) {
-    const std::string text = std::to_string(exposures.size()) + " exposures";
-    for (const auto& [name, exposure] : exposures)
-        for (const float value : exposure) EWA_REQUIRE(std::isfinite(value));
-}
 #elif defined(EWA_READ_TIMES)
 void check_scene(const train::RunTimes& times) {
     const std::string text = std::to_string(times.metrics.size()) + " times";

@@ -97,7 +97,7 @@ class GuardedFrame {
             make(frame.target, "target", s.target, Texel::rgba32f);
             if (request.appearance != AppearanceModel::none) {
                 make(frame.exposed, "exposed", s.exposed, Texel::rgba32f);
-                make(frame.exposure_sums, "exposure sums", s.exposure_sums);
+                make(frame.appearance_sums, "appearance sums", s.appearance_sums);
             }
             if (request.motion) {
                 make(frame.motion_sums, "motion sums", s.motion_sums);

@@ -76,7 +76,7 @@ void show(ShownInputs& s, pipeline::FrameBuffers& frame, uint32_t visit, uint32_
     const pipeline::Plan plan;
     r.run([&](gpu::Recording& recording) {
         const pipeline::FramePasses on{{recording, r.cache}, plan, frame, inputs};
-        on.loss(texels, false, nullptr, &use);
+        on.loss(texels, false, &use);
         const uint32_t photos[] = {kShownPhoto};
         record_cameras_update(on, s.appearances, frame, photos, kShownRate, frame.instance_capacity);
     });

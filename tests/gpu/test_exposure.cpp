@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exposures on the device against the CPU reference: the image the loss sees, the way back, and Adam's
-// step.
+// Affine maps of colours on the device against the CPU reference: the image the loss sees, the way back, and Adam's step.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,7 +8,8 @@
 
 #include "gpu/guarded.h"
 #include "gpu/reference_inputs.h"
-#include "pipeline/backward.h"
+#include "pipeline/appearances.h"
+#include "pipeline/forward.h"
 #include "pipeline/frame_inputs.h"
 #include "reference/loss.h"
 #include "reference/training.h"
@@ -28,13 +28,13 @@ reference::Exposure wide(const Exposure& exposure) {
 }
 
 struct Inputs {
-    pipeline::Exposures exposures;
+    pipeline::Appearances exposures;
     std::vector<Exposure> start;
     reference::Raster image, target;
     Image photo;
 
     Inputs(int width, int height)
-        : exposures(*device(), kPhotos),
+        : exposures(*device(), AppearanceModel::affine, std::vector<uint32_t>(kPhotos), 1),
           image(reference::to_double(random_target(71, width, height))),
           target(reference::to_double(random_target(72, width, height))),
           photo(random_target(72, width, height)) {
@@ -57,7 +57,7 @@ void run(Inputs& s, pipeline::FrameBuffers& frame, uint32_t visit, uint32_t inst
     frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
     const gpu::Buffer texels = pipeline::upload_photo(*device(), s.photo);
     const pipeline::CameraUse camera{nullptr, 0, uint32_t(s.image.width), uint32_t(s.image.height)};
-    const pipeline::ExposureUse use{&s.exposures, kPhoto, kRate, visit};
+    const pipeline::AppearanceUse use{&s.exposures, kPhoto, 0, kRate, visit};
     r.run([&](gpu::Recording& recording) {
         pipeline::FramePasses{{recording, r.cache}, {}, frame, {.camera = camera}}.loss(texels, false, &use);
     });
@@ -103,10 +103,11 @@ TEST_P(ExposedLoss, GradientsAndAdamsStepMatchTheReference) {
         for (size_t k = 0; k < 12; ++k)
             by_exposure[k] = cpu.exposure[k] + kPull * (exposure[k] - identity[k]);
         adam_step(values, by_exposure, adam, kRate, int(visit));
-        const std::vector<Exposure> now = s.exposures.download();
-        for (size_t k = 0; k < 12; ++k) EXPECT_NEAR(now[kPhoto][k], values[k], 2e-3 * kRate) << k;
-        EXPECT_EQ(now[0], s.start[0]);  // the other images'
-        EXPECT_EQ(now[2], s.start[2]);
+        const std::vector<Appearance> now = s.exposures.download();
+        for (size_t k = 0; k < 12; ++k)
+            EXPECT_NEAR(std::get<Exposure>(now[kPhoto])[k], values[k], 2e-3 * kRate) << k;
+        EXPECT_EQ(now[0], Appearance(s.start[0]));  // the other images'
+        EXPECT_EQ(now[2], Appearance(s.start[2]));
     }
     // The moments tell the gradient itself, where a step of Adam says little more than its sign.
     const auto m = s.exposures.moments1.download<float>(12 * kPhotos);
@@ -117,6 +118,8 @@ TEST_P(ExposedLoss, GradientsAndAdamsStepMatchTheReference) {
 
 INSTANTIATE_TEST_SUITE_P(Sizes, ExposedLoss,
                          testing::Values(std::pair{1, 1}, std::pair{61, 47}, std::pair{200, 131}));
+// Several parts of rows.
+INSTANTIATE_TEST_SUITE_P(LargeSize, ExposedLoss, testing::Values(std::pair{300, 200}));
 
 /// A pixel that does not count says nothing of the exposure.
 TEST(Exposure, LearnsNothingFromWhatIsMasked) {
@@ -133,14 +136,14 @@ TEST(Exposure, LearnsNothingFromWhatIsMasked) {
     const pipeline::CameraUse camera{nullptr, 0, 40, 30};
     s.exposures.values.upload(
         std::span<const Exposure>(std::vector<Exposure>(kPhotos, kIdentityExposure)));  // where nothing pulls
-    const pipeline::ExposureUse use{&s.exposures, kPhoto, kRate, 1};
+    const pipeline::AppearanceUse use{&s.exposures, kPhoto, 0, kRate, 1};
     Rig& r = rig();
     r.run([&](gpu::Recording& recording) {
         pipeline::FramePasses{{recording, r.cache}, {}, guarded.frame, {.camera = camera}}.loss(texels, true,
                                                                                                 &use);
     });
     EXPECT_TRUE(guarded.intact());
-    EXPECT_EQ(s.exposures.download()[kPhoto], kIdentityExposure);
+    EXPECT_EQ(s.exposures.download()[kPhoto], Appearance(kIdentityExposure));
 }
 
 TEST(Exposure, AStepThatIsNotFiniteIsDroppedAndCounted) {
@@ -149,16 +152,16 @@ TEST(Exposure, AStepThatIsNotFiniteIsDroppedAndCounted) {
     s.image.at(3, 3)[1] = std::numeric_limits<double>::infinity();
     run(s, guarded.frame, 1);
     EXPECT_EQ(guarded.frame.read_counts().dropped_updates, 3u);  // each row sees every channel
-    EXPECT_EQ(s.exposures.download()[kPhoto], s.start[kPhoto]);
+    EXPECT_EQ(s.exposures.download()[kPhoto], Appearance(s.start[kPhoto]));
 }
 
 TEST(Exposure, NothingMovesWhereTheInstancesDidNotFit) {
     Inputs s(16, 16);
     GuardedFrame guarded(rig().config(), {1, 16, 16, 1, true, false, false, AppearanceModel::affine});
     run(s, guarded.frame, 1, guarded.frame.instance_capacity + 1);
-    EXPECT_EQ(s.exposures.download()[kPhoto], s.start[kPhoto]);
+    EXPECT_EQ(s.exposures.download()[kPhoto], Appearance(s.start[kPhoto]));
     run(s, guarded.frame, 1, guarded.frame.instance_capacity);  // they just fit
-    EXPECT_NE(s.exposures.download()[kPhoto], s.start[kPhoto]);
+    EXPECT_NE(s.exposures.download()[kPhoto], Appearance(s.start[kPhoto]));
 }
 
 }  // namespace

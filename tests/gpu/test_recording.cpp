@@ -408,8 +408,7 @@ struct FrameParts {
     pipeline::FrameBuffers frame;
     pipeline::FrameBuffers wide;  // its tiles are sorted in several passes
     gpu::Buffer camera, photo;
-    pipeline::Exposures exposures;
-    pipeline::Appearances ppisp, grids;
+    pipeline::Appearances exposures, ppisp, grids;
     pipeline::Motions motions;
     pipeline::LearnedSky sky;
     pipeline::ViewBuffers views;
@@ -422,7 +421,7 @@ void record_gradient(const FrameParts& parts, gpu::Recording& recording, const p
     const auto plan = plan_for(request);
     const pipeline::FramePasses on{{recording, rig().cache}, plan, parts.frame, inputs};
     const auto sorted = on.forward(parts.model);
-    on.loss(parts.photo, masked, nullptr, nullptr, cut, {depths ? &parts.photo : nullptr});
+    on.loss(parts.photo, masked, nullptr, cut, {depths ? &parts.photo : nullptr});
     on.backward(parts.model, sorted, {});
 }
 
@@ -432,8 +431,8 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     const Scene scene = random_scene(3000, 50, SplatKind::ordinary, 61, 47, 2);
     FrameParts& parts = frame_parts->get([] { return FrameParts(); });
     auto& [model, frame, wide, camera, photo, exposures, ppisp, grids, motions, sky, views] = parts;
-    exposures = pipeline::Exposures(*device(), 3);
-    const pipeline::ExposureUse exposure{&exposures, 1, 0.01f, 1};
+    exposures = pipeline::Appearances(*device(), AppearanceModel::affine, {0, 0, 0}, 1);
+    const pipeline::AppearanceUse exposure{&exposures, 1, 0, 0.01f, 1};
     ppisp = pipeline::Appearances(*device(), AppearanceModel::ppisp, {0, 1, 0}, 2);
     grids = pipeline::Appearances(*device(), AppearanceModel::grid, {0, 0}, 1);
     sky = pipeline::LearnedSky(*device(), 1);
@@ -482,7 +481,7 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     const pipeline::FramePasses shown{{appearance, r.cache}, plan, frame, inputs};
     for (const pipeline::Appearances* each : {&ppisp, &grids}) {
         const pipeline::AppearanceUse use{each, 1, 0, 0.01f, 1};
-        shown.loss(photo, false, nullptr, &use);
+        shown.loss(photo, false, &use);
         const uint32_t photos[] = {1};
         record_cameras_update(shown, *each, frame, photos, 0.01f, frame.instance_capacity);
     }
@@ -491,7 +490,7 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     // A sky that is learned.
     gpu::Recording behind = r.recording();
     pipeline::FrameInputs over_sky = inputs;
-    over_sky.sky = &sky;
+    over_sky.sky = sky.use();
     const pipeline::FramePasses under_sky{{behind, r.cache}, plan, frame, over_sky};
     under_sky.forward(model);
     under_sky.loss(photo);

@@ -184,7 +184,7 @@ TEST(SkyOfBands, IsThatOfTheView) {
     const pipeline::SkyTexels sky(*device(), random_sky(68, 16));
     const gpu::Buffer block = camera_buffer(s.camera, rig().config());
     auto inputs = pipeline::inputs_of(block, s.camera, {});
-    inputs.sky = &sky;
+    inputs.sky = sky.use();
     inputs.band = {.first = 16, .rows = 24, .own_begin = 8, .own_end = 16};
     GuardedFrame guarded(rig().config(), {.splats = 1, .width = 40, .height = 24, .instances = 1});
     pipeline::FrameBuffers& frame = guarded.frame;
@@ -280,10 +280,10 @@ TEST(SkyUpdate, GivesOtherRanksWhatAViewLearns) {
     SkySteps s;
     s.step(1, 1);
     pipeline::LearnedSky received(*device(), 2);
-    received.set(1, s.sky.words(2));
+    received.set(0, 1, s.sky.words(0, 2));
     const auto expected = s.sky.slots.download<int32_t>(s.floats, 2 * s.sky.bytes());
     EXPECT_EQ(received.slots.download<int32_t>(s.floats, received.bytes()), expected);
-    EXPECT_EQ(s.sky.words(2).size(), s.sky.words_of_view());
+    EXPECT_EQ(s.sky.words(0, 2).size(), s.sky.words_of_view());
 }
 
 }  // namespace

@@ -97,7 +97,7 @@ TEST(Run, WritesItsFilesAndTellsItsObserver) {
     recorder.save_file = folder / "o/splats.ply";
     const RunResult result = run_training(options, recorder);
     for (const char* file : {"config.json", "metrics.jsonl", "checkpoint.ewa", "times.json", "splats.ply",
-                             "summary.json", "report.html", "exposures.json"})
+                             "summary.json", "report.html", "appearance.json"})
         EXPECT_TRUE(fs::exists(folder / "o" / file)) << file;
     EXPECT_EQ(result.folder, folder / "o");
     EXPECT_TRUE(fs::exists(result.first_render)) << result.first_render;
@@ -145,7 +145,7 @@ TEST(Run, StoppedAndResumedEndsWithTheSameBytes) {
     const RunResult result = run_training(options);
     EXPECT_FALSE(result.summary.interrupted);
     EXPECT_EQ(json_of(folder / "cut/config.json")["background"], "sky");
-    for (const char* file : {"splats.ply", "exposures.json", "sky.json", "config.json"})
+    for (const char* file : {"splats.ply", "appearance.json", "sky.json", "config.json"})
         EXPECT_EQ(file_bytes(folder / "cut" / file), file_bytes(folder / "whole" / file)) << file;
 
     options.train.seed = 4;

@@ -435,7 +435,7 @@ Dataset exposed_by_itself(Synthetic& made) {
         Exposure e = kIdentityExposure;
         for (const size_t k : {0u, 5u, 10u}) e[k] = float(random.uniform(0.5, 1));
         const Frame& frame = made.dataset.frames[i];
-        save_image(frame.image_path, exposed(load_image(frame.image_path), e));
+        save_image(frame.image_path, with_appearance(load_image(frame.image_path), e));
     }
     return load_dataset(made.folder.path(), {});
 }

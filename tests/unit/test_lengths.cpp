@@ -143,7 +143,6 @@ TEST(Lengths, OfImagesAreChecked) {
         {"measure", [&](const Image& a) { meter.measure(a, right); }},
         {"measure", [&](const Image& a) { meter.measure(right, a); }},
         {"measure", [&](const Image& a) { meter.measure(right, right, a); }},
-        {"exposed", [](const Image& a) { exposed(a, kIdentityExposure); }},
         {"with_appearance", [](const Image& a) { with_appearance(a, Ppisp{}); }},
         {"with_appearance", [](const Image& a) { with_appearance(a, ColorGrid{}); }}};
     std::vector<Image> wrong(5, right);
@@ -174,7 +173,7 @@ TEST(Lengths, ImagesOfAnotherKindAreRefused) {
     expect_refused([&] { with_alpha(color, color); }, "gets no alpha");
     expect_refused([&] { with_alpha(color, Image(8, 5, 1)); }, "gets no alpha");
     expect_refused([&] { oriented(color, 9); }, "orientations 1 to 8, not 9");
-    expect_refused([&] { exposed(grey, kIdentityExposure); }, "no colours");
+    expect_refused([&] { with_appearance(grey, kIdentityExposure); }, "no colours");
     expect_refused([&] { compare_images(Image(8, 6, 5), color); }, "5 and 3 channels");
 }
 

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <algorithm>
 
-#include "ewa/exposure.h"
+#include "ewa/appearance.h"
 #include "support/random_scene.h"
 
 namespace ewa::reference {
@@ -50,12 +50,12 @@ TEST(ReferenceExposure, MatchesTheExposureOfAnImage) {
     ewa::Exposure e{0.5f, 0.1f, 0, 0.2f, 0, 2, 0, -0.1f, 0.3f, 0, 1, 0};
     Exposure wide;
     std::copy(e.begin(), e.end(), wide.begin());
-    const Image actual = ewa::exposed(image, e);
+    const Image actual = with_appearance(image, e);
     const Raster expected = exposed(to_double(image), wide);
     for (int y = 0; y < 5; ++y)
         for (int x = 0; x < 6; ++x)
             for (int c = 0; c < 3; ++c) EXPECT_NEAR(actual.at(x, y)[c], expected.at(x, y)[c], 1e-6);
-    EXPECT_EQ(ewa::exposed(image, kIdentityExposure).pixels, image.pixels);
+    EXPECT_EQ(with_appearance(image, kIdentityExposure).pixels, image.pixels);
 }
 
 }  // namespace
