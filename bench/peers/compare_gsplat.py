@@ -6,7 +6,7 @@
 
 DATASET is a COLMAP folder with pinhole cameras, as text or binary, for example fox_270. Both train on the same images with the same
 first points, number of steps, SH degrees, loss, and held-out images. Each has its own defaults for learning rates and thresholds,
-as gsplat's example trainer and docs/training.md state them. Times are means over all steps, without loading and evaluation.
+as gsplat's example trainer and docs/training_options.md state them. Times are means over all steps, without loading and evaluation.
 
 gsplat needs a CUDA device, and the packages gsplat, torch, numpy and pillow. fused_ssim is used where it is installed. Without them
 the script prints one line and its exit status is 2.

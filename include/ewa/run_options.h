@@ -56,7 +56,7 @@ struct RunOptions {
     LensUse lens = LensUse::automatic;
     /// With TrainOptions::refine_poses: frames without a readout get one in this order, and learn their cameras' motion from rest.
     std::optional<ReadoutFrom> rolling_shutter;
-    /// Photos without transparency have TrainOptions::background_noise of 0.4 around their mean colour (docs/training.md#background).
+    /// Photos without transparency have TrainOptions::background_noise of 0.4 around their mean colour (docs/training_options.md#background).
     /// Only where RenderOptions::background is black, and not with a sky, a random background, points or refined poses.
     bool automatic_background = true;
     int test_every = 8;          // every K-th image in name order is held out; 0: none

@@ -20,14 +20,14 @@ enum class Strategy {
     automatic  // strategy_for(steps); adc if an option of adc is set
 };
 
-/// The strategy, adc or mcmc, that gives better images after this many steps (measurements: docs/training.md).
+/// The strategy, adc or mcmc, that gives better images after this many steps (docs/experiments/growth.md).
 Strategy strategy_for(int steps);
 
 /// TrainOptions::sh_degree: 3, or 0 if the dataset says that no colour depends on the view.
 inline constexpr int kAutomaticShDegree = -1;
 
 /// Half the width and height at first, in short runs of adc with many training images, for their first hundred steps
-/// (docs/training.md#resolution). It replaces a resolution_every that is the default.
+/// (docs/training_options.md#resolution). It replaces a resolution_every that is the default.
 inline constexpr int kAutomaticHalvings = -1;
 
 /// TrainOptions::max_splats: splat_cap() of ewa/training_needs.h chooses it.
@@ -83,7 +83,7 @@ struct TrainOptions {
     /// each photo 60 times and has fewer than 30,000 steps, the rates of its splats fade.
     int few_photos = 16;
 
-    /// Learns the appearance of each training image (docs/training.md).
+    /// Learns the appearance of each training image (docs/training_options.md).
     AppearanceModel appearance = AppearanceModel::none;
     bool exposure = false;  // AppearanceModel::affine; not with another model
     double exposure_rate = 0.01, exposure_rate_final = 0.001;

@@ -23,7 +23,7 @@ struct SplatCap {
     std::string reason;  // e.g. "100 more for each step"
 };
 
-/// TrainOptions::max_splats of a Trainer with the same arguments. docs/training.md has the rule of the automatic one. Throws
+/// TrainOptions::max_splats of a Trainer with the same arguments. docs/training_options.md has the rule of the automatic one. Throws
 /// InputError as that does; so do the next two functions.
 SplatCap splat_cap(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& train_frames,
                    const Gaussians& start, const TrainOptions& options);

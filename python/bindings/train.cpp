@@ -488,7 +488,8 @@ void bind_trainer(nb::module_& module) {
             "init: the first splats, a file of splats or points, or the folder of a run; \"sfm\", the "
             "usual, takes the dataset's points. "
             "train_frames: all but every eighth frame unless given. quality: low is 2000 steps, medium 7000, "
-            "high the usual 30000; steps goes before it. docs/training.md explains the other options.")
+            "high the usual 30000; steps goes before it. docs/training_options.md explains the other "
+            "options.")
         .def(
             "__iter__", [](nb::handle self) { return nb::borrow(self); },
             nb::sig("def __iter__(self) -> Trainer"))

@@ -7,7 +7,7 @@
 
 namespace ewa::train {
 
-/// docs/training.md lists them.
+/// docs/training_options.md lists them.
 std::vector<RunOption> advanced_options();
 
 }  // namespace ewa::train

@@ -16,7 +16,7 @@ namespace ewa::train {
 namespace {
 
 constexpr size_t kMostImages = 16;
-// Enough that splats become opaque, and so little that its gradients disturb few: docs/training.md#background has figures.
+// Enough that splats become opaque, and so little that its gradients disturb few: docs/experiments/background.md has figures.
 constexpr double kNoise = 0.4;
 // The mean is rounded, so that the same photos in other sizes have the same background.
 constexpr double kLevels = 100;

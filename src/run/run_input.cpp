@@ -44,7 +44,7 @@ constexpr size_t kUsualPoints = 200000;
 constexpr const char* kOtherLimit = "; --max-splats N sets another limit";
 // A longer run adds splats by itself where they are needed. fox_270 gains 0.7 dB in 500 steps, and nothing in 1,000.
 constexpr int kDenseStartSteps = 700;
-// With so few points for each pixel of a photo, runs of 1,000 steps gain from it, too (docs/training.md#short-runs).
+// With so few points for each pixel of a photo, runs of 1,000 steps gain from it, too (docs/experiments/short_runs.md).
 constexpr int kDenseStartStepsOfFewPoints = 1000;
 constexpr double kFewPoints = 0.15;
 constexpr double kPixelsOfDenseStart = 2;  // of an image, for each first splat

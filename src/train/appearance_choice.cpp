@@ -27,7 +27,7 @@ constexpr double kDark = 24 / 255.0, kBright = 240 / 255.0;
 // Brightness of an image and of the points that it shows: a smaller correlation says that they have nothing in common. Rendered
 // captures have 0.3 or more, random colours under 0.06 (1,000 points).
 constexpr double kLeastCorrelation = 0.15, kDeviationsOfChance = 3;
-// The root mean squares from which learning pays (docs/training.md "Appearance").
+// The root mean squares from which learning pays (docs/experiments/appearance.md).
 constexpr double kStopsToLearn = 0.12, kColorToLearn = 0.06;
 // A factor of light is this power of it in stored values: the exponent of sRGB is about 1 / 2.2.
 constexpr double kStored = 1 / 2.2;

@@ -26,9 +26,9 @@ constexpr int kLeastRefinements = 6;     // of adc, unless they would last for m
 constexpr int kLeastRelocateEvery = 25;  // a relocated splat has time to fade or to stay
 constexpr int kLeastResetEvery = 1000;
 constexpr int kLeastShEvery = 50;
-// Longer runs have opacity resets, or time to recover from splits that change the picture: docs/training.md#short-runs.
+// Longer runs have opacity resets, or time to recover from splits that change the picture: docs/training_options.md#even-splits.
 constexpr int kLongestEvenRun = 1000;
-// Longer runs are to end as before: docs/training.md#veils.
+// Longer runs are to end as before: docs/training_options.md#veils.
 constexpr int kLongestBoundedRun = 1000;
 // Share of the steps in which the rate of the poses rises from 0: the first splats say little of the cameras.
 constexpr double kPoseWarmUp = 0.1;
@@ -45,7 +45,7 @@ constexpr size_t kMostPhotosOfRate = 400;
 constexpr int kCoarseSteps = 100, kLeastCoarseRun = 10, kLongestCoarseRun = 1000;
 constexpr double kMostCoarse = 0.4;   // of the steps
 constexpr int kMostTileRows = 16;     // px, of any device's tiles
-constexpr double kPruneShare = 0.75;  // of the steps: 0.55 gave no better images (docs/training.md)
+constexpr double kPruneShare = 0.75;  // of the steps: 0.55 gave no better images (docs/experiments/growth.md)
 
 double decayed(double first, double last, double share) {
     const double t = std::clamp(share, 0.0, 1.0);

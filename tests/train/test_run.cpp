@@ -459,7 +459,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                              {"inria", "true"},
                                              {"device", "cpu"},
                                              {"rank-timeout", "7"}};
-    std::ifstream file(EWA_SOURCE_DIR "/docs/training.md");
+    std::ifstream file(EWA_SOURCE_DIR "/docs/training_options.md");
     const std::string documents(std::istreambuf_iterator<char>(file), {});
     for (const train::RunOption& option : train::advanced_options()) {
         other[option.name] = option.get(RunOptions()).is_number_integer() ? "7"
