@@ -27,7 +27,6 @@ namespace fs = std::filesystem;
 using report::Json;
 
 constexpr int kConnectSeconds = 3;
-constexpr std::chrono::seconds kPatience(30);
 constexpr uint64_t kMostHeader = 8192;                   // bytes of an answer before its body
 constexpr uint64_t kMostText = 16u << 20;                // bytes of a body that is text
 constexpr uint64_t kMostSplats = uint64_t(1) << 33;      // bytes of a body that is splats
@@ -77,10 +76,12 @@ bool is_done(const fs::path& folder) {
 /// cpp-httplib's client on a Wire. By itself it reads a status line of any length, and crashes on a long one.
 class Client::Http final : public httplib::ClientImpl {
   public:
-    Http(const Address& address, const std::string& token, const std::atomic<bool>* stop)
+    Http(const Address& address, const std::string& token, const std::atomic<bool>* stop,
+         std::chrono::milliseconds patience)
         : ClientImpl(address.host, address.port),
           name_(address.host + ":" + std::to_string(address.port)),
-          stop_(stop) {
+          stop_(stop),
+          patience_(patience) {
         set_connection_timeout(kConnectSeconds);
         set_tcp_nodelay(true);
         set_decompress(false);
@@ -117,7 +118,7 @@ class Client::Http final : public httplib::ClientImpl {
 
   private:
     bool process_socket(const Socket& socket, std::function<bool(httplib::Stream&)> exchange) override {
-        Wire wire(socket.sock, kMostHeader, kPatience, stop_);
+        Wire wire(socket.sock, kMostHeader, patience_, stop_);
         wire_ = &wire;
         return exchange(wire);
     }
@@ -135,11 +136,13 @@ class Client::Http final : public httplib::ClientImpl {
 
     const std::string name_;
     const std::atomic<bool>* const stop_;
+    const std::chrono::milliseconds patience_;
     Wire* wire_ = nullptr;  // of the present exchange
 };
 
-Client::Client(const Address& address, const std::string& token, const std::atomic<bool>* stop)
-    : http_(std::make_unique<Http>(address, token, stop)) {}
+Client::Client(const Address& address, const std::string& token, const std::atomic<bool>* stop,
+               std::chrono::milliseconds patience)
+    : http_(std::make_unique<Http>(address, token, stop, patience)) {}
 
 Client::~Client() = default;
 
@@ -290,11 +293,13 @@ void Watcher::work() {
 }
 
 void Watcher::look() {
-    if (!client_ && what_.address) client_ = std::make_unique<Client>(*what_.address, what_.token, &stop_);
+    if (!client_ && what_.address)
+        client_ = std::make_unique<Client>(*what_.address, what_.token, &stop_, what_.patience);
     if (!client_ && !what_.folder.empty()) {
         try {
             if (const auto live = read_live_file(what_.folder)) {
-                auto client = std::make_unique<Client>(Address{"127.0.0.1", live->port}, live->token, &stop_);
+                auto client = std::make_unique<Client>(Address{"127.0.0.1", live->port}, live->token, &stop_,
+                                                       what_.patience);
                 client->status(UINT32_MAX);
                 client_ = std::move(client);
             }

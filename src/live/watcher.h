@@ -2,6 +2,7 @@
 // Follows a training run: over HTTP (server.h) while its trainer serves, else by the files that the run writes.
 #pragma once
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <filesystem>
 #include <functional>
@@ -15,6 +16,8 @@
 #include "live/status.h"
 
 namespace ewa::live {
+
+inline constexpr std::chrono::seconds kPatience(30);
 
 struct Address {
     std::string host;
@@ -36,7 +39,9 @@ class Client {
   public:
     /// Does not connect yet. token: empty for watching without commands. stop: may be null. Once it is true,
     /// every wait ends at once with an error.
-    Client(const Address& address, const std::string& token, const std::atomic<bool>* stop = nullptr);
+    /// patience: for an answer's header, then for each part of its body.
+    Client(const Address& address, const std::string& token, const std::atomic<bool>* stop = nullptr,
+           std::chrono::milliseconds patience = kPatience);
     ~Client();
 
     // Each throws InputError for a refusal, or an answer that is not a trainer's. Each throws RunError if nobody
@@ -75,6 +80,7 @@ struct WhatToWatch {
     // Files that have not changed since then are ignored.
     std::filesystem::file_time_type splats_after = std::filesystem::file_time_type::min();
     std::filesystem::file_time_type metrics_after = std::filesystem::file_time_type::min();
+    std::chrono::milliseconds patience = kPatience;  // with a trainer that does not answer
 };
 
 struct Update {

@@ -259,13 +259,13 @@ TEST(LiveServer, IdleConnectionsGiveWay) {
 TEST(LiveServer, SlowRequestsAreCut) {
     Server server("127.0.0.1", 0, "secret");
     const RawSocket slow(server.port());
-    const auto start = std::chrono::steady_clock::now();
-    for (const char c : std::string(3000, 'x'))  // each byte comes in time, all would take a minute
-        if (!slow.send(std::string(1, c)) || slow.ended())
-            break;
-        else
-            std::this_thread::sleep_for(20ms);
-    EXPECT_LT(std::chrono::steady_clock::now() - start, 20s);
+    constexpr int kBytes = 3000;  // each comes in time, all would take a minute
+    int sent = 0;
+    while (sent < kBytes && slow.send("x") && !slow.ended()) {
+        ++sent;
+        std::this_thread::sleep_for(20ms);
+    }
+    EXPECT_LT(sent, kBytes);
 }
 
 /// Readers without the token that stop reading: they take the strangers' places and one set of splats.
@@ -314,9 +314,8 @@ TEST(LiveServer, EndsWhileSomebodyReads) {
     const RawSocket waits(server->port());  // for splats of a step that does not come
     server->report(status_at(9));
     waits.send(std::string("GET /splats HTTP/1.1\r\n") + kHost + "\r\n");
-    const auto start = std::chrono::steady_clock::now();
     server.reset();
-    EXPECT_LT(std::chrono::steady_clock::now() - start, 4s);
+    EXPECT_TRUE(soon([&] { return idle.ended(); }));
     EXPECT_THROW(client.status(0), RunError);
 }
 

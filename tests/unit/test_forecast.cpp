@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <vector>
 
@@ -93,15 +92,14 @@ TEST(Forecast, OfAShorterRunUsesTheMeasuredSpeed) {
     EXPECT_LT(fast.of_steps(2000), fast.left() / 10);
 }
 
+/// If each visited every step, all together would take longer than CTest waits.
 TEST(Forecast, OfAnyNumberOfStepsIsQuick) {
     TrainOptions options;
     options.steps = 1000000000;
     options.strategy = Strategy::mcmc;
     Forecast forecast(kFox, options);
     for (int step = 1000; step <= 1100; ++step) forecast.add(step, 0.05 * step, kFox.splats);  // resumed
-    const auto begin = std::chrono::steady_clock::now();
-    EXPECT_GT(forecast.left(), 1e6);
-    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(100));
+    for (int i = 0; i < 200; ++i) EXPECT_GT(forecast.left(), 1e6);
 }
 
 TEST(Forecast, WaitsForTimedSteps) {

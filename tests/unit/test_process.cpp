@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/process.h"
 
-#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -96,15 +95,13 @@ TEST(Process, ErrorsMayBePartOfTheOutput) {
               Ended::stopped);
 }
 
-/// The program and what it has started end, although neither prints anything.
+/// The program and what it has started end, although neither prints anything and both would take a day.
 TEST(Process, StopsWhenAsked) {
     const test::TempFolder folder;
     const auto file = folder / "pid";
-    const auto start = std::chrono::steady_clock::now();
-    const Ended ended = core::run_program(shell("sleep 100 & echo $! > " + file.string() + "; wait"),
+    const Ended ended = core::run_program(shell("sleep 100000 & echo $! > " + file.string() + "; wait"),
                                           [&](std::string_view) { return test::file_bytes(file).empty(); });
     EXPECT_EQ(ended, Ended::stopped);
-    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
     const pid_t child = std::stoi(test::file_bytes(file));
     for (int i = 0; i < 1000 && kill(child, 0) == 0; ++i) usleep(10000);
     // Where nobody reaps orphans, the child stays as a zombie.

@@ -2,7 +2,7 @@
 // Zip archives from strangers: what is unpacked, and what is refused before anything is written.
 #include "io/splats/zip_files.h"
 
-#include <chrono>
+#include <ctime>
 #include <filesystem>
 #include <initializer_list>
 #include <string>
@@ -102,9 +102,9 @@ TEST(ZipFiles, ManyDeepEntriesAreCheckedInTime) {
     io::ArchiveWriter writer;
     for (int i = 0; i < 20000; ++i) writer.add(deep + std::to_string(i), "");
     folder.write("a.zip", writer.finish());
-    const auto start = std::chrono::steady_clock::now();
+    const std::clock_t begin = std::clock();
     EXPECT_EQ(io::check_zip(folder / "a.zip"), 0u);
-    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
+    EXPECT_LT(double(std::clock() - begin) / CLOCKS_PER_SEC, 20);  // of the processor
 }
 
 /// Splats of a file, as its bytes.
