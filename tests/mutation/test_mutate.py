@@ -29,6 +29,13 @@ class Judgement(unittest.TestCase):
                 mutate.judge(status, output)
 
 
+class Choice(unittest.TestCase):
+    def test_some_are_spread_over_all(self):
+        self.assertEqual(mutate.spread(list(range(10)), 3), [0, 3, 6])
+        for most in (0, 10, 11):
+            self.assertEqual(mutate.spread(list(range(10)), most), list(range(10)))
+
+
 class Runs(unittest.TestCase):
     """With a program in the place of the tests, which reads what it is to do from the folder of shaders."""
 
