@@ -17,7 +17,7 @@ std::string_view name_of(SplatFormat format);
 std::string_view readers_of(SplatFormat format);
 
 /// The format of an extension, in upper or lower case: .ply .compressed.ply .splat .ksplat .spz .glb .gltf
-/// .sog .usda .usdz .rad, or of the names meta.json and lod-meta.json. Throws InputError for any other.
+/// .sog .usda .usdz, or of the names meta.json and lod-meta.json. Throws InputError for any other.
 SplatFormat format_of_name(const std::filesystem::path& path);
 
 /// The same for a file to write. Throws InputError also for .ksplat, which ewa only reads.
@@ -28,7 +28,7 @@ SplatFormat format_to_write(const std::filesystem::path& path);
 SplatFormat format_of_file(const std::filesystem::path& path);
 
 /// Reads any of the formats. The peak memory is at most twice the larger of the file and the scene. A file is
-/// refused if it claims more than 4 times its size and 40 MiB; for SPZ, SOG and .rad, which are compressed, 32 times. Values
+/// refused if it claims more than 4 times its size and 40 MiB; for SPZ and SOG, which are compressed, 32 times. Values
 /// may be infinite or NaN if the format can store that. Throws InputError that names the file and the byte or
 /// property.
 SplatScene read_splats(const std::filesystem::path& path);

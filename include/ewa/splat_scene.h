@@ -24,7 +24,6 @@ enum class SplatFormat {
     sog_levels,
     usda,
     usdz,
-    rad,
     ksplat
 };
 
@@ -43,7 +42,7 @@ struct SaveOptions {
     bool antialiased = false;
     int spz_version = 3;    // of an .spz: 2, 3 or 4
     bool gltf_spz = false;  // a glTF holds an SPZ of version 2, by KHR_gaussian_splatting_compression_spz_2
-    int levels = 0;  // of a lod-meta.json; 0: until one has a million splats. A .rad has a tree from 2 on
+    int levels = 0;         // of a lod-meta.json; 0: until one has a million splats
     std::function<void(uint64_t, uint64_t)> progress = {};  // splats written, all splats
 };
 

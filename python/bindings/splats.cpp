@@ -294,7 +294,7 @@ void bind_splats(nb::module_& module) {
             "= False, geo: str | collections.abc.Sequence[float] | None = None, cameras: " EWA_DATASET_TYPE
             " | None = None) -> list[str]"),
         "Writes splats in the format of the extension, a page that shows them (.html), or 3D Tiles "
-        "(tileset.json). The options of ewa convert: levels of a lod-meta.json, .rad, tileset.json or "
+        "(tileset.json). The options of ewa convert: levels of a lod-meta.json, tileset.json or "
         "unbundled "
         "page; title and unbundled of a page; geo of a tileset.json. cameras: a dataset whose cameras become "
         "the views of a page. A file is replaced as a whole, and missing folders "

@@ -204,7 +204,7 @@ void add_splats(CLI::App& app, fs::path& splats) {
     app.add_option("SPLATS", splats,
                    "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json lod-meta.json .glb "
                    ".gltf .usda "
-                   ".usdz .rad), or folder of a "
+                   ".usdz), or folder of a "
                    "training run")
         ->required()
         ->type_name("");

@@ -243,7 +243,7 @@ bool clean_scene(const ConvertArguments& arguments, Work& work, bool in_place) {
 int run(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
     const ConvertOutput output = report::output_of(out, arguments.output_options);
-    if (arguments.check) check_readable(output, arguments.output_options);
+    if (arguments.check) check_readable(output);
     // Report wrong use before the inputs are read: they may be large.
     scene::Edits edits = arguments.edits;
     edits.transform = scene::parse_transform(arguments.transform);
@@ -329,16 +329,15 @@ void add_editing_options(CLI::App& app, ConvertArguments& arguments) {
 
 Action add_convert(CLI::App& app) {
     const auto arguments = std::make_shared<ConvertArguments>();
-    app.add_option(
-           "FILES", arguments->files,
-           "One or more inputs, which are joined, then the output unless -o names it. Formats: .ply "
-           ".compressed.ply .splat .spz .sog meta.json lod-meta.json .glb .gltf .usda .usdz .rad, inputs "
-           "also .ksplat, "
-           "and an output "
-           "also .html, a page that shows the scene in a browser, and tileset.json, 3D Tiles. An "
-           "input may be the folder of a "
-           "training run. IN:STEP, as in b.ply:move=1,0,0, moves one input alone; more steps follow "
-           "after more colons")
+    app.add_option("FILES", arguments->files,
+                   "One or more inputs, which are joined, then the output unless -o names it. Formats: .ply "
+                   ".compressed.ply .splat .spz .sog meta.json lod-meta.json .glb .gltf .usda .usdz, inputs "
+                   "also .ksplat, "
+                   "and an output "
+                   "also .html, a page that shows the scene in a browser, and tileset.json, 3D Tiles. An "
+                   "input may be the folder of a "
+                   "training run. IN:STEP, as in b.ply:move=1,0,0, moves one input alone; more steps follow "
+                   "after more colons")
         ->required()
         ->expected(1, -1)
         ->type_name("IN... OUT");

@@ -22,7 +22,6 @@ std::vector<fs::path> values_of(const fs::path& path) {
     const std::string name = core::lower(path.filename().string());
     if (name.ends_with(".gltf")) return io::gltf_values(path);
     if (name == "lod-meta.json") return io::level_files(path);
-    if (name.ends_with(".rad")) return io::rad_files(path);
     if (names_tileset(path)) return io::tile_files(path);
     return name == "meta.json" ? io::sog_images(path) : std::vector<fs::path>();
 }

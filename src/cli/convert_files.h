@@ -8,7 +8,7 @@
 
 namespace ewa::cli {
 
-/// The files that hold the values of an existing .gltf, .rad, meta.json, lod-meta.json or tileset.json; empty for other formats.
+/// The files that hold the values of an existing .gltf, meta.json, lod-meta.json or tileset.json; empty for other formats.
 std::vector<std::filesystem::path> values_of(const std::filesystem::path& path);
 
 /// The files that a written output consists of besides itself. unbundled: it is a page with its scene beside it.

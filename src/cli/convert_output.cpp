@@ -18,9 +18,9 @@ void add_output_options(CLI::App& app, OutputOptions& options) {
     app.add_flag("--gltf-spz", options.gltf_spz,
                  "Pack the splats of a .glb or .gltf as SPZ (KHR_gaussian_splatting_compression_spz_2)");
     app.add_option("--levels", options.levels,
-                   "Levels of a lod-meta.json, .rad, tileset.json or --unbundled page, each with half of the "
+                   "Levels of a lod-meta.json, tileset.json or --unbundled page, each with half of the "
                    "splats of the one before; fewer where a tile would have less than 1,000 [until one "
-                   "has at most a million, or a tile 100,000; none in a .rad]")
+                   "has at most a million, or a tile 100,000]")
         ->transform(in_range(1, 32))
         ->type_name("N");
     app.add_flag(
@@ -36,15 +36,13 @@ void add_output_options(CLI::App& app, OutputOptions& options) {
         ->type_name("LAT,LON,HEIGHT[,HEADING]|ecef");
 }
 
-void check_readable(const ConvertOutput& output, const OutputOptions& options) {
+void check_readable(const ConvertOutput& output) {
     if (output.page) throw InputError("--check: ewa does not read a page; check a .sog, which it holds");
     if (output.tiles)
         throw InputError("--check: ewa reads no tileset; check a .glb with --gltf-spz, which its tiles are");
     if (output.format == SplatFormat::sog_levels)
         throw InputError(
             "--check: its splats are in another order; check a .sog, which level 0 holds in chunks");
-    if (output.format == SplatFormat::rad && options.levels > 1)
-        throw InputError("--check: the splats of a tree are in another order; check a .rad without --levels");
 }
 
 report::PageCameras page_cameras(const std::optional<live::Run>& run, std::vector<std::string>& remarks) {

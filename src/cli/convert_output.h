@@ -23,7 +23,7 @@ using ConvertOutput = report::SceneOutput;
 void add_output_options(CLI::App& app, OutputOptions& options);
 
 /// Throws InputError where the output cannot be read back.
-void check_readable(const ConvertOutput& output, const OutputOptions& options);
+void check_readable(const ConvertOutput& output);
 
 /// What the page of a run shows: its dataset's cameras, and its background. run: empty: none. Adds a remark where they cannot be read.
 report::PageCameras page_cameras(const std::optional<live::Run>& run, std::vector<std::string>& remarks);

@@ -464,7 +464,7 @@ Action add_info(CLI::App& app) {
     app.add_option("PATH", arguments->path,
                    "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json lod-meta.json .glb "
                    ".gltf .usda "
-                   ".usdz .rad), COLMAP folder, "
+                   ".usdz), COLMAP folder, "
                    "transforms.json, cameras of another program, zip archive of one of these, "
                    "glTF file of meshes, image, folder of photos, video, or folder of a training run")
         ->required();

@@ -129,14 +129,13 @@ std::vector<std::string> write_tiles(const SceneOutput& output, Gaussians gaussi
 
 void check_options(const SceneOutput& output, const OutputOptions& options) {
     const SplatFormat format = output.format;
-    const bool levels =
-        format == SplatFormat::sog_levels || format == SplatFormat::rad || output.tiles || options.unbundled;
+    const bool levels = format == SplatFormat::sog_levels || output.tiles || options.unbundled;
     if (!options.geo.empty() && !output.tiles) throw InputError("--geo: only a tileset.json is on a globe");
     if (!options.title.empty() && !output.page) throw InputError("--title: only a page has one");
     if (options.unbundled && !output.page) throw InputError("--unbundled: only a page has its scene inside");
     if (options.levels > 0 && !levels)
         throw InputError(
-            "--levels: only a lod-meta.json, a .rad, a tileset.json and an --unbundled page have levels");
+            "--levels: only a lod-meta.json, a tileset.json and an --unbundled page have levels");
     if (options.spz_version > 0 && (output.tiles || options.gltf_spz))
         throw InputError("--spz-version: a glTF and tiles hold SPZ 2; only an .spz has a version to choose");
     if (options.spz_version > 0 && format != SplatFormat::spz)

@@ -191,7 +191,8 @@ Shape shape_at(const Gaussians& g, size_t i, const Measured& values) {
 /// One round: finds pairs among near splats, and merges the cheapest of them.
 class Round {
   public:
-    Round(Gaussians& gaussians, const scene::MergeTrace& trace) : g_(gaussians), trace_(trace) {}
+    /// errors: see decimate_traced; null where nobody asks.
+    Round(Gaussians& gaussians, std::vector<float>* errors) : g_(gaussians), errors_(errors) {}
 
     void run(size_t target) {
         measure();
@@ -272,8 +273,6 @@ class Round {
     void merge_cheapest(size_t least) {
         std::sort(pairs_.begin(), pairs_.end());
         std::vector<uint8_t> state(g_.size(), 0);  // 1: merged, 2: gone
-        std::vector<uint32_t> into(trace_.into ? g_.size() : 0);
-        std::iota(into.begin(), into.end(), 0u);
         size_t left = g_.size();
         for (const Pair& pair : pairs_) {
             if (left == least) break;
@@ -281,7 +280,6 @@ class Round {
             merge_into(pair.i, pair.j);
             state[pair.i] = 1;
             state[pair.j] = 2;
-            if (trace_.into) into[pair.j] = pair.i;
             --left;
         }
         pairs_ = {};
@@ -291,24 +289,15 @@ class Round {
         for (size_t i = 0; i < state.size(); ++i)
             if (state[i] != 2) kept.push_back(uint32_t(i));
         keep_splats(g_, kept);
-        if (trace_.into) follow(into, kept);
-        if (!trace_.errors) return;
-        for (size_t k = 0; k < kept.size(); ++k) (*trace_.errors)[k] = (*trace_.errors)[kept[k]];
-        trace_.errors->resize(kept.size());
-    }
-
-    /// into: of each splat, the one that has it. kept: those that are left.
-    void follow(const std::vector<uint32_t>& into, const std::vector<uint32_t>& kept) {
-        std::vector<uint32_t> place(into.size());
-        for (size_t k = 0; k < kept.size(); ++k) place[kept[k]] = uint32_t(k);
-        for (uint32_t& now : *trace_.into) now = place[into[now]];
+        if (!errors_) return;
+        for (size_t k = 0; k < kept.size(); ++k) (*errors_)[k] = (*errors_)[kept[k]];
+        errors_->resize(kept.size());
     }
 
     void merge_into(size_t i, size_t j) {
         const Shape a = shape_of(i), b = shape_of(j);
-        if (trace_.errors)
-            (*trace_.errors)[i] +=
-                (*trace_.errors)[j] + float(change_of(a, b, color_distance(g_, i, j)).squared);
+        if (errors_)
+            (*errors_)[i] += (*errors_)[j] + float(change_of(a, b, color_distance(g_, i, j)).squared);
         const Merged merged = merge(a, b, overlap(a, b));
         const auto& c = merged.shape.covariance;
         for (size_t k = 0; k < 3; ++k) g_.means[3 * i + k] = float(merged.shape.mean[int(k)]);
@@ -322,7 +311,7 @@ class Round {
     }
 
     Gaussians& g_;
-    const scene::MergeTrace& trace_;
+    std::vector<float>* errors_;
     std::vector<Measured> measured_;
     std::vector<Pair> pairs_;  // kBestOfThem of each splat
 };
@@ -346,12 +335,12 @@ void reorder(std::vector<float>& values, size_t stride, const std::vector<uint32
 }
 
 /// The splats must be drawable, with opacities of 3DGS's kernel.
-void merge_rounds(Gaussians& gaussians, size_t target, const scene::MergeTrace& trace,
+void merge_rounds(Gaussians& gaussians, size_t target, std::vector<float>* errors,
                   const std::function<void(size_t)>& progress) {
     target = std::max(target, size_t(1));
     while (gaussians.size() > target) {
         const size_t before = gaussians.size();
-        Round(gaussians, trace).run(target);
+        Round(gaussians, errors).run(target);
         if (gaussians.size() == before)
             throw RunError("no two of " + std::to_string(before) + " splats can be merged to have " +
                            std::to_string(target));
@@ -372,7 +361,7 @@ void decimate_splats(Gaussians& gaussians, size_t target, const std::function<vo
     const bool density = gaussians.density;
     fit_opacities(gaussians, false);
     scene::put_neighbors_together(gaussians);
-    merge_rounds(gaussians, target, {}, progress);
+    merge_rounds(gaussians, target, nullptr, progress);
     fit_opacities(gaussians, density);
 }
 
@@ -389,13 +378,9 @@ double squared_light(const Gaussians& gaussians, size_t i) {
     return shape.opacity * shape.opacity * shape.square();
 }
 
-void decimate_traced(Gaussians& gaussians, size_t target, const MergeTrace& trace) {
-    if (trace.into) {
-        trace.into->resize(gaussians.size());
-        std::iota(trace.into->begin(), trace.into->end(), 0u);
-    }
-    if (trace.errors) trace.errors->resize(gaussians.size());
-    merge_rounds(gaussians, target, trace, {});
+void decimate_traced(Gaussians& gaussians, size_t target, std::vector<float>& errors) {
+    errors.resize(gaussians.size());
+    merge_rounds(gaussians, target, &errors, {});
 }
 
 }  // namespace scene

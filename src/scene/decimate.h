@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Merging of splats as decimate_splats does it, with a record of what became of each splat.
+// Merging of splats as decimate_splats does it, with the errors of the merges.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -9,15 +9,6 @@
 #include "ewa/gaussians.h"
 
 namespace ewa::scene {
-
-/// What became of the splats; null where nobody asks.
-struct MergeTrace {
-    /// Gets, of each splat before, the index of the splat that has it now.
-    std::vector<uint32_t>* into = nullptr;
-    /// For each splat that is left, the squared errors of the merges in it, in the units of squared_light. Those of earlier calls are added
-    /// to; empty before the first one.
-    std::vector<float>* errors = nullptr;
-};
 
 /// Reorders the splats by morton_order in place, without memory for a copy. Merging millions of splats in random order takes 1.5 times
 /// as long, as neighbours are far apart in memory.
@@ -29,7 +20,8 @@ double squared_light(const Gaussians& gaussians, size_t i);
 
 /// decimate_splats of splats that are drawable and have opacities of 3DGS's kernel. Those that are left keep their order. The error of
 /// a merge is the squared difference of the merged splat to both splats in these views: of their colours, and in part of their
-/// opacities.
-void decimate_traced(Gaussians& gaussians, size_t target, const MergeTrace& trace);
+/// opacities. errors: gets, for each splat that is left, the sum of the errors of the merges in it, in the units of squared_light.
+/// Those of earlier calls are added to; empty before the first one.
+void decimate_traced(Gaussians& gaussians, size_t target, std::vector<float>& errors);
 
 }  // namespace ewa::scene

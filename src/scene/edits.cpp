@@ -164,7 +164,7 @@ std::vector<std::string> apply_edits(Gaussians& gaussians, const Edits& edits, S
     }
     // The order in which these formats are written: --check compares splat by splat.
     const bool ordered = format == SplatFormat::compressed_ply || format == SplatFormat::sog ||
-                         format == SplatFormat::sog_meta || format == SplatFormat::rad;
+                         format == SplatFormat::sog_meta;
     if (edits.morton || ordered) select_splats(gaussians, morton_order(gaussians));
     return remarks;
 }

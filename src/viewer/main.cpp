@@ -259,7 +259,7 @@ void add_options(CLI::App& app, Arguments& arguments) {
     };
     option("PATH", arguments.path, "",
            "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json lod-meta.json .glb .gltf "
-           ".usda .usdz .rad), "
+           ".usda .usdz), "
            "dataset, folder of "
            "a training run, folder of photos, or video. Without it, the window waits for a file");
     CLI::Option* train = app.add_flag("--train", arguments.train,

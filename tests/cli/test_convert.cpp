@@ -17,8 +17,8 @@ using ewa::Gaussians;
 namespace fs = std::filesystem;
 using Names = std::vector<std::string>;
 
-const Names kFiles = {"a.ply", "a.compressed.ply", "a.splat", "a.spz",  "a.glb", "a.gltf",
-                      "a.sog", "meta.json",        "a.usda",  "a.usdz", "a.rad"};
+const Names kFiles = {"a.ply", "a.compressed.ply", "a.splat", "a.spz", "a.glb", "a.gltf",
+                      "a.sog", "meta.json",        "a.usda",  "a.usdz"};
 
 TEST(Convert, FromEachFormatToEach) {
     const Folder folder;
@@ -324,7 +324,7 @@ TEST(Convert, SaysWhatToWriteInstead) {
         const Outcome outcome = run_ewa({"convert", folder / "s.ply", folder / name});
         expect_failure(outcome, 2,
                        ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, lod-meta.json, .glb, "
-                       ".gltf, .usda, .usdz, .rad, tileset.json, .html (a page)");
+                       ".gltf, .usda, .usdz, tileset.json, .html (a page)");
     }
     EXPECT_EQ(files_below(folder / ""), Names{"s.ply"});
 }
@@ -347,7 +347,7 @@ TEST(Convert, WritesAPage) {
     expect_failure(run_ewa({"convert", folder / "s.ply", folder / "c.spz", "--title", "x"}), 2,
                    "--title: only a page has one");
     expect_failure(run_ewa({"convert", folder / "s.ply", folder / "c.obj"}), 2,
-                   ".rad, tileset.json, .html (a page); ewa mesh makes meshes: ewa mesh IN -o c.obj");
+                   "tileset.json, .html (a page); ewa mesh makes meshes: ewa mesh IN -o c.obj");
     expect_failure(run_ewa({"convert", folder / "s.ply", folder / "c.html", "--check"}), 2, "check a .sog");
     expect_failure(run_ewa({"convert", folder / "a <b>.html", folder / "d.ply"}), 2, "not a supported kind");
     EXPECT_EQ(files_below(folder / ""), (Names{"a <b>.html", "j.json", "s.ply"}));

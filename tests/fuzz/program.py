@@ -15,7 +15,7 @@ SEEDS = ROOT / "tests" / "fuzz" / "seeds"
 SECONDS = 120  # on a busy machine, under the sanitizers
 WORDS = [0, 0xFFFFFFFF, 0x7FFFFFFF, 0x80000000, 0x10000, 1]
 NUMBERS = [b"0", b"-1", b"4294967296", b"99999999", b"1e999", b"nan", b"-0.5", b"18446744073709551616"]
-FORMATS = ["ply", "compressed.ply", "splat", "spz", "glb", "gltf", "sog", "usda", "usdz", "rad"]
+FORMATS = ["ply", "compressed.ply", "splat", "spz", "glb", "gltf", "sog", "usda", "usdz"]
 
 
 def damaged(dice, data, other):
@@ -108,45 +108,17 @@ def restructured(dice, data, other):
 
 
 def with_json(dice, data, other):
-    """The JSON of a .glb or .rad, restructured, in a container that fits again."""
-    begin = 20 if data[:4] == b"glTF" else 8
-    length = struct.unpack_from("<I", data, begin - 8 if begin == 20 else 4)[0]
-    text = restructured(dice, data[begin : begin + length], other)
-    if begin == 20:
-        text += b" " * (-len(text) % 4)
-        out = data[:12] + struct.pack("<I", len(text)) + data[16:20] + text + data[begin + length :]
-        return out[:8] + struct.pack("<I", len(out)) + out[12:]
-    return data[:4] + struct.pack("<I", len(text)) + text + bytes(-len(text) % 8) + data[8 + length + -length % 8 :]
-
-
-def damaged_rad(dice, data, other):
-    """A .rad of one chunk, with one of its properties damaged before it is packed."""
-    def part(at):
-        length = struct.unpack_from("<I", data, at + 4)[0]
-        return json.loads(data[at + 8 : at + 8 + length]), at + 8 + length + -length % 8
-
-    def packed_head(magic, value):
-        text = json.dumps(value).encode()
-        return magic + struct.pack("<I", len(text)) + text + bytes(-len(text) % 8)
-
-    head, begin = part(0)
-    chunk, at = part(begin)
-    chosen, payload = dice.randrange(len(chunk["properties"])), b""
-    for i, its in enumerate(chunk["properties"]):
-        body = data[at + 8 + its["offset"] :][: its["bytes"]]
-        if i == chosen:
-            body = damaged(dice, zlib.decompress(body, -15), other)
-            packer = zlib.compressobj(1, zlib.DEFLATED, -15)
-            body = packer.compress(body) + packer.flush()
-        its["offset"], its["bytes"] = len(payload), len(body)
-        payload += body + bytes(-len(body) % 8)
-    chunk["payloadBytes"] = len(payload)
-    return packed_head(b"RAD0", head) + packed_head(b"RADC", chunk) + struct.pack("<Q", len(payload)) + payload
+    """The JSON of a .glb, restructured, in a container that fits again."""
+    length = struct.unpack_from("<I", data, 12)[0]
+    text = restructured(dice, data[20 : 20 + length], other)
+    text += b" " * (-len(text) % 4)
+    out = data[:12] + struct.pack("<I", len(text)) + data[16:20] + text + data[20 + length :]
+    return out[:8] + struct.pack("<I", len(out)) + out[12:]
 
 
 def restructured_inside(dice, data, other):
     """The same in the text of a container."""
-    if data[:4] in (b"glTF", b"RAD0"):
+    if data[:4] == b"glTF":
         return with_json(dice, data, other)
     return damaged_inside(dice, data, other, restructured) if data[:2] == b"PK" else restructured(dice, data, other)
 
@@ -155,8 +127,6 @@ def damaged_inside(dice, data, other, damaged=damaged):  # noqa: F811
     """The same below a compression or a checksum, which would notice any other damage."""
     if data[:2] == b"\x1f\x8b":
         return gzip.compress(damaged(dice, gzip.decompress(data), other), 1)
-    if data[:4] == b"RAD0":
-        return damaged_rad(dice, data, other)
     if data[:2] == b"PK":
         entries = [(i.filename, zipfile.ZipFile(io.BytesIO(data)).read(i)) for i in zipfile.ZipFile(io.BytesIO(data)).infolist()]
         chosen, packed = dice.randrange(len(entries)), io.BytesIO()
@@ -260,19 +230,19 @@ def make_cases(ewa, folder, renders):
     to_any = [f"convert {{}} {{out}}.{kind} --quiet" for kind in FORMATS] + ["convert {} {good} -o {out}.ply --sort morton"]
     to_any += ["convert {} {out}.ply --decimate 50% --quiet", "convert {} {out}.ply --decimate 1 --quiet",
                "convert {} {out}/lod-meta.json --levels 2 --quiet", "convert {} {out}/tileset.json --levels 2 --quiet",
-               "convert {} {out}.rad --levels 3 --quiet", "convert {} {out}.ply --remove-floaters --quiet"]
+               "convert {} {out}.ply --remove-floaters --quiet"]
     if renders:
         to_any.append("render {} -o {out}.png --size 24x16 --quiet")
     cases, base = [], folder / "base.ply"
     base.write_bytes(ply(40))
     splats = [base]
-    for name in FORMATS[1:] + ["sog/meta.json", "v4.spz", "tree.rad"]:
+    for name in FORMATS[1:] + ["sog/meta.json", "v4.spz"]:
         splats.append(folder / name if "/" in name else folder / f"base.{name}")
-        extra = {"v4.spz": ["--spz-version", "4"], "tree.rad": ["--levels", "3"]}.get(name, [])
+        extra = ["--spz-version", "4"] if name == "v4.spz" else []
         subprocess.run([ewa, "convert", base, splats[-1], "--quiet", *extra], check=True)
     splats += [*sorted(SEEDS.glob("read_ksplat/*")), *sorted(SEEDS.glob("read_sog/*"))]
     for file in splats:
-        name = "SOG, unpacked" if file.name == "meta.json" else file.name.split(".", 1)[1].replace("v4.", "").replace("tree.", "")
+        name = "SOG, unpacked" if file.name == "meta.json" else file.name.split(".", 1)[1].replace("v4.", "")
         if file.name == "meta.json":
             cases.append(Case(name, file.parent, [c.replace("{}", "{}/meta.json") for c in read + to_any],
                               [f.name for f in file.parent.iterdir()]))

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Changes of structure: what another program, or a hand that knows the format, makes of a file. They work on any text with brackets
-// or tags: JSON, USD, XML, the head of a PLY. In a .glb, a .rad and a zip archive they change the text inside, and the container fits again.
+// or tags: JSON, USD, XML, the head of a PLY. In a .glb and a zip archive they change the text inside, and the container fits again.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -52,17 +52,13 @@ class Structure {
         return {reinterpret_cast<const char*>(&value), sizeof(value)};
     }
 
-    /// The JSON chunks of a .glb or .rad: where each begins, and its size with the padding.
-    static std::vector<std::pair<size_t, size_t>> heads_of(const std::string& bytes) {
-        std::vector<std::pair<size_t, size_t>> heads;
-        if (bytes.starts_with("glTF") && word(bytes, 12) + 20ull <= bytes.size())
-            heads.emplace_back(20, word(bytes, 12));
-        for (size_t at = bytes.starts_with("RAD0") ? 0 : std::string::npos; at != std::string::npos;
-             at = bytes.find("RADC", at + 8)) {
-            const uint64_t size = (word(bytes, at + 4) + 7ull) / 8 * 8;
-            if (at + 8 + size <= bytes.size()) heads.emplace_back(at + 8, size);
-        }
-        return heads;
+    static constexpr size_t kGlbJson = 20;  // byte at which the JSON of a .glb begins
+
+    /// The size of the JSON of a .glb with its padding.
+    static std::optional<size_t> glb_json(const std::string& bytes) {
+        if (bytes.starts_with("glTF") && word(bytes, 12) + uint64_t(kGlbJson) <= bytes.size())
+            return word(bytes, 12);
+        return std::nullopt;
     }
 
     static std::vector<std::pair<std::string, std::string>> entries_of(const std::string& bytes) {
@@ -78,8 +74,7 @@ class Structure {
     }
 
     static std::string text_of(const std::string& bytes) {
-        const auto heads = heads_of(bytes);
-        if (!heads.empty()) return bytes.substr(heads[0].first, heads[0].second);
+        if (const auto size = glb_json(bytes)) return bytes.substr(kGlbJson, *size);
         for (const auto& [name, content] : entries_of(bytes))
             if (is_text(content)) return content;
         return bytes;
@@ -93,19 +88,12 @@ class Structure {
     }
 
     std::string changed(const std::string& bytes, const std::string& other) {
-        if (const auto heads = heads_of(bytes); !heads.empty()) {
-            const auto [begin, size] = heads[below(heads.size())];
-            std::string text = changed_text(bytes.substr(begin, size), other);
-            const bool glb = begin == 20;
-            const auto length = uint32_t(text.size());
-            text.resize((text.size() + (glb ? 3 : 7)) / (glb ? 4 : 8) * (glb ? 4 : 8), glb ? ' ' : '\0');
-            std::string out = bytes.substr(0, begin) + text + bytes.substr(begin + size);
-            if (glb) {
-                out.replace(12, 4, word_of(uint32_t(text.size())));
-                out.replace(8, 4, word_of(uint32_t(out.size())));
-            } else {
-                out.replace(begin - 4, 4, word_of(length));
-            }
+        if (const auto size = glb_json(bytes)) {
+            std::string text = changed_text(bytes.substr(kGlbJson, *size), other);
+            text.resize((text.size() + 3) / 4 * 4, ' ');
+            std::string out = bytes.substr(0, kGlbJson) + text + bytes.substr(kGlbJson + *size);
+            out.replace(12, 4, word_of(uint32_t(text.size())));
+            out.replace(8, 4, word_of(uint32_t(out.size())));
             return out;
         }
         if (auto entries = entries_of(bytes); !entries.empty()) {

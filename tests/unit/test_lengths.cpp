@@ -61,7 +61,7 @@ TEST(Lengths, OfSplatsAreChecked) {
          }},
         {"save_levels", [&](const Gaussians& g) { save_levels(folder / "lod-meta.json", g, {}); }}};
     for (const char* name : {"a.ply", "a.compressed.ply", "a.splat", "a.spz", "a.sog", "meta.json",
-                             "lod-meta.json", "a.glb", "a.gltf", "a.usda", "a.usdz", "a.rad"}) {
+                             "lod-meta.json", "a.glb", "a.gltf", "a.usda", "a.usdz"}) {
         calls.emplace_back(
             name, [&folder, name](const Gaussians& g) { save_splats(folder / name, g, SaveOptions{}); });
         calls.emplace_back(name, [&folder, name](const Gaussians& g) { save_splats(folder / name, g); });

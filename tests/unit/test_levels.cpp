@@ -130,8 +130,8 @@ TEST(Levels, ErrorsOfLeaves) {
     // The errors are those of all merges.
     std::vector<float> errors;
     Gaussians left = scene;
-    scene::decimate_traced(left, 10'000, {.errors = &errors});
-    scene::decimate_traced(left, 5'000, {.errors = &errors});
+    scene::decimate_traced(left, 10'000, errors);
+    scene::decimate_traced(left, 5'000, errors);
     double expected = 0;
     for (const float error : errors) expected += error;
     EXPECT_NEAR(sum, expected, 0.02 * expected);

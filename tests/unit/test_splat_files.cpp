@@ -68,12 +68,6 @@ const SplatFileCase kSplatFileCases[] = {
      3,
      {6 * 0.5001 * 3.6 / 65535, 0.0083, 9.0 / 256, 1.001 / 510, 3.0 / 256, 1.8 / 256},
      true,
-     true},
-    // Half a step of an octahedron's map, where it is widest, and of the half angle.
-    {"a.rad",
-     3,
-     {0, 0.0145, 0.5001 * 9 / 254, 1.001 / 510, 1.001 / 510 / 0.282, 0.5001 * 0.9 / 127},
-     true,
      true}};
 
 TEST(SplatFormats, RoundTripWithinTheQuantum) {
@@ -119,7 +113,7 @@ TEST(SplatFormats, SaysWhatIsLost) {
         std::string::npos);
     EXPECT_NE(all("a.splat", g, {.comments = {"x"}}).find("comments are dropped"), std::string::npos);
     EXPECT_NE(all("a.glb", g, {.antialiased = true}).find("anti-aliased is dropped"), std::string::npos);
-    for (const char* name : {"a.spz", "a.compressed.ply", "a.sog", "meta.json", "a.rad"}) {
+    for (const char* name : {"a.spz", "a.compressed.ply", "a.sog", "meta.json"}) {
         EXPECT_EQ(all(name, g, {.antialiased = true}).find("anti-aliased"), std::string::npos) << name;
         EXPECT_TRUE(read_splats(folder / name).antialiased) << name;
     }
@@ -131,7 +125,7 @@ TEST(SplatFormats, SaysWhatIsLost) {
               std::string::npos);
     g.means[0] = NAN;
     g.quaternions[7] = g.quaternions[6] = g.quaternions[5] = g.quaternions[4] = 0;
-    for (const char* name : {"a.splat", "a.spz", "a.glb", "a.gltf", "a.compressed.ply", "a.sog", "a.rad"}) {
+    for (const char* name : {"a.splat", "a.spz", "a.glb", "a.gltf", "a.compressed.ply", "a.sog"}) {
         EXPECT_NE(all(name, g, {}).find("2 splats have a value that is not finite"), std::string::npos)
             << name;
         EXPECT_EQ(load_splats(folder / name).size(), 8u) << name;
@@ -147,8 +141,7 @@ TEST(SplatFormats, AbsentDegreesStayAbsent) {
     const size_t stride = g.sh_stride();
     for (size_t i = 0; i < g.size(); ++i) std::fill_n(&g.sh[stride * i + 12], stride - 12, 0.0f);
     ASSERT_EQ(sh_degree_present(g), 1);
-    for (const char* name :
-         {"a.ply", "a.compressed.ply", "a.spz", "a.glb", "a.gltf", "a.sog", "meta.json", "a.rad"}) {
+    for (const char* name : {"a.ply", "a.compressed.ply", "a.spz", "a.glb", "a.gltf", "a.sog", "meta.json"}) {
         save_splats(folder / name, g);
         const Gaussians back = load_splats(folder / name);
         EXPECT_EQ(sh_degree_present(back), 1) << name;
@@ -160,7 +153,7 @@ TEST(SplatFormats, NoSplats) {
     TempFolder folder;
     Gaussians none;
     none.sh_degree = 1;
-    for (const char* name : {"a.ply", "a.splat", "a.spz", "a.compressed.ply", "a.sog", "a.rad"}) {
+    for (const char* name : {"a.ply", "a.splat", "a.spz", "a.compressed.ply", "a.sog"}) {
         save_splats(folder / name, none);
         EXPECT_EQ(load_splats(folder / name).size(), 0u) << name;
     }
@@ -172,7 +165,7 @@ TEST(SplatFormats, NoSplats) {
 TEST(SplatFormats, FoundByTheirFirstBytes) {
     TempFolder folder;
     const Gaussians g = storable_splats(1, 40, 1);
-    for (const char* name : {"a.ply", "a.compressed.ply", "a.spz", "a.glb", "a.sog", "a.rad"}) {
+    for (const char* name : {"a.ply", "a.compressed.ply", "a.spz", "a.glb", "a.sog"}) {
         save_splats(folder / name, g);
         for (const char* other : {"b", "b.ply", "b.spz", "b.gltf", "b.data"}) {
             std::filesystem::copy_file(folder / name, folder / other,
@@ -543,8 +536,8 @@ TEST(SplatFormats, UnusualValuesMeanWhatTheyMean) {
     const TempFolder folder;
     const Gaussians g = unusual_splats();
     for (size_t i = 0; i < 5; ++i) EXPECT_TRUE(drawable(g, i)) << i;
-    for (const char* name : {"a.ply", "a.splat", "a.spz", "a.compressed.ply", "a.sog", "meta.json", "a.rad",
-                             "a.glb", "a.gltf", "a.usda", "a.usdz"}) {
+    for (const char* name : {"a.ply", "a.splat", "a.spz", "a.compressed.ply", "a.sog", "meta.json", "a.glb",
+                             "a.gltf", "a.usda", "a.usdz"}) {
         SCOPED_TRACE(name);
         save_splats(folder / name, g);
         const Gaussians back = load_splats(folder / name);
@@ -552,7 +545,7 @@ TEST(SplatFormats, UnusualValuesMeanWhatTheyMean) {
         std::vector<uint32_t> order(g.size());
         for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
         const std::string text = name;
-        if (text.find("compressed") != text.npos || text == "a.sog" || text == "meta.json" || text == "a.rad")
+        if (text.find("compressed") != text.npos || text == "a.sog" || text == "meta.json")
             order = morton_order(g);
         double farthest = 0;
         for (size_t at = 0; at < order.size(); ++at) {

@@ -145,18 +145,6 @@ std::vector<std::string> write_levels(const std::filesystem::path& path, Gaussia
 /// The files that an existing lod-meta.json names, with the images that those name. Empty if it cannot be read.
 std::vector<std::filesystem::path> level_files(const std::filesystem::path& path);
 
-/// Spark's .rad. read_rad takes the splats without children of a tree of levels. Chunks in files of their own must be in or below the
-/// file's folder.
-SplatScene read_rad(const std::filesystem::path& path);
-
-/// The files besides itself that an existing .rad has chunks in. Empty if it cannot be read.
-std::vector<std::filesystem::path> rad_files(const std::filesystem::path& path);
-
-/// Writes the splats in Morton order; with options.levels above 1 a tree over them, which takes memory for three copies of the
-/// scene. Positions are kept exactly. The same scene gives the same bytes.
-std::vector<std::string> write_rad(const std::filesystem::path& path, const Gaussians& gaussians,
-                                   const SaveOptions& options);
-
 /// OpenUSD's ParticleField3DGaussianSplat, as text and as a package of it. Reads every prim of that type that is defined in
 /// the layer, in the order of the text, into one scene, placed by the transforms of its parents. Refuses the binary format.
 /// What other layers, references and variants would add is skipped with a remark. Errors name the line.

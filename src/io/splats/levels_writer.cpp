@@ -72,7 +72,7 @@ class LevelsWriter {
         nodes_ = build_tree(g, {.most = kMostOfALeaf, .longest = kLongestLeaf, .few = kFew});
         rows_.resize(nodes_.size());
         for (size_t level = 0; level < sizes_.size(); ++level) {
-            if (level > 0) scene::decimate_traced(g, sizes_[level], {.errors = &errors_});
+            if (level > 0) scene::decimate_traced(g, sizes_[level], errors_);
             write_level(g, level);
         }
         folders_.replace(meta().dump() + "\n");

@@ -83,7 +83,6 @@ constexpr Kind kKinds[] = {
      "PlayCanvas, SuperSplat's viewer"},
     {SplatFormat::usda, ".usda", "USD", {"#usd", "PXR-"}, io::read_usda, io::write_usda, kOfUsd},
     {SplatFormat::usdz, ".usdz", "USDZ", {}, io::read_usdz, io::write_usdz, kOfUsd},
-    {SplatFormat::rad, ".rad", "RAD", {"RAD0"}, io::read_rad, io::write_rad, "Spark"},
     {SplatFormat::ksplat,
      ".ksplat",
      "ksplat",
@@ -106,8 +105,7 @@ const Kind* kind_of_name(const std::filesystem::path& path) {
 
 constexpr const char* kWritten =
     ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, lod-meta.json, .glb, .gltf, .usda, "
-    ".usdz, "
-    ".rad";
+    ".usdz";
 
 std::string all_kinds() {
     return std::string(kWritten) + ", .ksplat";
@@ -296,8 +294,7 @@ std::vector<std::string> save_splats(const std::filesystem::path& path, const Ga
     if (format == SplatFormat::sog_levels) return save_levels(path, gaussians, options);
     std::vector<std::string> remarks, more;
     const bool ply = format == SplatFormat::ply;
-    if (ply || format == SplatFormat::compressed_ply || format == SplatFormat::rad)
-        check_comments(path, options.comments);
+    if (ply || format == SplatFormat::compressed_ply) check_comments(path, options.comments);
     if (!ply && gaussians.origin != glm::dvec3(0)) {
         remarks = save_splats(path, in_float_positions(gaussians), options);
         remarks.push_back(rounding_remark(gaussians.origin));
@@ -320,7 +317,7 @@ std::vector<std::string> save_splats(const std::filesystem::path& path, const Ga
         more = write(path, storable, options);
     }
     remarks.insert(remarks.end(), more.begin(), more.end());
-    const bool comments = ply || format == SplatFormat::compressed_ply || format == SplatFormat::rad;
+    const bool comments = ply || format == SplatFormat::compressed_ply;
     const bool unmarked = !comments && format != SplatFormat::spz && format != SplatFormat::sog &&
                           format != SplatFormat::sog_meta && !options.gltf_spz;
     if (options.antialiased && unmarked)

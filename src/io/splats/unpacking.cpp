@@ -13,27 +13,23 @@ namespace ewa::io {
 namespace {
 
 constexpr size_t kPieceBytes = size_t(1) << 16;
-/// zlib's window bits, which also tell the wrapper: a gzip header and trailer, or none.
-constexpr int kGzip = 16 + MAX_WBITS, kDeflate = -MAX_WBITS;
+constexpr int kGzip = 16;  // zlib adds a gzip header and trailer if this is added to the window bits
 
-class DeflateUnpacker final : public Unpacker {
+class GzipUnpacker final : public Unpacker {
   public:
-    DeflateUnpacker(core::FileReader& reader, int window_bits, uint64_t packed_bytes)
-        : Unpacker(reader), gzip_(window_bits == kGzip), left_(packed_bytes) {
-        if (inflateInit2(&stream_, window_bits) != Z_OK) throw std::bad_alloc();
+    explicit GzipUnpacker(core::FileReader& reader) : Unpacker(reader) {
+        if (inflateInit2(&stream_, kGzip + MAX_WBITS) != Z_OK) throw std::bad_alloc();
     }
-    ~DeflateUnpacker() override { inflateEnd(&stream_); }
+    ~GzipUnpacker() override { inflateEnd(&stream_); }
 
   private:
     size_t advance(std::byte* to, size_t n) override {
         n = std::min(n, kPieceBytes);  // zlib counts in 32 bits
         if (stream_.avail_in == 0) {
-            if (left_ == 0)
-                reader_.fail(gzip_ ? "the file ends inside its packed data; it is truncated"
-                                   : "the packed data ends inside its stream; it is damaged");
-            const size_t size = size_t(std::min<uint64_t>(left_, kPieceBytes));
+            if (reader_.remaining() == 0)
+                reader_.fail("the file ends inside its packed data; it is truncated");
+            const size_t size = size_t(std::min<uint64_t>(reader_.remaining(), kPieceBytes));
             const std::byte* bytes = reader_.take(size, "packed data");
-            left_ -= size;
             input_.assign(bytes, bytes + size);
             stream_.next_in = reinterpret_cast<Bytef*>(input_.data());
             stream_.avail_in = uInt(size);
@@ -44,13 +40,11 @@ class DeflateUnpacker final : public Unpacker {
         ended_ = result == Z_STREAM_END;
         if (result == Z_MEM_ERROR) throw std::bad_alloc();
         if (result != Z_OK && result != Z_STREAM_END && result != Z_BUF_ERROR)
-            reader_.fail(std::string("the packed data up to here is damaged (") +
-                         (gzip_ ? "gzip: " : "deflate: ") + (stream_.msg ? stream_.msg : "no message") + ")");
+            reader_.fail(std::string("the packed data up to here is damaged (gzip: ") +
+                         (stream_.msg ? stream_.msg : "no message") + ")");
         return n - stream_.avail_out;
     }
 
-    bool gzip_;
-    uint64_t left_;  // compressed bytes not yet taken from the reader
     std::vector<std::byte> input_;
     z_stream stream_{};
 };
@@ -70,15 +64,15 @@ class PlainUnpacker final : public Unpacker {
     }
 };
 
-class DeflatePacker final : public Packer {
+class GzipPacker final : public Packer {
   public:
-    DeflatePacker(Sink sink, int window_bits) : sink_(std::move(sink)), output_(kPieceBytes) {
+    explicit GzipPacker(Sink sink) : sink_(std::move(sink)), output_(kPieceBytes) {
         constexpr int kMemoryLevel = 9;
-        if (deflateInit2(&stream_, Z_DEFAULT_COMPRESSION, Z_DEFLATED, window_bits, kMemoryLevel,
+        if (deflateInit2(&stream_, Z_DEFAULT_COMPRESSION, Z_DEFLATED, kGzip + MAX_WBITS, kMemoryLevel,
                          Z_DEFAULT_STRATEGY) != Z_OK)
             throw std::bad_alloc();
     }
-    ~DeflatePacker() override { deflateEnd(&stream_); }
+    ~GzipPacker() override { deflateEnd(&stream_); }
 
     void write(const std::byte* bytes, size_t n) override { run(bytes, n, Z_NO_FLUSH); }
     void finish() override { run(nullptr, 0, Z_FINISH); }
@@ -193,19 +187,11 @@ std::unique_ptr<Unpacker> open_plain(core::FileReader& reader) {
 }
 
 std::unique_ptr<Unpacker> open_gzip(core::FileReader& reader) {
-    return std::make_unique<DeflateUnpacker>(reader, kGzip, reader.remaining());
-}
-
-std::unique_ptr<Unpacker> open_deflate(core::FileReader& reader, uint64_t packed_bytes) {
-    return std::make_unique<DeflateUnpacker>(reader, kDeflate, packed_bytes);
+    return std::make_unique<GzipUnpacker>(reader);
 }
 
 std::unique_ptr<Packer> make_gzip(Packer::Sink sink) {
-    return std::make_unique<DeflatePacker>(std::move(sink), kGzip);
-}
-
-std::unique_ptr<Packer> make_deflate(Packer::Sink sink) {
-    return std::make_unique<DeflatePacker>(std::move(sink), kDeflate);
+    return std::make_unique<GzipPacker>(std::move(sink));
 }
 
 std::unique_ptr<Unpacker> open_zstd(core::FileReader& reader, uint64_t packed_bytes,

@@ -39,9 +39,6 @@ std::unique_ptr<Unpacker> open_plain(core::FileReader& reader);
 /// gzip (RFC 1952) from the reader's position to the end of the member.
 std::unique_ptr<Unpacker> open_gzip(core::FileReader& reader);
 
-/// Deflate (RFC 1951) of `packed_bytes` from the reader's position, without a header.
-std::unique_ptr<Unpacker> open_deflate(core::FileReader& reader, uint64_t packed_bytes);
-
 /// A Zstandard frame (RFC 8878) of `packed_bytes` from the reader's position. Its window is limited to the
 /// larger of 16 MiB and `unpacked_bytes`.
 std::unique_ptr<Unpacker> open_zstd(core::FileReader& reader, uint64_t packed_bytes, uint64_t unpacked_bytes);
@@ -57,7 +54,6 @@ class Packer {
 };
 
 std::unique_ptr<Packer> make_gzip(Packer::Sink sink);
-std::unique_ptr<Packer> make_deflate(Packer::Sink sink);
 std::unique_ptr<Packer> make_zstd(Packer::Sink sink, uint64_t unpacked_bytes);
 
 }  // namespace ewa::io

@@ -29,7 +29,7 @@ bool is_splats(const ZipFiles& zip, const ZipFiles::Entry& entry) {
     if (name.ends_with(".glb") || name.ends_with(".gltf"))
         return mentions(kGltfHead, {kSplatExtension, kSpzExtensions[2], kSpzExtensions[3]});
     if (name == kSogMeta) return mentions(kPlyHead, {"\"means\""});
-    return std::ranges::any_of(std::initializer_list<const char*>{".splat", ".ksplat", ".spz", ".sog", ".rad",
+    return std::ranges::any_of(std::initializer_list<const char*>{".splat", ".ksplat", ".spz", ".sog",
                                                                   ".usda", ".usdz", kLevelsName},
                                [&](const char* end) { return name.ends_with(end); });
 }
