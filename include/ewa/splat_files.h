@@ -27,7 +27,7 @@ SplatFormat format_to_write(const std::filesystem::path& path);
 /// Throws InputError.
 SplatFormat format_of_file(const std::filesystem::path& path);
 
-/// Reads any of the formats. The peak memory is at most twice the larger of the file and the scene. A file is
+/// Reads any of the formats but .usda and .usdz, which ewa only writes. The peak memory is at most twice the larger of the file and the scene. A file is
 /// refused if it claims more than 4 times its size and 40 MiB; for SPZ and SOG, which are compressed, 32 times. Values
 /// may be infinite or NaN if the format can store that. Throws InputError that names the file and the byte or
 /// property.

@@ -222,7 +222,7 @@ def test_every_option_in_an_error_of_libewa_is_an_argument():
         option: place
         for option, place in found.items()
         if option not in COMMAND_LINE
-        and option not in ("ratio", "width", "flatten")  # of style sheets and of usdcat
+        and option not in ("ratio", "width")  # of style sheets
         and spelled(f"--{option}").removesuffix("=") not in known
     }
     assert not strangers

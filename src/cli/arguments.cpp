@@ -203,9 +203,7 @@ void add_test_every_option(CLI::App& app, int& test_every) {
 void add_splats(CLI::App& app, fs::path& splats) {
     app.add_option("SPLATS", splats,
                    "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json lod-meta.json .glb "
-                   ".gltf .usda "
-                   ".usdz), or folder of a "
-                   "training run")
+                   ".gltf), or folder of a training run")
         ->required()
         ->type_name("");
 }

@@ -329,15 +329,14 @@ void add_editing_options(CLI::App& app, ConvertArguments& arguments) {
 
 Action add_convert(CLI::App& app) {
     const auto arguments = std::make_shared<ConvertArguments>();
-    app.add_option("FILES", arguments->files,
-                   "One or more inputs, which are joined, then the output unless -o names it. Formats: .ply "
-                   ".compressed.ply .splat .spz .sog meta.json lod-meta.json .glb .gltf .usda .usdz, inputs "
-                   "also .ksplat, "
-                   "and an output "
-                   "also .html, a page that shows the scene in a browser, and tileset.json, 3D Tiles. An "
-                   "input may be the folder of a "
-                   "training run. IN:STEP, as in b.ply:move=1,0,0, moves one input alone; more steps follow "
-                   "after more colons")
+    app.add_option(
+           "FILES", arguments->files,
+           "One or more inputs, which are joined, then the output unless -o names it. Formats: .ply "
+           ".compressed.ply .splat .spz .sog meta.json lod-meta.json .glb .gltf, inputs also "
+           ".ksplat, and an output also .usda .usdz, .html, a page that shows the scene in a browser, "
+           "and tileset.json, 3D Tiles. An input may be the folder of a training run. IN:STEP, as in "
+           "b.ply:move=1,0,0, moves one input alone; more steps follow "
+           "after more colons")
         ->required()
         ->expected(1, -1)
         ->type_name("IN... OUT");

@@ -40,6 +40,9 @@ void check_readable(const ConvertOutput& output) {
     if (output.page) throw InputError("--check: ewa does not read a page; check a .sog, which it holds");
     if (output.tiles)
         throw InputError("--check: ewa reads no tileset; check a .glb with --gltf-spz, which its tiles are");
+    if (output.format == SplatFormat::usda || output.format == SplatFormat::usdz)
+        throw InputError(
+            "--check: ewa writes USD and does not read it; check a .ply, which has the same values");
     if (output.format == SplatFormat::sog_levels)
         throw InputError(
             "--check: its splats are in another order; check a .sog, which level 0 holds in chunks");

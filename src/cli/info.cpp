@@ -463,8 +463,7 @@ Action add_info(CLI::App& app) {
     const auto arguments = std::make_shared<InfoArguments>();
     app.add_option("PATH", arguments->path,
                    "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json lod-meta.json .glb "
-                   ".gltf .usda "
-                   ".usdz), COLMAP folder, "
+                   ".gltf), COLMAP folder, "
                    "transforms.json, cameras of another program, zip archive of one of these, "
                    "glTF file of meshes, image, folder of photos, video, or folder of a training run")
         ->required();

@@ -258,10 +258,9 @@ void add_options(CLI::App& app, Arguments& arguments) {
         return app.add_option(name, value, help)->type_name(type);
     };
     option("PATH", arguments.path, "",
-           "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json lod-meta.json .glb .gltf "
-           ".usda .usdz), "
-           "dataset, folder of "
-           "a training run, folder of photos, or video. Without it, the window waits for a file");
+           "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json lod-meta.json .glb .gltf), "
+           "dataset, folder of a training run, folder of photos, or video. Without it, the window waits for "
+           "a file");
     CLI::Option* train = app.add_flag("--train", arguments.train,
                                       "Train on the dataset, photos or video, and watch. Other options are "
                                       "passed to ewa train, such as --steps");

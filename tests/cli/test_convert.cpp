@@ -9,6 +9,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
+#include "support/usd_values.h"
 
 namespace {
 
@@ -17,8 +18,10 @@ using ewa::Gaussians;
 namespace fs = std::filesystem;
 using Names = std::vector<std::string>;
 
-const Names kFiles = {"a.ply", "a.compressed.ply", "a.splat", "a.spz", "a.glb", "a.gltf",
-                      "a.sog", "meta.json",        "a.usda",  "a.usdz"};
+/// Of the formats that ewa reads and writes, and of those that it only writes.
+const Names kFiles = {"a.ply", "a.compressed.ply", "a.splat", "a.spz",
+                      "a.glb", "a.gltf",           "a.sog",   "meta.json"},
+            kUsdFiles = {"a.usda", "a.usdz"};
 
 TEST(Convert, FromEachFormatToEach) {
     const Folder folder;
@@ -33,6 +36,11 @@ TEST(Convert, FromEachFormatToEach) {
             expect_success(outcome);
             EXPECT_EQ(outcome.out.find("read back") != std::string::npos, check) << outcome.out;
             EXPECT_EQ(ewa::load_splats(folder / ("b/" + second)).size(), 300u) << first << " to " << second;
+        }
+        for (const std::string& second : kUsdFiles) {
+            expect_success(run_ewa({"convert", folder / first, folder / ("b/" + second)}));
+            EXPECT_EQ(usd_numbers(read_file(folder / ("b/" + second)), "positions").size(), 900u)
+                << first << " to " << second;
         }
     }
 }
@@ -393,6 +401,23 @@ TEST(Formats, EveryCommandReadsEveryFormat) {
     expect_failure(
         run_ewa({"grad", folder / "a.spz", folder / "data", "--frame", "0", "-o", folder / "g.spz"}), 2,
         "g.spz");
+}
+
+TEST(Formats, UsdIsWrittenAndNotRead) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    make_splats(folder / "s.ply");
+    for (const std::string& name : kUsdFiles) {
+        SCOPED_TRACE(name);
+        const std::string file = folder / name, text = name + ": ewa writes USD and does not read it";
+        expect_success(run_ewa({"convert", folder / "s.ply", file}));
+        expect_failure(run_ewa({"info", file}), 2, text);
+        expect_failure(run_ewa({"info", file, "--json"}), 2, text);
+        expect_failure(run_ewa({"convert", file, folder / "b.ply"}), 2, text);
+        expect_failure(run_ewa({"eval", file, folder / "data"}), 2, text);
+        expect_failure(run_ewa({"convert", folder / "s.ply", file, "--check"}), 2,
+                       "--check: ewa writes USD and does not read it");
+    }
 }
 
 TEST(Formats, ADensityKeepsItsKernelAndIsFittedForOthers) {

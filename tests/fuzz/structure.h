@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Changes of structure: what another program, or a hand that knows the format, makes of a file. They work on any text with brackets
-// or tags: JSON, USD, XML, the head of a PLY. In a .glb and a zip archive they change the text inside, and the container fits again.
+// or tags: JSON, XML, the head of a PLY. In a .glb and a zip archive they change the text inside, and the container fits again.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -103,9 +103,7 @@ class Structure {
                 name = one_of(entries).first;
             else if (is_text(content))
                 content = changed_text(content, other);
-            constexpr size_t kAlignment = 64;  // a USDZ wants it
-            for (const auto& [entry, bytes_of_entry] : entries)
-                archive.add(entry, bytes_of_entry, kAlignment);
+            for (const auto& [entry, bytes_of_entry] : entries) archive.add(entry, bytes_of_entry);
             return archive.finish();
         }
         return is_text(bytes) ? changed_text(bytes, other) : with_limit(bytes);
@@ -297,7 +295,8 @@ class Structure {
         size_t begin = name->begin, end = from.find_first_of("\n,", name->end);
         for (const Span& span : spans_of(from))
             if (span.begin > name->end && span.begin < name->end + 4) end = span.end;
-        if (from[name->end < from.size() ? name->end : 0] != ':')  // USD: the type stands before the name
+        if (from[name->end < from.size() ? name->end : 0] !=
+            ':')  // XML: what stands before the name on its line
             begin = from.rfind('\n', begin) == std::string::npos ? begin : from.rfind('\n', begin) + 1;
         if (end == std::string::npos || end - begin > 4096) return;
         const bool first = text.find_first_not_of(" \t\n", list->begin + 1) == list->end - 1;

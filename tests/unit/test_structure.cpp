@@ -55,16 +55,7 @@ TEST(Structure, OfJsonIsChangedInEachWay) {
     EXPECT_EQ(fuzz::Structure(7).of(kStructured, ""), fuzz::Structure(7).of(kStructured, ""));
 }
 
-TEST(Structure, OfUsdAndXmlIsChanged) {
-    const std::string usd =
-        "#usda 1.0\ndef Xform \"a\" {\n    uniform token colorSpace:name = \"srgb\"\n    token[] ops = "
-        "[\"x\", \"y\"]\n}\n";
-    EXPECT_GT(changed_as(3000, usd, usd,
-                         [](const std::string& text) { return text.find("ops = []") != std::string::npos; }),
-              10);
-    EXPECT_GT(changed_as(3000, usd, usd,
-                         [](const std::string& text) { return text.find("name = []") != std::string::npos; }),
-              3);
+TEST(Structure, OfXmlIsChanged) {
     const std::string xml =
         "<cameras><camera id=\"0\" label=\"a\"><transform>1 0 0 0</transform></camera></cameras>";
     EXPECT_GT(changed_as(3000, xml, xml,
@@ -80,7 +71,7 @@ TEST(Structure, OfUsdAndXmlIsChanged) {
 TEST(Structure, OfContainersFitsAgain) {
     const test::TempFolder folder;
     const Gaussians scene = test::storable_splats(3, 20, 1);
-    for (const char* name : {"a.glb", "a.sog", "a.usdz"}) {
+    for (const char* name : {"a.glb", "a.sog"}) {
         SCOPED_TRACE(name);
         save_splats(folder / name, scene);
         const std::string bytes = test::file_bytes(folder / name);

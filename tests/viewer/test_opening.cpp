@@ -7,6 +7,7 @@
 
 #include "cli/expect.h"
 #include "cli/program.h"
+#include "ewa/error.h"
 #include "ewa/sky_map.h"
 #include "viewer/opening.h"
 
@@ -36,6 +37,17 @@ TEST(Opening, ARunOnAMeshSceneHasTheRenderedImages) {
     ASSERT_TRUE(after.dataset) << after.remark;
     EXPECT_NE(after.dataset->frames.size(), 44u);
     EXPECT_TRUE(after.dataset->frames[0].image_exists);
+}
+
+TEST(Opening, UsdIsNotRead) {
+    const test::Folder folder;
+    test::make_splats(folder / "s.usdz");
+    try {
+        open_scene(folder / "s.usdz", {});
+        ADD_FAILURE() << "opened";
+    } catch (const InputError& error) {
+        EXPECT_EQ(std::string(error.what()), folder / "s.usdz" + ": ewa writes USD and does not read it");
+    }
 }
 
 TEST(Opening, TheSplatsOfARunHaveItsCameras) {

@@ -145,13 +145,8 @@ std::vector<std::string> write_levels(const std::filesystem::path& path, Gaussia
 /// The files that an existing lod-meta.json names, with the images that those name. Empty if it cannot be read.
 std::vector<std::filesystem::path> level_files(const std::filesystem::path& path);
 
-/// OpenUSD's ParticleField3DGaussianSplat, as text and as a package of it. Reads every prim of that type that is defined in
-/// the layer, in the order of the text, into one scene, placed by the transforms of its parents. Refuses the binary format.
-/// What other layers, references and variants would add is skipped with a remark. Errors name the line.
-SplatScene read_usda(const std::filesystem::path& path);
-SplatScene read_usdz(const std::filesystem::path& path);
-
-/// Write float32 throughout, with y up. Throw InputError for a .usdz of more than 4 GiB. It is in memory as a whole.
+/// OpenUSD's ParticleField3DGaussianSplat, as text and as a package of it: float32 throughout, with y up. Throw InputError for a
+/// .usdz of more than 4 GiB. It is in memory as a whole.
 std::vector<std::string> write_usda(const std::filesystem::path& path, const Gaussians& gaussians,
                                     const SaveOptions& options);
 std::vector<std::string> write_usdz(const std::filesystem::path& path, const Gaussians& gaussians,

@@ -31,6 +31,7 @@ struct Kind {
     SplatFormat format;
     std::string_view extension, name;
     std::array<std::string_view, 2> beginnings;  // of a file; none where the first bytes do not tell
+    /// Null where ewa only writes the format.
     SplatScene (*read)(const std::filesystem::path&);
     /// Null where ewa only reads the format.
     std::vector<std::string> (*write)(const std::filesystem::path&, const Gaussians&, const SaveOptions&);
@@ -81,8 +82,8 @@ constexpr Kind kKinds[] = {
      io::read_levels,
      write_levels_of_copy,
      "PlayCanvas, SuperSplat's viewer"},
-    {SplatFormat::usda, ".usda", "USD", {"#usd", "PXR-"}, io::read_usda, io::write_usda, kOfUsd},
-    {SplatFormat::usdz, ".usdz", "USDZ", {}, io::read_usdz, io::write_usdz, kOfUsd},
+    {SplatFormat::usda, ".usda", "USD", {"#usd", "PXR-"}, nullptr, io::write_usda, kOfUsd},
+    {SplatFormat::usdz, ".usdz", "USDZ", {}, nullptr, io::write_usdz, kOfUsd},
     {SplatFormat::ksplat,
      ".ksplat",
      "ksplat",
@@ -103,12 +104,15 @@ const Kind* kind_of_name(const std::filesystem::path& path) {
     return nullptr;
 }
 
-constexpr const char* kWritten =
-    ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, lod-meta.json, .glb, .gltf, .usda, "
-    ".usdz";
+constexpr const char* kBothWays =
+    ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, lod-meta.json, .glb, .gltf";
 
-std::string all_kinds() {
-    return std::string(kWritten) + ", .ksplat";
+std::string read_kinds() {
+    return std::string(kBothWays) + ", .ksplat";
+}
+
+std::string written_kinds() {
+    return std::string(kBothWays) + ", .usda, .usdz";
 }
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& kinds) {
@@ -124,9 +128,9 @@ std::string all_kinds() {
 
 /// Says what to write instead.
 [[noreturn]] void refuse_to_write(const std::filesystem::path& path, bool read_only) {
-    if (!read_only) refuse(path, kWritten);
-    throw InputError(core::one_line(path.string() +
-                                    ": ewa reads this format and does not write it; it writes " + kWritten));
+    if (!read_only) refuse(path, written_kinds());
+    throw InputError(core::one_line(
+        path.string() + ": ewa reads this format and does not write it; it writes " + written_kinds()));
 }
 
 /// Whether the file is a zip archive of splats in another format, or in a folder.
@@ -230,7 +234,7 @@ std::string_view readers_of(SplatFormat format) {
 
 SplatFormat format_of_name(const std::filesystem::path& path) {
     const Kind* kind = kind_of_name(path);
-    if (!kind) refuse(path, all_kinds());
+    if (!kind) refuse(path, read_kinds());
     return kind->format;
 }
 
@@ -244,7 +248,7 @@ SplatFormat format_of_file(const std::filesystem::path& path) {
     if (is_zipped(path)) return format_of_name(io::zipped_splats(path, io::ZipFiles(path)).name);
     const Kind* kind = kind_of_name(path);
     std::error_code error;
-    if (!kind && !std::filesystem::is_regular_file(path, error)) refuse(path, all_kinds());
+    if (!kind && !std::filesystem::is_regular_file(path, error)) refuse(path, read_kinds());
     core::FileReader reader(path);
     // Both .usdz and .sog are zip archives.
     if (kind && kind->format == SplatFormat::usdz) return SplatFormat::usdz;
@@ -261,14 +265,17 @@ SplatFormat format_of_file(const std::filesystem::path& path) {
         kind = &kind_of(SplatFormat::sog_meta);
     else if (const Kind* found = kind_of_head(head))
         kind = found;
-    if (!kind) refuse(path, all_kinds());
+    if (!kind) refuse(path, read_kinds());
     if (kind->format != SplatFormat::ply) return kind->format;
     return io::is_compressed_ply(io::PlyTable(path)) ? SplatFormat::compressed_ply : SplatFormat::ply;
 }
 
 SplatScene read_splats(const std::filesystem::path& path) {
     if (is_zipped(path)) return io::read_zipped(path, read_splats);
-    return kind_of(format_of_file(path)).read(path);
+    const SplatFormat format = format_of_file(path);
+    const auto read = kind_of(format).read;
+    if (!read) throw InputError(core::one_line(path.string()) + ": ewa writes USD and does not read it");
+    return read(path);
 }
 
 SplatScene read_splat_level(const std::filesystem::path& path, size_t level) {
