@@ -50,7 +50,7 @@ struct RenderArguments {
     PictureArguments picture;
     DrawArguments draw;
     DeviceOptions device;
-    bool contact_sheet = false, quiet = false;
+    bool quiet = false;
     // The run that SPLATS names; empty: none.
     std::optional<live::Run> run;
     bool cameras_of_run = false, run_is_folder = false;
@@ -105,48 +105,36 @@ class EmptyViews {
 };
 
 /// View i in its appearance. appearances: of each view, or none.
-std::vector<Rendering> eyes_of(const RenderArguments& arguments, PictureTaker& taker, size_t i,
-                               const std::vector<Appearance>& appearances) {
-    std::vector<Rendering> eyes = taker.take(i);
+Rendering picture_of(const RenderArguments& arguments, PictureTaker& taker, size_t i,
+                     const std::vector<Appearance>& appearances) {
+    Rendering picture = taker.take(i);
     if (!appearances.empty() && arguments.mode == "color")
-        for (Rendering& eye : eyes)
-            eye.color = arguments.picture.transparent ? with_appearance_over_black(eye, appearances[i])
-                                                      : with_appearance(std::move(eye.color), appearances[i]);
-    return eyes;
+        picture.color = arguments.picture.transparent
+                            ? with_appearance_over_black(picture, appearances[i])
+                            : with_appearance(std::move(picture.color), appearances[i]);
+    return picture;
 }
 
 /// Renders the views into the files. appearances: of each, or none. Returns the exit status.
 int write_images(const RenderArguments& arguments, const DrawnScene& scene, Renderer& renderer,
                  ViewPath views, const std::vector<fs::path>& files,
                  const std::vector<Appearance>& appearances, Progress& progress) {
-    std::optional<ContactSheet> sheet;
-    if (arguments.contact_sheet) {
-        std::ranges::transform(views.cameras, views.cameras.begin(), thumbnail_of);
-        if (views.at) views.at = [at = views.at](double time) { return thumbnail_of(at(time)); };
-        sheet.emplace(views.cameras);
-    }
     const std::vector<Camera> cameras = views.cameras;
-    RenderOutput output({arguments.mode, arguments.format, arguments.picture.transparent}, files, progress,
-                        std::move(sheet));
+    const ImageKind kind{arguments.mode, arguments.format, arguments.picture.transparent};
     PictureTaker taker(arguments.picture, renderer, drawing_of(arguments.mode), scene.options.kernel,
                        std::move(views));
     EmptyViews empty(arguments.mode);
     for (size_t i = 0; i < cameras.size(); ++i) {
         if (interrupted()) return kInterruptedStatus;
-        std::vector<Rendering> eyes = eyes_of(arguments, taker, i, appearances);
-        empty.add(std::ranges::all_of(eyes, is_empty));
-        const bool panorama = eyes.size() == 1 && scene::shows_all_around(cameras[i]);
-        output.add(i, joined_eyes(std::move(eyes), arguments.picture.stereo), panorama);
+        Rendering picture = picture_of(arguments, taker, i, appearances);
+        empty.add(is_empty(picture));
+        save_render(files[i], std::move(picture), kind, scene::shows_all_around(cameras[i]), progress);
         if (cameras.size() > 1) progress.update(int(i) + 1);
     }
-    output.finish();
     note_skipped(progress, taker.skipped(), scene.gaussians);
     progress.clear();
     empty.warn(scene.gaussians, files);
-    if (arguments.contact_sheet)
-        progress.note(
-            fmt::format("{}: {}", arguments.output.string(), core::counted(cameras.size(), "view")));
-    else if (files[0] == arguments.output)
+    if (files[0] == arguments.output)
         progress.note(
             fmt::format("{}: {}x{}", arguments.output.string(), cameras[0].width, cameras[0].height));
     else
@@ -165,11 +153,11 @@ std::vector<fs::path> files_of_frames(const RenderArguments& arguments, const Da
                          "dataset's photos make "
                          "images in a folder");
     if (output == ViewsOutput::film) return {arguments.output};
-    if (output == ViewsOutput::image && frames.size() > 1 && !arguments.contact_sheet)
-        throw InputError(
-            fmt::format("--output {}: one image, and there are {} frames; choose one with --frames, name a "
-                        "folder, or make a --contact-sheet",
-                        core::one_line(arguments.output.string()), frames.size()));
+    if (output == ViewsOutput::image && frames.size() > 1)
+        throw InputError(fmt::format(
+            "--output {}: one image, and there are {} frames; choose one with --frames, or name a "
+            "folder",
+            core::one_line(arguments.output.string()), frames.size()));
     if (output == ViewsOutput::image) return {arguments.output};
     const std::vector<fs::path> names = report::picture_names(dataset.frames);
     std::vector<fs::path> files;
@@ -215,19 +203,17 @@ Camera of_frame(const LensArgument& lens, const Camera& frame, const Dataset& da
 int write_film(const RenderArguments& arguments, const DrawnScene& scene, Renderer& renderer,
                const ViewPath& views, const std::vector<Appearance>& appearances, const std::string& encoder,
                Progress& progress) {
-    const PictureArguments& picture = arguments.picture;
     const std::vector<Camera>& cameras = views.cameras;
     make_folder(arguments.output.parent_path());
-    Film film(arguments.output, cameras[0].width * (picture.stereo == "side-by-side" ? 2 : 1),
-              cameras[0].height * (picture.stereo == "top-bottom" ? 2 : 1), encoder, views.rate);
-    PictureTaker taker(picture, renderer, Drawing::color, scene.options.kernel, views);
+    Film film(arguments.output, cameras[0].width, cameras[0].height, encoder, views.rate);
+    PictureTaker taker(arguments.picture, renderer, Drawing::color, scene.options.kernel, views);
     EmptyViews empty(arguments.mode);
     for (size_t i = 0; i < cameras.size(); ++i) {
         if (interrupted()) return kInterruptedStatus;
-        if (picture.several() || !appearances.empty()) {
-            std::vector<Rendering> eyes = eyes_of(arguments, taker, i, appearances);
-            empty.add(std::ranges::all_of(eyes, is_empty));
-            film.add(screen_bytes(joined_eyes(std::move(eyes), picture.stereo).color));
+        if (arguments.picture.blurs() || !appearances.empty()) {
+            const Rendering picture = picture_of(arguments, taker, i, appearances);
+            empty.add(is_empty(picture));
+            film.add(screen_bytes(picture.color));
         } else {
             film.add(renderer.render_bytes(cameras[i], {.render = scene.options}));
             empty.add(renderer.splats_drawn() == 0);
@@ -333,8 +319,7 @@ int render_free_views(RenderArguments arguments) {
         for (const Frame& frame : dataset->frames) sum += frame.camera.position();
         arguments.views.inside = sum / double(dataset->frames.size());
     }
-    const ViewPath views = views_of(arguments.views, gaussians, hints_of(dataset),
-                                    arguments.contact_sheet ? ViewsOutput::folder : output);
+    const ViewPath views = views_of(arguments.views, gaussians, hints_of(dataset), output);
     check_motion(arguments, views);
     if (output == ViewsOutput::folder) {
         files.clear();
@@ -373,10 +358,6 @@ int run(CLI::App& app, RenderArguments& arguments) {
     if (arguments.lens == "native" || arguments.lens == "undistort") of_frames = "--lens " + arguments.lens;
     if (arguments.mode == "depth" && arguments.draw.integrator == "march")
         throw InputError("--mode depth: the integrator march draws no depth; the others do");
-    if (arguments.contact_sheet && views_output(arguments.output) != ViewsOutput::image)
-        throw InputError("--contact-sheet: all views go into one image; name a .png, .jpg or .exr with -o");
-    if (arguments.contact_sheet && arguments.picture.transparent)
-        throw InputError("--contact-sheet has a background of its own: not with --transparent");
     if (!arguments.codec.empty() && views_output(arguments.output) != ViewsOutput::film)
         throw InputError("--codec: only a film has one, such as -o film.mp4");
     SplatInput input = splat_input(arguments.splats);
@@ -391,8 +372,7 @@ int run(CLI::App& app, RenderArguments& arguments) {
     if (!arguments.cameras.empty()) return render_dataset_views(arguments);
     const ViewsOutput output = views_output(arguments.output);
     const bool free = any_given(arguments.views) || (arguments.views.lens && of_frames.empty()) ||
-                      output == ViewsOutput::film ||
-                      (output == ViewsOutput::image && of_frames.empty() && !arguments.contact_sheet);
+                      output == ViewsOutput::film || (output == ViewsOutput::image && of_frames.empty());
     if (input.run && !free) {
         arguments.cameras = dataset_of(*input.run);
         arguments.run = std::move(input.run);
@@ -433,7 +413,6 @@ Action add_render(CLI::App& app) {
                    "surface) or normal (of the surface, in world axes; from -1..1 to 0..1 in a png)")
         ->transform(one_of({"color", "depth", "alpha", "median-depth", "normal"}))
         ->capture_default_str();
-    app.add_flag("--contact-sheet", arguments->contact_sheet, "All views, small, in one image");
     app.add_option(
            "--codec", arguments->codec,
            "How a film is packed, if ffmpeg can: h264, hevc, av1 or vp9 [ffmpeg's choice for the name: "

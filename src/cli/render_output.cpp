@@ -55,22 +55,16 @@ Drawing drawing_of(const std::string& mode) {
     return Drawing::color;
 }
 
-void RenderOutput::add(size_t i, Rendering&& rendering, bool panorama) {
+void save_render(const std::filesystem::path& file, Rendering&& rendering, const ImageKind& kind,
+                 bool panorama, Progress& progress) {
     std::string remark;
-    const Image image = chosen_image(std::move(rendering), kind_, remark);
-    if (sheet_) return sheet_->add(image);
-    core::make_folder(files_[i].parent_path());
+    const Image image = chosen_image(std::move(rendering), kind, remark);
+    core::make_folder(file.parent_path());
     if (panorama)
-        save_panorama(files_[i], image);
+        save_panorama(file, image);
     else
-        save_image(files_[i], image);
-    if (!remark.empty()) progress_.note(files_[i].string() + ": " + remark);
-}
-
-void RenderOutput::finish() {
-    if (!sheet_) return;
-    core::make_folder(files_[0].parent_path());
-    save_image(files_[0], sheet_->image());
+        save_image(file, image);
+    if (!remark.empty()) progress.note(file.string() + ": " + remark);
 }
 
 }  // namespace ewa::cli

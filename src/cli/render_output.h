@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the images of ewa render go: a file for each view, or one contact sheet.
+// The images of ewa render as files.
 #pragma once
 #include <filesystem>
-#include <optional>
 #include <string>
-#include <vector>
 
-#include "cli/contact_sheet.h"
 #include "cli/output.h"
 #include "ewa/renderer.h"
 
@@ -20,22 +17,9 @@ struct ImageKind {
     bool transparent = false;
 };
 
-class RenderOutput {
-  public:
-    /// files: of each view, or with `sheet` the one of all.
-    RenderOutput(ImageKind kind, std::vector<std::filesystem::path> files, Progress& progress,
-                 std::optional<ContactSheet> sheet)
-        : kind_(std::move(kind)), files_(std::move(files)), progress_(progress), sheet_(std::move(sheet)) {}
-
-    /// The image of view i, in their order. panorama: it shows all directions.
-    void add(size_t i, Rendering&& rendering, bool panorama);
-    void finish();
-
-  private:
-    ImageKind kind_;
-    std::vector<std::filesystem::path> files_;
-    Progress& progress_;
-    std::optional<ContactSheet> sheet_;
-};
+/// Writes the image of one view, and makes its folder. panorama: it shows all directions. progress gets a remark where the file does not
+/// hold a fact, such as the depth of white. Throws RunError if the file cannot be written.
+void save_render(const std::filesystem::path& file, Rendering&& rendering, const ImageKind& kind,
+                 bool panorama, Progress& progress);
 
 }  // namespace ewa::cli

@@ -14,10 +14,6 @@
 namespace ewa::cli {
 namespace {
 
-/// From eye to eye, as a part of the distance of focus: what stereo photography holds comfortable.
-constexpr double kEyesPerFocus = 1.0 / 30;
-constexpr int kEyeColumns = 16;  // of a 360° image that share an eye
-
 void add_image(Image& sum, const Image& image, bool linear) {
     if (sum.pixels.empty()) sum = Image(image.width, image.height, image.channels);
     for (size_t i = 0; i < image.pixels.size(); ++i) {
@@ -31,34 +27,6 @@ void divide(Image& sum, int count, bool linear) {
         v = linear ? float(scene::srgb_of_linear(double(v) / count)) : v / float(count);
 }
 
-/// The images that a rendering may have.
-std::vector<Image*> images_of(Rendering& rendering) {
-    return {&rendering.color, &rendering.alpha, &rendering.depth, &rendering.median_depth, &rendering.normal};
-}
-
-Image beside(const Image& left, const Image& right) {
-    Image both(2 * left.width, left.height, left.channels);
-    const size_t row = size_t(left.width) * size_t(left.channels);
-    for (int y = 0; y < left.height; ++y) {
-        std::copy_n(left.at(0, y), row, both.at(0, y));
-        std::copy_n(right.at(0, y), row, both.at(left.width, y));
-    }
-    return both;
-}
-
-Image below(Image top, const Image& bottom) {
-    top.pixels.insert(top.pixels.end(), bottom.pixels.begin(), bottom.pixels.end());
-    top.height *= 2;
-    return top;
-}
-
-void paste_columns(const Image& part, int first, int width, Image& whole) {
-    if (part.pixels.empty()) return;
-    if (whole.pixels.empty()) whole = Image(width, part.height, part.channels);
-    for (int y = 0; y < part.height; ++y)
-        std::copy_n(part.at(0, y), size_t(part.width) * size_t(part.channels), whole.at(first, y));
-}
-
 }  // namespace
 
 void add_picture_options(CLI::App& app, PictureArguments& arguments) {
@@ -67,8 +35,8 @@ void add_picture_options(CLI::App& app, PictureArguments& arguments) {
         ->transform(in_range(1e-9, 1e9))
         ->type_name("D");
     app.add_option("--focus", arguments.focus,
-                   "Distance along the view that is sharp, and at the screen's depth with --stereo (world "
-                   "units) [that of what the middle of the image shows]")
+                   "Distance along the view that is sharp (world units) [that of what the middle of the "
+                   "image shows]")
         ->transform(in_range(1e-9, 1e9))
         ->type_name("D");
     app.add_option("--shutter", arguments.shutter,
@@ -81,16 +49,6 @@ void add_picture_options(CLI::App& app, PictureArguments& arguments) {
         ->transform(in_range(2, 4096))
         ->type_name("N")
         ->capture_default_str();
-    app.add_option("--stereo", arguments.stereo,
-                   "Two eyes in one image, the left eye first: side-by-side or top-bottom. A 360° image of "
-                   "each eye with --lens equirect")
-        ->transform(one_of({"side-by-side", "top-bottom"}))
-        ->type_name("LAYOUT");
-    app.add_option("--eye-distance", arguments.eye_distance,
-                   "With --stereo: from eye to eye (world units) [a thirtieth of --focus]")
-        ->transform(in_range(1e-9, 1e9))
-        ->needs("--stereo")
-        ->type_name("D");
     app.add_flag("--transparent", arguments.transparent,
                  "No background: a png has alpha, and an exr colour over black");
 }
@@ -102,8 +60,7 @@ void check_picture(const PictureArguments& arguments, const std::string& mode, b
         throw InputError("--aperture and --shutter average colours: --mode color or alpha");
     if (arguments.shutter > 0 && !path)
         throw InputError("--shutter: there is no motion; it needs a film, --orbit or --film-seconds");
-    if (arguments.focus > 0 && arguments.aperture == 0 && arguments.stereo.empty())
-        throw InputError("--focus needs --aperture or --stereo");
+    if (arguments.focus > 0 && arguments.aperture == 0) throw InputError("--focus needs --aperture");
     if (!arguments.transparent) return;
     if (mode != "color") throw InputError("--transparent needs --mode color");
     if (extension != ".png" && extension != ".exr")
@@ -149,10 +106,9 @@ double PictureTaker::focus_of(size_t i) {
     return found_;
 }
 
-Rendering PictureTaker::averaged(size_t i, double eye, double focus) {
+Rendering PictureTaker::averaged(size_t i, double focus) {
     const Camera& view = views_.cameras[i];
-    const int count = arguments_.blurs() ? arguments_.blur_samples : 1;
-    if (count == 1) return render(eye == 0 ? view : scene::moved_eye(view, {eye, 0}, focus));
+    const int count = arguments_.blur_samples;
     // Light adds up in a camera, so colours are averaged in linear light. Programs that put a transparent image over another one
     // blend stored values, as splats are blended.
     const bool linear = !arguments_.transparent;
@@ -161,8 +117,7 @@ Rendering PictureTaker::averaged(size_t i, double eye, double focus) {
         Camera camera =
             arguments_.shutter > 0 ? views_.at(double(i) + arguments_.shutter * scene::even_share(k)) : view;
         const glm::dvec2 place = 0.5 * arguments_.aperture * scene::disc_point(k, count);
-        if (arguments_.aperture > 0 || eye != 0)
-            camera = scene::moved_eye(camera, place + glm::dvec2(eye, 0), focus);
+        if (arguments_.aperture > 0) camera = scene::moved_eye(camera, place, focus);
         const Rendering one = render(camera);
         add_image(sum.color, one.color, linear);
         add_image(sum.alpha, one.alpha, false);
@@ -172,50 +127,19 @@ Rendering PictureTaker::averaged(size_t i, double eye, double focus) {
     return sum;
 }
 
-Rendering PictureTaker::all_around(const Camera& camera, double eye) {
-    Rendering whole;
-    for (const scene::EyeColumns& piece : scene::eye_columns(camera, eye, kEyeColumns)) {
-        Rendering part = render(piece.camera);
-        const std::vector<Image*> from = images_of(part), to = images_of(whole);
-        for (size_t k = 0; k < from.size(); ++k) paste_columns(*from[k], piece.first, camera.width, *to[k]);
-    }
-    return whole;
-}
-
-std::vector<Rendering> PictureTaker::take(size_t i) {
+Rendering PictureTaker::take(size_t i) {
     const Camera& camera = views_.cameras[i];
-    const bool stereo = !arguments_.stereo.empty(), around = scene::shows_all_around(camera);
-    if ((arguments_.aperture > 0 && !scene::has_movable_eye(camera)) ||
-        (stereo && !around && !scene::has_movable_eye(camera)) || (around && arguments_.blurs()))
-        throw InputError(around ? "--aperture and --shutter: a 360° image has neither"
-                                : "--aperture and --stereo need a pinhole: --lens undistort");
-    if (around && arguments_.focus > 0)
-        throw InputError("--focus: a 360° image has no distance of focus; leave it out");
-    double focus = 1, half = 0.5 * arguments_.eye_distance;
-    if (arguments_.aperture > 0 || (stereo && !around)) focus = focus_of(i);
-    if (stereo && half == 0) {
-        if (around) throw InputError("--eye-distance is needed: a 360° image has no distance of focus");
-        half = 0.5 * kEyesPerFocus * focus;
-    }
-    std::vector<Rendering> eyes;
-    for (const double eye : stereo ? std::vector{-half, half} : std::vector{0.0})
-        eyes.push_back(around && stereo ? all_around(camera, eye) : averaged(i, eye, focus));
-    return eyes;
+    if (!arguments_.blurs()) return render(camera);
+    if (scene::shows_all_around(camera))
+        throw InputError("--aperture and --shutter: a 360° image has neither");
+    if (arguments_.aperture > 0 && !scene::has_movable_eye(camera))
+        throw InputError("--aperture needs a pinhole: --lens undistort");
+    return averaged(i, arguments_.aperture > 0 ? focus_of(i) : 1);
 }
 
 bool is_empty(const Rendering& rendering) {
     const Image& shown = rendering.median_depth.pixels.empty() ? rendering.alpha : rendering.median_depth;
     return std::ranges::all_of(shown.pixels, [](float value) { return value == 0; });
-}
-
-Rendering joined_eyes(std::vector<Rendering> eyes, const std::string& stereo) {
-    Rendering& first = eyes[0];
-    if (eyes.size() == 1) return std::move(first);
-    const std::vector<Image*> left = images_of(first), right = images_of(eyes[1]);
-    for (size_t k = 0; k < left.size(); ++k)
-        *left[k] =
-            stereo == "side-by-side" ? beside(*left[k], *right[k]) : below(std::move(*left[k]), *right[k]);
-    return std::move(first);
 }
 
 namespace {

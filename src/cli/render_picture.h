@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures of ewa render that consist of several renders: depth of field, motion blur, and two eyes. Also transparent ones.
+// Pictures of ewa render that consist of several renders: depth of field and motion blur. Also transparent ones.
 #pragma once
 #include <CLI/CLI.hpp>
 
@@ -15,17 +15,15 @@
 namespace ewa::cli {
 
 struct PictureArguments {
-    double aperture = 0, focus = 0, eye_distance = 0;  // world units; 0: not given
-    double shutter = 0;                                // share of a frame's time; 0: no motion blur
+    double aperture = 0, focus = 0;  // world units; 0: not given
+    double shutter = 0;              // share of a frame's time; 0: no motion blur
     int blur_samples = 32;
-    std::string stereo;  // side-by-side, top-bottom; empty: one eye
     bool transparent = false;
 
     bool blurs() const { return aperture > 0 || shutter > 0; }
-    bool several() const { return blurs() || !stereo.empty(); }  // renders for a picture
 };
 
-/// --aperture, --focus, --shutter, --blur-samples, --stereo, --eye-distance and --transparent.
+/// --aperture, --focus, --shutter, --blur-samples and --transparent.
 void add_picture_options(CLI::App& app, PictureArguments& arguments);
 
 /// Throws InputError for options that exclude each other. mode: of --mode. path: whether the views are moments of one motion. extension: of
@@ -45,16 +43,15 @@ class PictureTaker {
           kernel_(kernel),
           views_(std::move(views)) {}
 
-    /// What each eye sees in view i: one or two images. With a shutter, while the camera moves to the next view.
+    /// The picture of view i. With a shutter, while the camera moves to the next view.
     /// Throws InputError where the options do not go with the lens of a camera, or no view has anything in focus.
-    std::vector<Rendering> take(size_t i);
+    Rendering take(size_t i);
 
     uint32_t skipped() const { return skipped_; }  // the most splats of a render that were not finite
 
   private:
     Rendering render(const Camera& camera);
-    Rendering averaged(size_t i, double eye, double focus);
-    Rendering all_around(const Camera& camera, double eye);
+    Rendering averaged(size_t i, double focus);
     double focus_of(size_t i);
     double depth_of_middle(const Camera& camera);
 
@@ -69,9 +66,6 @@ class PictureTaker {
 
 /// Whether it shows no splat, or no surface where it has the depth of surfaces.
 bool is_empty(const Rendering& rendering);
-
-/// Both eyes in one image, as --stereo names it. One eye stays as it is.
-Rendering joined_eyes(std::vector<Rendering> eyes, const std::string& stereo);
 
 /// The colours as a camera of this appearance shows them. The rendering is over black, and stays so.
 Image with_appearance_over_black(const Rendering& rendering, const Appearance& appearance);

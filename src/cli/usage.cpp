@@ -22,19 +22,19 @@ const std::map<std::string, std::string>& subjects() {
         const auto add = [&made](const char* subject, std::initializer_list<const char*> names) {
             for (const char* name : names) made[name] = subject;
         };
-        add("Data", {"cameras",      "frame",        "split",   "transform", "exposures", "appearance-of",
-                     "max-sh",       "sort",         "splats",  "cases",     "decimate",  "level",
-                     "bake-sky",     "views",        "size",    "look-at",   "up",        "orbit",
-                     "film-seconds", "matching",     "visible", "view-time", "aperture",  "focus",
-                     "shutter",      "scene-splats", "stereo",  "geo",       "scale-to",  "eye-distance"});
+        add("Data",
+            {"cameras",   "frame",    "split", "transform", "exposures",    "appearance-of", "max-sh",
+             "sort",      "splats",   "cases", "decimate",  "level",        "bake-sky",      "views",
+             "size",      "look-at",  "up",    "orbit",     "film-seconds", "matching",      "visible",
+             "view-time", "aperture", "focus", "shutter",   "scene-splats", "geo",           "scale-to"});
         add("Quality",
             {"quality", "antialias", "integrator", "samples", "runs", "training-steps", "blur-samples"});
-        add("Output", {"output",     "format",    "mode",        "json",        "svg",           "heat-map",
-                       "heat-scale", "serve",     "accuracy",    "spz-version", "levels",        "check",
-                       "ranks",      "quiet",     "verbose",     "results",     "compare",       "threshold",
-                       "max-error",  "resume",    "force",       "allow-empty", "protocol",      "voxel",
-                       "triangles",  "distance",  "transparent", "codec",       "contact-sheet", "gltf-spz",
-                       "unbundled",  "unbounded", "collision",   "title"});
+        add("Output",
+            {"output",      "format",    "mode",        "json",      "svg",       "heat-map",    "heat-scale",
+             "serve",       "accuracy",  "spz-version", "levels",    "check",     "ranks",       "quiet",
+             "verbose",     "results",   "compare",     "threshold", "max-error", "resume",      "force",
+             "allow-empty", "protocol",  "voxel",       "triangles", "distance",  "transparent", "codec",
+             "gltf-spz",    "unbundled", "unbounded",   "collision", "title"});
         for (const train::RunOption& option : train::run_options())
             if (!option.subject.empty()) made[option.name] = option.subject;
         return made;

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/picture_views.h"
 
-#include <algorithm>
 #include <cmath>
-#include <glm/mat3x3.hpp>
 #include <numbers>
 
 namespace ewa::scene {
@@ -28,23 +26,6 @@ double even_share(int i) {
     double share = 0, part = 0.5;
     for (; i > 0; i >>= 1, part /= 2) share += (i & 1) * part;
     return share;
-}
-
-std::vector<EyeColumns> eye_columns(const Camera& camera, double offset, int width) {
-    std::vector<EyeColumns> all;
-    for (int first = 0; first < camera.width; first += width) {
-        EyeColumns piece{camera, first};
-        Camera& eye = piece.camera;
-        eye.width = std::min(width, camera.width - first);
-        const double angle = (first + 0.5 * eye.width - camera.cx) / camera.fx;
-        const double c = std::cos(angle), s = std::sin(angle);
-        const glm::dmat3 turn({c, 0, s}, {0, 1, 0}, {-s, 0, c});  // the middle of the piece becomes the axis
-        eye.rotation = turn * camera.rotation;
-        eye.translation = turn * camera.translation - glm::dvec3(offset, 0, 0);
-        eye.cx = 0.5 * eye.width;
-        all.push_back(piece);
-    }
-    return all;
 }
 
 }  // namespace ewa::scene

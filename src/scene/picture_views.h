@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The views of which pictures with depth of field, motion blur and two eyes consist. Cameras in the OpenCV convention.
+// The views of which pictures with depth of field and motion blur consist. Cameras in the OpenCV convention.
 #pragma once
 #include <glm/vec2.hpp>
-#include <vector>
 
 #include "ewa/camera.h"
 
@@ -21,15 +20,5 @@ glm::dvec2 disc_point(int i, int count);
 
 /// Element i >= 0 of van der Corput's sequence in base 2: in [0, 1), evenly for each count, and without relation to disc_point.
 double even_share(int i);
-
-/// Columns of a 360° image for one eye.
-struct EyeColumns {
-    Camera camera;  // of these columns alone
-    int first = 0;  // column of the image
-};
-
-/// The 360° image of an eye, in pieces of at most `width` columns. The eye of each piece is moved by `offset` (world units) to the right
-/// of where its middle looks: an omni-directional stereo image (Ishiguro, Yamamoto and Tsuji 1992). camera: shows_all_around.
-std::vector<EyeColumns> eye_columns(const Camera& camera, double offset, int width);
 
 }  // namespace ewa::scene

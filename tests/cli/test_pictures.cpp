@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures of ewa render of several renders: depth of field, motion blur, two eyes, contact sheets; transparent ones; codecs.
+// Pictures of ewa render of several renders: depth of field and motion blur; transparent ones; codecs.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -175,39 +175,6 @@ TEST_F(Pictures, TheFocusIsOnASurfaceAndThatOfAnotherViewWhereThereIsNone) {
     EXPECT_EQ(files_below(folder / "batch").size(), 2u);
 }
 
-TEST_F(Pictures, TwoEyesSeeDepth) {
-    place({{-0.5f, 0, 3}, {0.4f, 0, 2}});
-    const Image both = image("both.exr", {"--size", "160x120", "--mode", "alpha", "--stereo", "side-by-side",
-                                          "--focus", "3", "--eye-distance", "0.2"});
-    ASSERT_EQ(both.width, 320);
-    const auto shift = [&](int from, int to) {
-        return spot_of(both, from, to).middle.x - spot_of(both, 160 + from, 160 + to).middle.x;
-    };
-    EXPECT_NEAR(shift(0, 75), 0, 0.05) << "at the screen";
-    EXPECT_NEAR(shift(75, 160), 0.2 * kFocal * (1 / 2.0 - 1 / 3.0), 0.1) << "before it";
-    const Image below = image("below.exr", {"--size", "160x120", "--mode", "alpha", "--stereo", "top-bottom",
-                                            "--focus", "3", "--eye-distance", "0.2"});
-    ASSERT_EQ(below.height, 240);
-    EXPECT_NEAR(spot_of(below, 75, 160, 0, 120).middle.x, spot_of(both, 75, 160).middle.x, 1e-4);
-    EXPECT_NEAR(spot_of(below, 75, 160, 120).middle.x, spot_of(both, 235, 320).middle.x, 1e-4);
-}
-
-TEST_F(Pictures, EyesAllAroundAreApartInEachDirection) {
-    place({{0, 0, 2}, {2, 0, 0}});
-    const Image both = image("all.exr", {"--lens", "equirect", "--size", "400x200", "--mode", "alpha",
-                                         "--stereo", "top-bottom", "--eye-distance", "0.2"});
-    ASSERT_EQ(both.height, 400);
-    const double expected = 2 * std::asin(0.1 / 2) / (2 * M_PI) * 400;
-    for (const int middle : {200, 300}) {
-        const double left = spot_of(both, middle - 40, middle + 40, 0, 200).middle.x,
-                     right = spot_of(both, middle - 40, middle + 40, 200, 400).middle.x;
-        EXPECT_NEAR(left - right, expected, 0.15) << middle;
-        EXPECT_NEAR(left + right, 80, 0.3) << middle;
-    }
-    expect_failure(render("x.exr", {"--lens", "equirect", "--stereo", "top-bottom"}), 2,
-                   "--eye-distance is needed");
-}
-
 TEST_F(Pictures, ATransparentImageGoesOverAnyBackground) {
     place({{-0.5f, 0, 3}, {1, 0, 6}});
     const Names size{"--size", "80x60"};
@@ -219,39 +186,6 @@ TEST_F(Pictures, ATransparentImageGoesOverAnyBackground) {
     EXPECT_GT(compare_images(over, image("black.png", size)).max_error, 0.1);
     expect_failure(render("x.jpg", {"--transparent"}), 2, "has no alpha");
     expect_failure(render("x.png", {"--transparent", "--mode", "depth"}), 2, "--mode color");
-}
-
-TEST_F(Pictures, AContactSheetHasAllViews) {
-    make_splats(splats, 400);
-    const Image sheet = image("sheet.png", {"--orbit", "6", "--size", "640x480", "--contact-sheet"});
-    ASSERT_EQ(sheet.width, 8 + 3 * 328);
-    ASSERT_EQ(sheet.height, 8 + 2 * 248);
-    for (int view = 0; view < 6; ++view) {
-        float most = 0;
-        for (int y = 0; y < 240; ++y)
-            for (int x = 0; x < 320; ++x)
-                most = std::max(most, *sheet.at(8 + view % 3 * 328 + x, 8 + view / 3 * 248 + y));
-        EXPECT_GT(most, 0.3f) << view;
-    }
-    EXPECT_NEAR(*sheet.at(2, 2), 0.12f, 0.01f);
-    const std::string data = folder / "data";
-    make_dataset(data);
-    expect_success(run_ewa(
-        {"render", splats, "--cameras", data, "--contact-sheet", "--quiet", "-o", folder / "frames.jpg"}));
-    const Image frames = load_image(folder / "frames.jpg");
-    EXPECT_GT(frames.width, 60);
-    // A run's are those of its dataset.
-    expect_success(run_ewa({"train", data, "-o", folder / "run", "--init", splats, "--max-splats", "400",
-                            "--steps", "2", "--quiet"}));
-    expect_success(
-        run_ewa({"render", folder / "run", "--contact-sheet", "--quiet", "-o", folder / "run.jpg"}));
-    const Image of_run = load_image(folder / "run.jpg");
-    EXPECT_EQ(of_run.width, frames.width);
-    EXPECT_EQ(of_run.height, frames.height);
-    expect_failure(render("d", {"--orbit", "6", "--contact-sheet"}), 2, "one image");
-    expect_failure(render("x.png", {"--orbit", "6", "--contact-sheet", "--transparent"}), 2,
-                   "background of its own");
-    expect_failure(render("x.png", {"--orbit", "3000", "--contact-sheet"}), 2, "3000 views take ");
 }
 
 TEST_F(Pictures, SizesOfScreensHaveNames) {
@@ -287,11 +221,10 @@ TEST_F(Pictures, TheCodecIsOneThatFfmpegHas) {
                        "has none of it");
     expect_success(film({}));
     EXPECT_EQ(read_file(folder / "arguments").find("-c:v"), std::string::npos);
-    // Both eyes are in each frame.
-    expect_success(
-        film({"--stereo", "side-by-side", "--focus", "2", "--shutter", "0.5", "--blur-samples", "2"}));
-    EXPECT_NE(read_file(folder / "arguments").find("\n16x6\n"), std::string::npos);
-    EXPECT_EQ(read_file(folder / "f.mp4").size(), size_t(2) * 16 * 6 * 4);
+    // Each frame is an average.
+    expect_success(film({"--shutter", "0.5", "--blur-samples", "2"}));
+    EXPECT_NE(read_file(folder / "arguments").find("\n8x6\n"), std::string::npos);
+    EXPECT_EQ(read_file(folder / "f.mp4").size(), size_t(2) * 8 * 6 * 4);
 }
 
 TEST_F(Pictures, WrongUse) {
@@ -299,14 +232,9 @@ TEST_F(Pictures, WrongUse) {
     const std::pair<Names, const char*> cases[] = {
         {{"--shutter", "0.5"}, "there is no motion"},
         {{"--focus", "2"}, "--focus needs"},
-        {{"--eye-distance", "2"}, "--stereo"},
         {{"--aperture", "1", "--mode", "depth"}, "average colours"},
         {{"--aperture", "1", "--lens", "equirect"}, "360"},
         {{"--aperture", "1", "--lens", "fisheye:180"}, "pinhole"},
-        {{"--stereo", "side-by-side", "--lens", "fisheye:180", "--focus", "1"}, "pinhole"},
-        {{"--stereo", "both"}, "--stereo"},
-        {{"--stereo", "top-bottom", "--lens", "equirect", "--eye-distance", "1", "--focus", "2"},
-         "--focus: a 360"},
         {{"--codec", "av1"}, "only a film"}};
     for (const auto& [arguments, text] : cases) expect_failure(render("x.png", arguments), 2, text);
     EXPECT_FALSE(std::filesystem::exists(folder / "x.png"));

@@ -34,7 +34,7 @@ Lens lens_of_path(const JsonField& top) {
     if (type == "fisheye") return Lens::fisheye;
     if (type == "equirectangular") return Lens::equirectangular;
     top.fail("the camera_type \"" + type.substr(0, 60) +
-             "\" is not supported; take perspective, fisheye or equirectangular, and --stereo for two eyes");
+             "\" is not supported; take perspective, fisheye or equirectangular");
 }
 
 void read_path_camera(const JsonField& field, Camera& camera) {
