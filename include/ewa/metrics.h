@@ -1,18 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Metrics of two images beside PSNR and SSIM of image.h. docs/figures.md defines each.
 #pragma once
-#include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "ewa/image.h"
 
 namespace ewa {
-
-namespace image {
-class Lpips;
-}
 
 struct Metric {
     std::string name;  // as in JSON, e.g. "cc_psnr"
@@ -23,8 +17,8 @@ struct Metric {
 /// All metrics, in the order of tables. The first two are "psnr" and "ssim".
 const std::vector<Metric>& all_metrics();
 
-/// The names in a list such as "cc_psnr,flip", each once, in the order of all_metrics. "all" names all of them, "bands" the
-/// PSNR of all frequency bands, and "lpips" that of both networks. Throws InputError for any other word.
+/// The names in a list such as "cc_psnr,flip", each once, in the order of all_metrics. "all" names all of them, and "bands"
+/// the PSNR of all frequency bands. Throws InputError for any other word.
 std::vector<std::string> metrics_named(const std::string& list);
 
 /// The value of a metric.
@@ -37,12 +31,8 @@ struct Figure {
 class Meter {
   public:
     Meter() = default;  // none
-    /// names: of all_metrics. "psnr" and "ssim" are skipped. lpips_weights: a file that scripts/lpips-weights wrote; empty:
-    /// LPIPS is not computed. lpips_of_unit_range: the networks get values in [0, 1] instead of [-1, 1], as in INRIA's
-    /// evaluation. A network that the file lacks is not
-    /// computed. Throws InputError (the file has no network that `names` asks for, or is damaged).
-    explicit Meter(const std::vector<std::string>& names, const std::filesystem::path& lpips_weights = {},
-                   bool lpips_of_unit_range = false);
+    /// names: of all_metrics. "psnr" and "ssim" are skipped.
+    explicit Meter(const std::vector<std::string>& names);
 
     /// Whether it measures nothing.
     bool empty() const { return names_.empty(); }
@@ -55,7 +45,6 @@ class Meter {
 
   private:
     std::vector<std::string> names_;
-    std::shared_ptr<const image::Lpips> vgg_, alex_;  // null: not computed
 };
 
 }  // namespace ewa

@@ -65,8 +65,7 @@ struct RunOptions {
     bool robust = false;         // masks what single images show and the others do not
     int eval_every = 0;          // evaluates the held-out views every N steps; 0: only at the end
     std::string metrics;         // that evaluations measure beside PSNR and SSIM: see metrics_named
-    std::filesystem::path lpips_weights;  // see Meter; empty: LPIPS is not computed
-    bool tensorboard = false;             // also writes the figures of metrics.jsonl as TensorBoard's events
+    bool tensorboard = false;    // also writes the figures of metrics.jsonl as TensorBoard's events
     int save_every = 0;  // saves splats and checkpoint every N steps; 0: the checkpoint every 30 s or more
     int keep = 0;        // of the splats of save_every, the last N stay as splats_007000.ply and the like
     bool inria = false;  // also writes the folder inria/, for viewers of INRIA's runs

@@ -1,23 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "metrics.h"
 
-#include <nanobind/stl/filesystem.h>
-#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
 #include <algorithm>
+#include <array>
+#include <set>
+#include <sstream>
 
+#include "arrays.h"
 #include "bindings.h"
-#include "errors.h"
-#include "ewa/error.h"
+#include "core/text.h"
 #include "images.h"
 
 namespace ewa::python {
 namespace {
 
-nb::dict measure(nb::handle image, nb::handle reference, nb::handle names, nb::handle weights,
-                 const std::optional<std::filesystem::path>& lpips_weights) {
-    const Meter meter = meter_of(names, lpips_weights);
+constexpr std::array<const char*, 2> kLpips = {"lpips_vgg", "lpips_alex"};
+
+/// The words of a list of metrics.
+std::vector<std::string> words_of(nb::handle names) {
+    std::vector<std::string> words;
+    if (!nb::isinstance<nb::str>(names)) {
+        for (const nb::handle name : names) words.push_back(nb::cast<std::string>(name));
+        return words;
+    }
+    const std::string list = nb::cast<std::string>(names);
+    if (list.empty()) return words;
+    std::istringstream stream(list + ",");
+    for (std::string word; std::getline(stream, word, ',');) words.push_back(word);
+    return words;
+}
+
+nb::dict measure(nb::handle image, nb::handle reference, nb::handle names, nb::handle weights) {
+    const AskedMetrics asked = asked_metrics(names);
     const Image judged = image_of(image, "image"), wanted = image_of(reference, "reference");
     const Image counts = weights.is_none() ? Image() : weights_of(weights);
     double psnr = 0, ssim = 0;
@@ -26,30 +42,47 @@ nb::dict measure(nb::handle image, nb::handle reference, nb::handle names, nb::h
         const nb::gil_scoped_release released;
         psnr = ewa::psnr(judged, wanted, counts);
         ssim = ewa::ssim(judged, wanted, counts);
-        if (!meter.empty()) figures = meter.measure(judged, wanted, counts);
+        if (!asked.meter.empty()) figures = asked.meter.measure(judged, wanted, counts);
     }
+    for (Figure& figure : lpips_figures(asked.lpips, judged, wanted, counts))
+        figures.push_back(std::move(figure));
     return figures_dict(psnr, ssim, figures);
 }
 
 }  // namespace
 
-Meter meter_of(nb::handle names, const std::optional<std::filesystem::path>& lpips_weights) {
-    std::string list;
-    if (nb::isinstance<nb::str>(names))
-        list = nb::cast<std::string>(names);
-    else
-        for (const nb::handle name : names)
-            list.append(list.empty() ? "" : ",").append(nb::cast<std::string>(name));
-    if (list.empty()) return {};
-    std::vector<std::string> all = metrics_named(list);
-    const auto is_lpips = [](const std::string& name) { return name.starts_with("lpips"); };
-    if (!lpips_weights) {
-        // "all" is what can be measured.
-        if (list != "all" && std::ranges::any_of(all, is_lpips))
-            throw InputError("metrics: lpips needs lpips_weights, a file that scripts/lpips-weights writes");
-        std::erase_if(all, is_lpips);
+AskedMetrics asked_metrics(nb::handle names) {
+    std::string others;
+    std::set<std::string> lpips;
+    for (const std::string& word : words_of(names)) {
+        const std::string known = core::lower(word);
+        if (known == "lpips")
+            lpips.insert(kLpips.begin(), kLpips.end());
+        else if (std::ranges::find(kLpips, known) != kLpips.end())
+            lpips.insert(known);
+        else
+            others.append(others.empty() ? "" : ",").append(word);
     }
-    return Meter(all, lpips_weights.value_or(std::filesystem::path()));
+    AskedMetrics asked;
+    if (!others.empty()) asked.meter = Meter(metrics_named(others));
+    for (const char* name : kLpips)
+        if (lpips.contains(name)) asked.lpips.emplace_back(name);
+    // A network that is missing is an error before the work.
+    for (const std::string& name : asked.lpips) nb::module_::import_("ewa._lpips").attr("network")(name);
+    return asked;
+}
+
+std::vector<Figure> lpips_figures(const std::vector<std::string>& names, const Image& image,
+                                  const Image& reference, const Image& weights) {
+    std::vector<Figure> figures;
+    if (names.empty()) return figures;
+    const nb::gil_scoped_acquire interpreter;
+    const nb::object distance = nb::module_::import_("ewa._lpips").attr("distance");
+    const nb::object judged = nb::cast(to_numpy(Image(image))), wanted = nb::cast(to_numpy(Image(reference)));
+    const nb::object counts = weights.pixels.empty() ? nb::none() : nb::cast(to_numpy(Image(weights)));
+    for (const std::string& name : names)
+        figures.push_back({name, nb::cast<double>(distance(name, judged, wanted, counts))});
+    return figures;
 }
 
 nb::dict figures_dict(double psnr, double ssim, const std::vector<Figure>& figures) {
@@ -75,13 +108,13 @@ std::vector<Figure> figures_of(const FigureState& state) {
 void bind_metrics(nb::module_& module) {
     module.def(
         "metrics", measure, nb::arg("image"), nb::arg("reference"), nb::arg("metrics") = nb::tuple(),
-        nb::kw_only(), nb::arg("weights") = nb::none(), nb::arg("lpips_weights") = nb::none(),
+        nb::kw_only(), nb::arg("weights") = nb::none(),
         nb::sig("def metrics(image: numpy.typing.ArrayLike | os.PathLike[str], "
                 "reference: numpy.typing.ArrayLike | os.PathLike[str], "
                 "metrics: str | collections.abc.Sequence[str] = (), *, "
-                "weights: numpy.typing.ArrayLike | None = None, "
-                "lpips_weights: str | os.PathLike[str] | None = None) -> dict[str, float]"),
-        "PSNR, SSIM and the metrics with these names (docs/figures.md; \"all\" names all) of an image and "
+                "weights: numpy.typing.ArrayLike | None = None) -> dict[str, float]"),
+        "PSNR, SSIM and the metrics with these names (docs/figures.md; \"all\" names all but LPIPS) of an "
+        "image and "
         "what it should be: [H, W, 3] or [H, W, 4], from 0 to 1, where integers are from 0 to 255; or the "
         "files of images. weights: [H, W], how much each pixel counts. Raises InputError.");
 }

@@ -3,8 +3,6 @@
 #pragma once
 #include <nanobind/nanobind.h>
 
-#include <filesystem>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,8 +11,18 @@
 
 namespace ewa::python {
 
-/// names: a list of them, or a text of names with commas. Throws InputError, also for LPIPS without its weights.
-Meter meter_of(nanobind::handle names, const std::optional<std::filesystem::path>& lpips_weights);
+/// The metrics of a call beside PSNR and SSIM.
+struct AskedMetrics {
+    Meter meter;
+    std::vector<std::string> lpips;  // those that the Python package lpips measures
+};
+
+/// names: a list of them, or a text of names with commas. Throws InputError, and what ewa._lpips raises where a network is missing.
+AskedMetrics asked_metrics(nanobind::handle names);
+
+/// The figures with these names of AskedMetrics::lpips. Arguments as in Meter::measure. Takes the interpreter. Throws what Python raises.
+std::vector<Figure> lpips_figures(const std::vector<std::string>& names, const Image& image,
+                                  const Image& reference, const Image& weights);
 
 /// psnr, ssim and the others under their names.
 nanobind::dict figures_dict(double psnr, double ssim, const std::vector<Figure>& figures);

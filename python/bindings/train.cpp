@@ -5,6 +5,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <tuple>
@@ -27,6 +28,7 @@
 #include "metrics.h"
 #include "options.h"
 #include "report/run_file_names.h"
+#include "run/evaluation.h"
 #include "run/first_checks.h"
 #include "run/option_table.h"
 #include "run/photo_background.h"
@@ -358,13 +360,25 @@ Training resume(const std::filesystem::path& named, const ObjectOrPath<LoadedDat
     return training;
 }
 
+/// Adds figures with these names to each frame, and their means to the evaluation.
+void add_figures(Evaluation& evaluation, const std::vector<std::string>& names,
+                 const std::vector<std::vector<Figure>>& of_frames) {
+    const size_t first = evaluation.figures.size(), count = of_frames.size();
+    for (const std::string& name : names)
+        evaluation.figures.push_back({name, count == 0 ? std::nan("") : 0.0});
+    for (size_t i = 0; i < count; ++i)
+        for (size_t k = 0; k < names.size(); ++k) {
+            evaluation.frames[i].figures.push_back(of_frames[i][k]);
+            evaluation.figures[first + k].value += of_frames[i][k].value / double(count);
+        }
+}
+
 Evaluation evaluate_splats(const ObjectOrPath<Splats>& given_splats,
                            const ObjectOrPath<LoadedDataset>& given_dataset, nb::handle frames,
-                           nb::handle metrics, const std::optional<std::filesystem::path>& lpips_weights,
-                           nb::handle background, std::optional<bool> antialias,
+                           nb::handle metrics, nb::handle background, std::optional<bool> antialias,
                            std::optional<std::string> kernel, const std::string& integrator,
                            std::optional<int> samples, bool points, std::optional<int> nearest) {
-    const Measures measures{.meter = meter_of(metrics, lpips_weights)};
+    const AskedMetrics asked = asked_metrics(metrics);
     const Opened<LoadedDataset> dataset(given_dataset, open_dataset);
     const Opened<Splats> splats(given_splats, open_splats);
     std::vector<int> chosen = frames.is_none() ? split_frames(*dataset->dataset, dataset->test_every).test
@@ -378,9 +392,17 @@ Evaluation evaluate_splats(const ObjectOrPath<Splats>& given_splats,
         use_background(options, background);
     Gaussians fitted;
     const Gaussians& gaussians = fitted_to(options.kernel, *splats, fitted);
+    std::vector<std::vector<Figure>> lpips;  // of each view
+    const auto on_view = [&](size_t, const train::RenderedView& view, const EvalFrame&) {
+        lpips.push_back(lpips_figures(asked.lpips, view.rendering, view.photo, view.weights));
+    };
+    check(*dataset->dataset, chosen);
     const DeviceWork work;
-    return evaluate(work.device(), gaussians, *dataset->dataset, chosen, options, {}, check_signals,
-                    measures);
+    Evaluation evaluation =
+        train::evaluate_views(train::view_renderer_of(work.device(), gaussians, options), *dataset->dataset,
+                              chosen, options, {}, check_signals, on_view, {.meter = asked.meter});
+    add_figures(evaluation, asked.lpips, lpips);
+    return evaluation;
 }
 
 std::string report_text(const StepReport& report) {
@@ -539,19 +561,19 @@ void bind_train(nb::module_& module) {
     module.attr("_argument_names") = argument_names();
     module.attr("_value_words") = value_words();
     module.def("evaluate", evaluate_splats, "splats"_a, "dataset"_a, "frames"_a = nb::none(), nb::kw_only(),
-               "metrics"_a = nb::tuple(), "lpips_weights"_a = nb::none(), "background"_a = nb::none(),
-               "antialias"_a = nb::none(), "kernel"_a = nb::none(), "integrator"_a = "splat",
-               "samples"_a = nb::none(), "points"_a = false, "nearest"_a = nb::none(),
+               "metrics"_a = nb::tuple(), "background"_a = nb::none(), "antialias"_a = nb::none(),
+               "kernel"_a = nb::none(), "integrator"_a = "splat", "samples"_a = nb::none(),
+               "points"_a = false, "nearest"_a = nb::none(),
                nb::sig("def evaluate(splats: " EWA_SPLATS_TYPE ", dataset: " EWA_DATASET_TYPE
                        ", frames: collections.abc.Sequence[int] | None = None, *, "
                        "metrics: str | collections.abc.Sequence[str] = (), "
-                       "lpips_weights: str | os.PathLike[str] | None = None, background: "
-                       "numpy.typing.ArrayLike | str | None = None, " EWA_LOOK_TYPES ") "
+                       "background: numpy.typing.ArrayLike | str | None = None, " EWA_LOOK_TYPES ") "
                        "-> Evaluation"),
                "Renders frames and compares each with its image: every eighth frame unless given, those that "
                "Trainer leaves "
                "out. metrics: names of docs/figures.md that are measured beside PSNR and SSIM; \"all\" names "
-               "all. background: that of the run that dataset is, else black, unless given. Ctrl-C ends it.");
+               "all but LPIPS. background: that of the run that dataset is, else black, unless given. Ctrl-C "
+               "ends it.");
 }
 
 }  // namespace ewa::python

@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The metrics of ewa eval and ewa compare against other implementations: flip-evaluator, scikit-image where it is installed,
-Pillow, TensorBoard, and the formulas of gsplat, multinerf, Wang and lpips in numpy."""
+Pillow, TensorBoard, and the formulas of gsplat, multinerf and Wang in numpy."""
 
 import json
 import math
-import os
 import pathlib
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -18,10 +15,6 @@ import ewa
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 STILL_LIFE = ROOT / "scenes/still_life"
 CLOSE = 1e-4
-VGG = ((0, 3, 64, 3), (2, 64, 64, 3), (5, 64, 128, 3), (7, 128, 128, 3), (10, 128, 256, 3), (12, 256, 256, 3), (14, 256, 256, 3),
-       (17, 256, 512, 3), (19, 512, 512, 3), (21, 512, 512, 3), (24, 512, 512, 3), (26, 512, 512, 3), (28, 512, 512, 3))
-ALEX = ((0, 3, 64, 11), (3, 64, 192, 5), (6, 192, 384, 3), (8, 384, 256, 3), (10, 256, 256, 3))
-NETWORKS = {"vgg": (VGG, {2, 7, 14, 21, 28}, {5, 10, 17, 24}), "alex": (ALEX, {0, 3, 6, 8, 10}, {3, 6})}
 
 
 def picture(width, height, seed):
@@ -53,8 +46,7 @@ def pair(tmp_path_factory):
 @pytest.fixture(scope="module")
 def figures(pair, program):
     file = pair[0].parent / "figures.json"
-    output = program("compare", *pair[:2], "--metrics", "all", "--json", file)
-    assert "lpips_vgg and lpips_alex not computed: --lpips-weights FILE" in output
+    program("compare", *pair[:2], "--metrics", "all", "--json", file)
     return json.loads(file.read_text())
 
 
@@ -178,84 +170,6 @@ def test_bands(pair, figures):
     assert -10 * math.log10(total) == pytest.approx(figures["psnr"], abs=CLOSE)
 
 
-def features(network, weights, image):
-    """The compared layers of a network, in float64."""
-    layers, compared, pooled = NETWORKS[network]
-    maps = ((image - [-0.030, -0.088, -0.188]) / [0.458, 0.448, 0.450]).transpose(2, 0, 1)
-    for layer, inputs, outputs, kernel in layers:
-        if layer in pooled:
-            side = 2 if network == "vgg" else 3
-            views = np.lib.stride_tricks.sliding_window_view(maps, (side, side), (1, 2))
-            maps = views[:, ::2, ::2].max((-1, -2))
-        padding, stride = (2, 4) if kernel == 11 else (kernel // 2, 1)
-        maps = np.pad(maps, ((0, 0), (padding, padding), (padding, padding)))
-        views = np.lib.stride_tricks.sliding_window_view(maps, (kernel, kernel), (1, 2))[:, ::stride, ::stride]
-        filters = weights[f"{network}.features.{layer}.weight"].astype(float)
-        maps = np.tensordot(filters, views, ((1, 2, 3), (0, 3, 4)))
-        maps = np.maximum(0, maps + weights[f"{network}.features.{layer}.bias"][:, None, None])
-        if layer in compared:
-            yield maps / (np.sqrt(np.sum(maps**2, 0)) + 1e-10)
-
-
-def lpips(network, weights, a, b):
-    distance = 0
-    for k, (one, other) in enumerate(zip(features(network, weights, a), features(network, weights, b))):
-        distance += np.mean(np.tensordot(weights[f"{network}.lin.{k}.weight"].ravel(), (one - other) ** 2, 1))
-    return distance
-
-
-@pytest.fixture(scope="module")
-def networks(tmp_path_factory):
-    """A file that scripts/lpips-weights writes from a module that stands in for lpips, and its arrays."""
-    folder = tmp_path_factory.mktemp("networks")
-    (folder / "lpips.py").write_text("""
-import numpy as np
-from pathlib import Path
-
-class Tensor:
-    def __init__(self, array): self.array = array
-    def cpu(self): return self
-    def numpy(self): return self.array
-
-class LPIPS:
-    def __init__(self, net, verbose): self.net = net
-    def state_dict(self):
-        arrays = np.load(Path(__file__).parent / "arrays.npz")
-        state = {"scaling_layer.shift": Tensor(np.zeros(3)), "lins.0.model.1.weight": Tensor(np.zeros(1))}
-        for name in arrays.files:
-            network, kind, number, *rest = name.split(".")
-            if network == self.net:
-                key = f"net.slice7.{number}.{rest[0]}" if kind == "features" else f"lin{number}.model.1.weight"
-                state[key] = Tensor(arrays[name])
-        return state
-""")
-    random, arrays = np.random.default_rng(5), {}
-    for network, (layers, compared, _) in NETWORKS.items():
-        for layer, inputs, outputs, kernel in layers:
-            scale = math.sqrt(2 / (inputs * kernel * kernel))
-            arrays[f"{network}.features.{layer}.weight"] = random.normal(scale=scale, size=(outputs, inputs, kernel, kernel)).astype("f4")
-            arrays[f"{network}.features.{layer}.bias"] = random.normal(scale=0.05, size=outputs).astype("f4")
-        for k, layer in enumerate(sorted(compared)):
-            channels = next(row[2] for row in layers if row[0] == layer)
-            arrays[f"{network}.lin.{k}.weight"] = random.uniform(0, 2, (1, channels, 1, 1)).astype("f4")
-    np.savez(folder / "arrays.npz", **arrays)
-    file = folder / "lpips.safetensors"
-    subprocess.run([sys.executable, ROOT / "scripts/lpips-weights", file], check=True, env={**os.environ, "PYTHONPATH": str(folder)})
-    return file, arrays
-
-
-def test_lpips(tmp_path, program, networks):
-    b = saved(tmp_path / "b.png", picture(71, 53, 8))
-    a = saved(tmp_path / "a.png", b + np.random.default_rng(9).normal(scale=0.08, size=b.shape))
-    program("compare", tmp_path / "a.png", tmp_path / "b.png", "--metrics", "lpips", "--lpips-weights", networks[0],
-            "--json", tmp_path / "j")
-    measured = json.loads((tmp_path / "j").read_text())
-    for network in NETWORKS:
-        expected = lpips(network, networks[1], 2 * a - 1, 2 * b - 1)
-        assert expected > 0.01
-        assert measured[f"lpips_{network}"] == pytest.approx(expected, abs=CLOSE)
-
-
 def evaluated(program, folder, downscale, *options):
     """The figures of the first image by ewa eval, its render, and its file."""
     data = ewa.Dataset(STILL_LIFE, downscale=downscale)
@@ -269,21 +183,20 @@ def evaluated(program, folder, downscale, *options):
     return figures, np.clip(np.asarray(render, float), 0, 1), Image.open(next(STILL_LIFE.rglob(frame.name))).convert("RGB")
 
 
-def test_protocol_of_inria(tmp_path, program, networks):
-    """8-bit images that Pillow resizes; LPIPS of values in 0..1."""
-    figures, a, photo = evaluated(program, tmp_path, 4, "--protocol", "inria", "--lpips-weights", networks[0])
+def test_protocol_of_inria(tmp_path, program):
+    """8-bit images that Pillow resizes."""
+    figures, a, photo = evaluated(program, tmp_path, 4, "--protocol", "inria")
     a, b = np.floor(255 * a + 0.5) / 255, np.asarray(photo.resize((a.shape[1], a.shape[0]))) / 255.0
-    assert set(figures) == {"name", "psnr", "ssim", "lpips_vgg"}
+    assert set(figures) == {"name", "psnr", "ssim"}
     assert figures["psnr"] == pytest.approx(psnr(a, b), abs=1e-3)  # the resize may differ in its last bit
     assert figures["ssim"] == pytest.approx(ssim_and_contrast(a, b, valid=False)[0], abs=CLOSE)
-    assert figures["lpips_vgg"] == pytest.approx(lpips("vgg", networks[1], a, b), abs=CLOSE)
 
 
 def test_protocol_of_nerfbaselines(tmp_path, program):
     """8-bit images, of which the render's lose their fraction; SSIM of windows inside the image."""
     figures, a, photo = evaluated(program, tmp_path, 1, "--protocol", "nerfbaselines")
     a, b = np.floor(255 * a) / 255, np.asarray(photo) / 255.0
-    assert set(figures) == {"name", "psnr", "ssim", "lpips_vgg", "lpips_alex"} and figures["lpips_vgg"] is None
+    assert set(figures) == {"name", "psnr", "ssim"}
     assert figures["psnr"] == pytest.approx(psnr(a, b), abs=CLOSE)
     assert figures["ssim"] == pytest.approx(ssim_and_contrast(a, b)[0], abs=CLOSE)
 

@@ -175,7 +175,6 @@ COMMAND_LINE = {
     "frames",
     "inria",
     "keep",
-    "lpips-weights",
     "metrics",
     "output",
     "protocol",

@@ -4,12 +4,15 @@
 import json
 import math
 import pickle
+import sys
+import types
 
 import numpy as np
 import pytest
 
 import ewa
 from conftest import make_splats
+from ewa import _lpips
 
 RANDOM = np.random.default_rng(0)
 REFERENCE = RANDOM.uniform(size=(40, 60, 3)).astype(np.float32)
@@ -54,7 +57,6 @@ def test_weights_count_pixels():
     [
         ((IMAGE, REFERENCE[1:]), {}, "pictures of 60 x 40 x 3 and 60 x 39 x 3"),
         ((IMAGE, REFERENCE, "flpi"), {}, "did you mean flip"),
-        ((IMAGE, REFERENCE, ["lpips"]), {}, "lpips needs lpips_weights"),
         ((IMAGE[0], REFERENCE), {}, "image has the shape"),
         ((IMAGE, REFERENCE), dict(weights=np.ones((3, 3, 3))), "weights has the shape"),
     ],
@@ -63,6 +65,94 @@ def test_wrong_metrics(arguments, options, text):
     with pytest.raises(ValueError, match=text) as found:
         ewa.metrics(*arguments, **options)
     assert "\n" not in str(found.value)
+
+
+@pytest.fixture
+def package(monkeypatch):
+    """Stands in for lpips: the mean absolute difference, twice as high with AlexNet, and a map of it where `spatial` asks for one."""
+    torch = pytest.importorskip("torch")
+    made = []
+
+    class Network:
+        def __init__(self, net, verbose):
+            assert not verbose
+            made.append(net)
+            self.factor, self.spatial = {"vgg": 1, "alex": 2}[net], False
+
+        def __call__(self, a, b):
+            assert a.dtype == b.dtype == torch.float32 and a.shape[:2] == b.shape[:2] == (1, 3)
+            assert max(a.abs().max(), b.abs().max()) <= 1
+            found = self.factor * (a - b).abs().mean(1, keepdim=True)
+            return found if self.spatial else found.mean((2, 3), keepdim=True)
+
+    module = types.ModuleType("lpips")
+    module.LPIPS = Network
+    monkeypatch.setitem(sys.modules, "lpips", module)
+    _lpips.network.cache_clear()
+    yield made
+    _lpips.network.cache_clear()
+
+
+def test_lpips_is_that_of_the_package(package):
+    expected = np.mean(np.abs(2 * IMAGE.astype(float) - 2 * REFERENCE))
+    found = ewa.metrics(IMAGE, REFERENCE, "LPIPS,flip")
+    assert list(found) == ["psnr", "ssim", "flip", "lpips_vgg", "lpips_alex"]
+    assert found["lpips_vgg"] == pytest.approx(expected, abs=1e-6)
+    assert found["lpips_alex"] == pytest.approx(2 * expected, abs=1e-6)
+    assert list(ewa.metrics(IMAGE, REFERENCE, ["lpips_alex"])) == ["psnr", "ssim", "lpips_alex"]
+    assert package == ["vgg", "alex"], "each network is loaded once"
+    opaque = np.ones((40, 60, 1), np.float32)
+    with_alpha = ewa.metrics(*(np.concatenate([i, opaque], -1) for i in (IMAGE, REFERENCE)), "lpips_vgg")
+    assert with_alpha["lpips_vgg"] == pytest.approx(expected, abs=1e-6)
+    small = ewa.metrics(IMAGE[:20], REFERENCE[:20], "lpips")
+    assert math.isnan(small["lpips_alex"]) and not math.isnan(small["lpips_vgg"])
+
+
+def test_pixels_of_weight_0_do_not_count_in_lpips(package):
+    weights = np.zeros((40, 60))
+    weights[:, 30:] = 1
+    half = ewa.metrics(IMAGE, REFERENCE, "lpips_vgg", weights=weights)["lpips_vgg"]
+    assert half == pytest.approx(np.mean(np.abs(2 * IMAGE - 2 * REFERENCE)[:, 30:]), abs=1e-6)
+    assert ewa.metrics(IMAGE, REFERENCE, "lpips_vgg")["lpips_vgg"] != pytest.approx(half, abs=1e-6)
+    assert math.isnan(ewa.metrics(IMAGE, REFERENCE, "lpips", weights=0 * weights)["lpips_vgg"])
+
+
+def test_an_evaluation_has_lpips(package, still_life):
+    splats = ewa.Splats.from_points(still_life.points, still_life.point_colors)
+    result = ewa.evaluate(splats, still_life, metrics=["lpips_vgg", "flip"])
+    assert list(result.metrics) == ["psnr", "ssim", "flip", "lpips_vgg"]
+    first = result.frames[0]
+    at = [frame.name for frame in still_life.frames].index(first.name)
+    frame = still_life.frames[at]
+    render = np.asarray(ewa.render(splats, still_life.viewmats[at], still_life.Ks[at], frame.width, frame.height).color)
+    image = still_life.images[at]
+    assert first.metrics["lpips_vgg"] == pytest.approx(np.mean(np.abs(2 * render.clip(0, 1) - 2 * image)), abs=1e-4)
+    mean = np.mean([frame.metrics["lpips_vgg"] for frame in result.frames])
+    assert mean == pytest.approx(result.metrics["lpips_vgg"], abs=1e-6)
+
+
+def test_lpips_without_the_package_names_it(monkeypatch, still_life):
+    monkeypatch.setitem(sys.modules, "lpips", None)
+    _lpips.network.cache_clear()
+    for call in (
+        lambda: ewa.metrics(IMAGE, REFERENCE, "flip,lpips"),
+        lambda: ewa.evaluate(make_splats(), still_life, metrics=["lpips_alex"]),
+    ):
+        with pytest.raises(ewa.InputError, match="pip install lpips") as found:
+            call()
+        assert "\n" not in str(found.value)
+
+
+def test_a_network_that_cannot_be_loaded_is_named_in_one_line(monkeypatch):
+    def refuse(net, verbose):
+        raise OSError("no\nnetwork")
+
+    module = types.ModuleType("lpips")
+    module.LPIPS = refuse
+    monkeypatch.setitem(sys.modules, "lpips", module)
+    _lpips.network.cache_clear()
+    with pytest.raises(ewa.InputError, match="metrics: lpips_vgg: no network"):
+        ewa.metrics(IMAGE, REFERENCE, "lpips_vgg")
 
 
 def test_an_evaluation_has_metrics(still_life, program, tmp_path):

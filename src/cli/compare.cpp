@@ -154,10 +154,7 @@ void check_files(const CompareArguments& arguments, const Sides& sides, const Im
     const bool maps = !arguments.heat_map.empty() && !pairs.pairs.empty() && !pairs.pairs[0].name.empty();
     if (maps) io::check_output_folder("--heat-map", arguments.heat_map, sides.cameras);
     std::vector<NamedFile> written = {{"--json", arguments.json}};
-    std::vector<NamedFile> read = {{"A", inputs.a},
-                                   {"B", inputs.b},
-                                   {"--cameras", inputs.cameras},
-                                   {"--lpips-weights", arguments.metrics.lpips_weights}};
+    std::vector<NamedFile> read = {{"A", inputs.a}, {"B", inputs.b}, {"--cameras", inputs.cameras}};
     for (const ImagePair& pair : pairs.pairs) {
         written.push_back({"--heat-map", heat_map_file(pair, arguments)});
         if (!sides.a->is_scene) read.push_back({"an image of A", sides.a->place(pair.a)});
@@ -201,12 +198,11 @@ void print(const CompareTotals& totals, size_t pictures) {
             core::one_line(totals.worst->name));
 }
 
-void print_all_figures(const std::vector<Compared>& all, const CompareTotals& totals,
-                       const CompareArguments& arguments) {
+void print_all_figures(const std::vector<Compared>& all, const CompareTotals& totals) {
     std::vector<FigureRow> rows;
     for (const Compared& one : all) rows.push_back({one.name, one.figures});
     if (rows.size() > 1) rows.push_back({"mean", totals.figures});
-    fmt::print("{}{}", figure_table(rows), lpips_note(totals.figures, arguments.metrics.lpips_weights));
+    fmt::print("{}", figure_table(rows));
 }
 
 /// One line: a folder of all images is often compared with renders of a few. --json names them all.
@@ -236,7 +232,7 @@ int run(const CompareArguments& arguments) {
 
     const CompareTotals totals = totals_of(all);
     print(totals, all.size());
-    print_all_figures(all, totals, arguments);
+    print_all_figures(all, totals);
     print_unpaired(*sides.a, pairs.only_a);
     print_unpaired(*sides.b, pairs.only_b);
     for (const ComparedSide* side : {sides.a.get(), sides.b.get()})

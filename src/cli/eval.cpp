@@ -58,7 +58,7 @@ std::string line_of(double psnr, double ssim, const std::vector<Figure>& figures
     return fmt::format("PSNR {:.3f} dB{}  SSIM {:.5f}", psnr, beside, ssim);
 }
 
-void print_figures(const Evaluation& evaluation, const MetricArguments& arguments) {
+void print_figures(const Evaluation& evaluation) {
     const auto others = [](std::vector<Figure> figures) {
         std::erase_if(figures, [](const Figure& figure) { return figure.name == kFittedMetric; });
         return figures;
@@ -66,15 +66,14 @@ void print_figures(const Evaluation& evaluation, const MetricArguments& argument
     std::vector<FigureRow> rows;
     for (const EvalFrame& frame : evaluation.frames) rows.push_back({frame.name, others(frame.figures)});
     rows.push_back({"mean", others(evaluation.figures)});
-    fmt::print("{}{}", figure_table(rows), lpips_note(evaluation.figures, arguments.lpips_weights));
+    fmt::print("{}", figure_table(rows));
 }
 
 int run(const EvalArguments& arguments) {
     RenderOptions options = arguments.views.draw.options();
     const std::vector<NamedFile> written{{"--json", arguments.json}};
-    check_command_outputs(written, {{"SPLATS", arguments.views.splats},
-                                    {"DATASET", arguments.views.dataset},
-                                    {"--lpips-weights", arguments.metrics.lpips_weights}});
+    check_command_outputs(written,
+                          {{"SPLATS", arguments.views.splats}, {"DATASET", arguments.views.dataset}});
     const Measures measures = arguments.metrics.measures();
     const Gaussians gaussians = arguments.views.draw.load(arguments.views.splats, options);
     const auto [dataset, refined, frames, folder] =
@@ -110,7 +109,7 @@ int run(const EvalArguments& arguments) {
         fmt::print("mean of {} ({})  {}  in {:.2f} s\n", core::counted(evaluation.frames.size(), "frame"),
                    arguments.split, line_of(evaluation.psnr, evaluation.ssim, evaluation.figures),
                    evaluation.seconds);
-    print_figures(evaluation, arguments.metrics);
+    print_figures(evaluation);
     if (depths) fmt::print("{}", depth_table(*depths));
     if (!arguments.json.empty()) {
         report::Json json = to_json(evaluation, refined, arguments.metrics.protocol);

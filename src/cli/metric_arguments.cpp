@@ -51,33 +51,19 @@ std::string table_part(const std::vector<FigureRow>& rows, size_t name_width, si
 Measures MetricArguments::measures() const {
     Measures result;
     std::string list = metrics;
-    if (protocol == "nerfbaselines") {
-        result.protocol = Protocol::nerfbaselines;
-        if (list.empty()) list = "lpips";
-    } else if (protocol == "inria") {
-        result.protocol = Protocol::inria;
-        if (list.empty()) list = "lpips_vgg";
-    }
+    if (protocol == "nerfbaselines") result.protocol = Protocol::nerfbaselines;
+    if (protocol == "inria") result.protocol = Protocol::inria;
     if (fitted && protocol == "ewa") list.append(list.empty() ? "" : ",").append(kFittedMetric);
-    if (lpips_weights.empty() && core::lower(metrics).find("lpips") != std::string::npos)
-        throw InputError(
-            "--metrics " + metrics +
-            ": LPIPS needs its networks; scripts/lpips-weights FILE makes them for --lpips-weights FILE");
-    try {
-        if (!list.empty())
-            result.meter = Meter(metrics_named(list), lpips_weights, result.protocol == Protocol::inria);
-    } catch (const InputError& error) {
-        throw InputError((lpips_weights.empty() ? "--metrics: " : "") + std::string(error.what()));
-    }
+    if (!list.empty()) result.meter = Meter(metrics_named(list));
     return result;
 }
 
 void add_metric_options(CLI::App& app, MetricArguments& arguments) {
     std::string names;
     for (const Metric& metric : all_metrics()) names += (names.empty() ? "" : ", ") + metric.name;
-    app.add_option("--metrics", arguments.metrics,
-                   "Metrics beside PSNR and SSIM: all, bands, lpips, or some of " + names +
-                       ", with commas between them")
+    app.add_option(
+           "--metrics", arguments.metrics,
+           "Metrics beside PSNR and SSIM: all, bands, or some of " + names + ", with commas between them")
         ->transform(CLI::Validator(
             [](std::string& text) {
                 try {
@@ -89,9 +75,6 @@ void add_metric_options(CLI::App& app, MetricArguments& arguments) {
             },
             ""))
         ->type_name("LIST");
-    app.add_option("--lpips-weights", arguments.lpips_weights,
-                   "Networks of LPIPS, as scripts/lpips-weights writes them. LPIPS needs them")
-        ->type_name("FILE");
 }
 
 void add_protocol_option(CLI::App& app, MetricArguments& arguments) {
@@ -125,18 +108,6 @@ std::string figures_text(const std::vector<Figure>& figures) {
         text += (text.empty() ? "" : ", ") + figure.name + " " +
                 (std::isnan(figure.value) ? "not computed" : value_text(figure));
     return text;
-}
-
-std::string lpips_note(const std::vector<Figure>& figures, const std::filesystem::path& weights) {
-    std::string missing;
-    for (const Figure& figure : figures)
-        if (figure.name.starts_with("lpips_") && std::isnan(figure.value))
-            missing += (missing.empty() ? "" : " and ") + figure.name;
-    if (missing.empty()) return "";
-    return missing + (weights.empty()
-                          ? " not computed: --lpips-weights FILE names the networks, which "
-                            "scripts/lpips-weights makes\n"
-                          : " not computed: the file lacks the network, or an image is too small\n");
 }
 
 void add_figures(report::Json& json, const std::vector<Figure>& figures) {

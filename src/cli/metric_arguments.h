@@ -3,7 +3,6 @@
 #pragma once
 #include <CLI/CLI.hpp>
 
-#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,15 +16,14 @@ namespace ewa::cli {
 inline constexpr const char* kFittedMetric = "fitted_psnr";
 
 struct MetricArguments {
-    std::string metrics;  // a list; empty: those of the protocol
-    std::filesystem::path lpips_weights;
+    std::string metrics;  // a list; empty: none
     std::string protocol = "ewa";
     bool fitted = false;  // kFittedMetric is measured, too, unless the protocol is another program's
 
-    /// Throws InputError, also if the file of weights cannot be read.
+    /// Throws InputError.
     Measures measures() const;
 };
-/// --metrics and --lpips-weights.
+/// --metrics.
 void add_metric_options(CLI::App& app, MetricArguments& arguments);
 /// --protocol.
 void add_protocol_option(CLI::App& app, MetricArguments& arguments);
@@ -39,8 +37,6 @@ struct FigureRow {
 std::string figure_table(const std::vector<FigureRow>& rows);
 /// "cc_psnr 24.312, flip 0.08123"; empty without figures.
 std::string figures_text(const std::vector<Figure>& figures);
-/// One line if an LPIPS is not computed, else nothing. weights: MetricArguments::lpips_weights.
-std::string lpips_note(const std::vector<Figure>& figures, const std::filesystem::path& weights);
 
 /// Adds them by their names. A figure that is not finite is null.
 void add_figures(report::Json& json, const std::vector<Figure>& figures);

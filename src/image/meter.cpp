@@ -10,9 +10,7 @@
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/metrics.h"
-#include "image/lpips.h"
 #include "image/metric.h"
-#include "image/tensors.h"
 
 namespace ewa {
 namespace {
@@ -24,15 +22,11 @@ constexpr std::array<const char*, image::kBands> kBandNames = {"psnr_1px", "psnr
 std::vector<std::string> named_by(const std::string& word) {
     std::vector<std::string> names;
     for (const Metric& metric : all_metrics())
-        if (word == "all" || word == metric.name || (word == "lpips" && metric.name.starts_with("lpips_")) ||
+        if (word == "all" || word == metric.name ||
             (word == "bands" &&
              std::find(kBandNames.begin(), kBandNames.end(), metric.name) != kBandNames.end()))
             names.push_back(metric.name);
     return names;
-}
-
-double distance_of(const image::Lpips* network, const Image& a, const Image& b, const Image& weights) {
-    return network ? network->distance(a, b, weights) : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace
@@ -53,14 +47,12 @@ const std::vector<Metric>& all_metrics() {
         {kBandNames[1], "PSNR of details of 2 to 4 px, dB", 3},
         {kBandNames[2], "PSNR of details of 4 to 8 px, dB", 3},
         {kBandNames[3], "PSNR of details of 8 to 16 px, dB", 3},
-        {kBandNames[4], "PSNR of all that is larger than 16 px, dB", 3},
-        {"lpips_vgg", "LPIPS with VGG16", 5},
-        {"lpips_alex", "LPIPS with AlexNet", 5}};
+        {kBandNames[4], "PSNR of all that is larger than 16 px, dB", 3}};
     return metrics;
 }
 
 std::vector<std::string> metrics_named(const std::string& list) {
-    std::vector<std::string> words = {"all", "bands", "lpips"};
+    std::vector<std::string> words = {"all", "bands"};
     for (const Metric& metric : all_metrics()) words.push_back(metric.name);
     std::set<std::string> wanted;
     std::istringstream stream(list + ",");
@@ -75,27 +67,9 @@ std::vector<std::string> metrics_named(const std::string& list) {
     return names;
 }
 
-Meter::Meter(const std::vector<std::string>& names, const std::filesystem::path& lpips_weights,
-             bool lpips_of_unit_range) {
+Meter::Meter(const std::vector<std::string>& names) {
     for (const std::string& name : names)
         if (name != "psnr" && name != "ssim") names_.push_back(name);
-    const auto asked = [&](const char* name) {
-        return std::find(names_.begin(), names_.end(), name) != names_.end();
-    };
-    const bool vgg = asked("lpips_vgg"), alex = asked("lpips_alex");
-    if (lpips_weights.empty() || !(vgg || alex)) return;
-    const auto tensors = image::read_tensors(lpips_weights);
-    const auto has = [&](const char* prefix) {
-        const auto found = tensors.lower_bound(prefix);
-        return found != tensors.end() && found->first.starts_with(prefix);
-    };
-    const auto network = [&](image::Lpips::Network which) {
-        return std::make_shared<const image::Lpips>(which, tensors, lpips_weights.string(),
-                                                    lpips_of_unit_range);
-    };
-    // A file may have one of two networks. Without any that is asked for, the first that is missing is an error.
-    if (vgg && (has("vgg.") || !(alex && has("alex.")))) vgg_ = network(image::Lpips::Network::vgg);
-    if (alex && (has("alex.") || !vgg_)) alex_ = network(image::Lpips::Network::alex);
 }
 
 std::vector<Figure> Meter::measure(const Image& image, const Image& reference, const Image& weights) const {
@@ -121,8 +95,6 @@ std::vector<Figure> Meter::measure(const Image& image, const Image& reference, c
         if (name == "cc2_ssim") return ssim(quadratic, reference, weights);
         if (name == "ms_ssim") return image::ms_ssim(image, reference, weights);
         if (name == "flip") return image::flip(image, reference, weights);
-        if (name == "lpips_vgg") return distance_of(vgg_.get(), image, reference, weights);
-        if (name == "lpips_alex") return distance_of(alex_.get(), image, reference, weights);
         const auto band = std::find(kBandNames.begin(), kBandNames.end(), name);
         return band == kBandNames.end() ? std::numeric_limits<double>::quiet_NaN()
                                         : bands[size_t(band - kBandNames.begin())];

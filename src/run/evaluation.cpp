@@ -113,8 +113,7 @@ std::vector<Appearance> for_new_views(const NewViewAppearance& appearance, const
 
 Measures measures_of(const RunOptions& options) {
     Measures measures;
-    if (!options.metrics.empty())
-        measures.meter = Meter(metrics_named(options.metrics), options.lpips_weights);
+    if (!options.metrics.empty()) measures.meter = Meter(metrics_named(options.metrics));
     return measures;
 }
 

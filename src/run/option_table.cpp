@@ -216,15 +216,6 @@ RunOption metrics_option() {
         });
 }
 
-RunOption lpips_weights_option() {
-    RunOption option{"lpips-weights", "FILE",
-                     "With --metrics: the networks of LPIPS, as scripts/lpips-weights writes them",
-                     kDoesNotDecide};
-    option.get = [](const RunOptions& options) { return options.lpips_weights.string(); };
-    option.set = [](RunOptions& options, const std::string& text) { options.lpips_weights = text; };
-    return option;
-}
-
 RunOption tensorboard_option() {
     RunOption option = flag("tensorboard", "Also write the curves of metrics.jsonl in a file for TensorBoard",
                             [](RunOptions& o) -> bool& { return o.tensorboard; });
@@ -418,7 +409,6 @@ std::vector<Row> rows() {
              "eval-every", "N", "Evaluate the held-out views every N steps. 0: only at the end",
              kDoesNotDecide, [](RunOptions& o) -> int& { return o.eval_every; }, 0, kMostSteps)},
         {"Output", "", metrics_option()},
-        {"Output", "", lpips_weights_option()},
         {"Output", "", tensorboard_option()},
         {"Output", "",
          number<int>(

@@ -27,7 +27,6 @@ const std::filesystem::path& checked_folder(const RunInput& input) {
     if (!starts_by_word(input.options.init))
         read.push_back({"--init", input.options.init_folder / input.options.init});
     read.push_back({"DATASET", input.options.scene});
-    read.push_back({"--lpips-weights", input.options.lpips_weights});
     core::check_outputs(written, read);
     return folder;
 }

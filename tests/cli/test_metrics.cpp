@@ -99,19 +99,10 @@ TEST_F(Metrics, AMaskLimitsFigures) {
     }
 }
 
-TEST_F(Metrics, LpipsIsNotComputedWithoutItsWeights) {
-    for (const char* asked : {"lpips", "flip,lpips_vgg"})
-        expect_failure(eval({"--metrics", asked}), 2, "scripts/lpips-weights FILE makes them");
-    const Outcome outcome = eval({"--metrics", "all"});
-    expect_success(outcome);
-    EXPECT_NE(outcome.out.find("lpips_vgg and lpips_alex not computed: --lpips-weights FILE"),
-              std::string::npos);
-    EXPECT_TRUE(json().at("lpips_vgg").is_null());
-    EXPECT_TRUE(json()["frames"][0].at("lpips_alex").is_null());
-    write_file(folder / "w", "no weights");
-    expect_failure(eval({"--metrics", "lpips", "--lpips-weights", folder / "w"}), 2, folder / "w");
-    expect_failure(eval({"--metrics", "lpips", "--lpips-weights", folder / "nothere"}), 2, "nothere");
-    expect_failure(eval({"--lpips-weights", folder / "e.json"}), 2, "--json");
+TEST_F(Metrics, AFigureThatAnImageIsTooSmallForIsNull) {
+    expect_success(eval({"--metrics", "all"}));
+    EXPECT_TRUE(json().at("ms_ssim").is_null());
+    EXPECT_TRUE(json()["frames"][0].at("ms_ssim").is_null());
 }
 
 TEST_F(Metrics, ProtocolsNameThemselves) {
@@ -123,8 +114,6 @@ TEST_F(Metrics, ProtocolsNameThemselves) {
         EXPECT_NEAR(json()["psnr"], psnr, 0.2);
         EXPECT_NE(json()["psnr"], psnr);
         EXPECT_NEAR(json()["ssim"], ssim, 0.2);
-        EXPECT_EQ(json().contains("lpips_alex"), std::string(protocol) == "nerfbaselines");
-        EXPECT_TRUE(json().contains("lpips_vgg"));
     }
 }
 
@@ -133,9 +122,6 @@ TEST_F(Metrics, WrongNamesAreRefused) {
     expect_failure(eval({"--protocol", "nerf"}), 2, "--protocol");
     expect_failure(run_ewa({"train", folder / "data", "-o", folder / "o", "--metrics", "psnr,flop"}), 2,
                    "flop");
-    expect_failure(run_ewa({"train", folder / "data", "-o", folder / "o", "--metrics", "lpips",
-                            "--lpips-weights", folder / "s.ply"}),
-                   2, "s.ply");
 }
 
 TEST_F(Metrics, CompareHasThemForEachPairAndTheirMean) {
@@ -153,12 +139,12 @@ TEST_F(Metrics, CompareHasThemForEachPairAndTheirMean) {
 
 TEST_F(Metrics, OfEvaluationsDuringATraining) {
     const std::vector<std::string> words{
-        "train",        folder / "data", "-o", folder / "o", "--steps",        "20",     "--eval-every",
-        "10",           "--test-every",  "2",  "--metrics",  "flip,lpips_vgg", "--seed", "7",
+        "train",        folder / "data", "-o", folder / "o", "--steps",      "20",     "--eval-every",
+        "10",           "--test-every",  "2",  "--metrics",  "flip,ms_ssim", "--seed", "7",
         "--tensorboard"};
     const Outcome outcome = run_ewa(words);
     expect_success(outcome);
-    EXPECT_NE(outcome.out.find("held-out flip 0."), std::string::npos) << outcome.out;
+    EXPECT_NE(outcome.out.find("held-out ms_ssim not computed, flip 0."), std::string::npos) << outcome.out;
     std::istringstream lines(read_file(folder / "o/metrics.jsonl"));
     int evaluated = 0;
     for (std::string line; std::getline(lines, line);) {
@@ -167,7 +153,7 @@ TEST_F(Metrics, OfEvaluationsDuringATraining) {
         if (!metrics.contains("test_flip")) continue;
         ++evaluated;
         EXPECT_GT(metrics["test_flip"].get<double>(), 0);
-        EXPECT_TRUE(metrics.at("test_lpips_vgg").is_null());
+        EXPECT_TRUE(metrics.at("test_ms_ssim").is_null());
     }
     EXPECT_EQ(evaluated, 2);
     const auto summary = read_json(folder / "o/summary.json");

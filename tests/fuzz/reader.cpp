@@ -92,16 +92,6 @@ void check_scene(const io::PlyPoints& read) {
     for (const glm::dvec3& p : read.points.positions)
         EWA_REQUIRE(std::isfinite(float(p.x)) && std::isfinite(float(p.y)) && std::isfinite(float(p.z)));
 }
-#elif defined(EWA_READ_TENSORS)
-void check_scene(const std::map<std::string, image::Tensor>& tensors) {
-    const std::string text = std::to_string(tensors.size()) + " tensors";
-    for (const auto& [name, tensor] : tensors) {
-        uint64_t values = 1;
-        for (const uint64_t size : tensor.shape) values *= size;
-        EWA_REQUIRE(values == tensor.values.size());
-        for (const float value : tensor.values) EWA_REQUIRE(std::isfinite(value));
-    }
-}
 #elif defined(EWA_READ_ZIP)
 void check_scene(uint64_t bytes) {
     const std::string text = std::to_string(bytes) + " bytes";

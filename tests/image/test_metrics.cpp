@@ -6,19 +6,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <random>
 
 #include "image/metric.h"
 #include "image/pillow.h"
-#include "image/tensors.h"
 #include "support/temp_folder.h"
 
 namespace {
 
 using namespace ewa;
 using test::expect_error;
-using test::TempFolder;
 
 Image grain(int width, int height, int channels, unsigned seed) {
     Image image(width, height, channels);
@@ -28,11 +25,8 @@ Image grain(int width, int height, int channels, unsigned seed) {
     return image;
 }
 
-/// All that need no file.
 Meter every_metric() {
-    std::vector<std::string> names = metrics_named("all");
-    std::erase_if(names, [](const std::string& name) { return name.starts_with("lpips"); });
-    return Meter(names);
+    return Meter(metrics_named("all"));
 }
 
 TEST(Metrics, OfEqualImagesAreTheBest) {
@@ -139,63 +133,6 @@ TEST(Metrics, AreNamedInLists) {
     expect_error<InputError>([] { metrics_named(""); }, {"''"});
     expect_error<InputError>([] { Meter({"flip"}).measure(grain(4, 5, 3, 1), grain(5, 4, 3, 1)); },
                              {"4 x 5"});
-}
-
-/// A file of the format safetensors.
-void write_tensors(const std::filesystem::path& path, const std::string& json, size_t values,
-                   float value = 0.5f) {
-    std::ofstream file(path, std::ios::binary);
-    const uint64_t length = json.size();
-    file.write(reinterpret_cast<const char*>(&length), sizeof(length));
-    file << json;
-    for (size_t i = 0; i < values; ++i) file.write(reinterpret_cast<const char*>(&value), sizeof(value));
-}
-
-TEST(Tensors, AreReadByName) {
-    TempFolder folder;
-    write_tensors(folder / "t",
-                  R"({"__metadata__":{"format":"pt"},"a":{"dtype":"F32","shape":[2,3],"data_offsets":[0,24]},
-        "b":{"dtype":"F32","shape":[],"data_offsets":[24,28]}})",
-                  7);
-    const auto tensors = image::read_tensors(folder / "t");
-    ASSERT_EQ(tensors.size(), 2u);
-    EXPECT_EQ(tensors.at("a").shape, (std::vector<uint64_t>{2, 3}));
-    EXPECT_EQ(tensors.at("a").values, std::vector<float>(6, 0.5f));
-    EXPECT_EQ(tensors.at("b").values.size(), 1u);
-}
-
-TEST(Tensors, ADamagedFileIsNamedInOneLine) {
-    TempFolder folder;
-    const std::filesystem::path path = folder / "t";
-    const auto refused = [&](const std::string& json, size_t values, const char* reason, float value = 0.5f) {
-        write_tensors(path, json, values, value);
-        expect_error<InputError>([&] { image::read_tensors(path); }, {path.string() + ": byte", reason});
-    };
-    refused("[1]", 0, "no object");
-    refused(R"({"a":{"dtype":"F16","shape":[1],"data_offsets":[0,2]}})", 1, "another type");
-    refused(R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,4]}})", 1, "do not fill");
-    refused(R"({"a":{"dtype":"F32","shape":[4294967296,4294967296],"data_offsets":[0,0]}})", 1,
-            "do not fill");
-    refused(R"({"a":{"dtype":"F32","shape":[4],"data_offsets":[0,16]}})", 3, "the values");
-    refused(
-        R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[0,4]},"b":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}})",
-        1, "more values");
-    refused(R"({"a":{"dtype":"F32","shape":"x","data_offsets":[0,4]}})", 1, "no shape");
-    refused(R"({"a":7})", 1, "another type");
-    refused(R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}})", 1, "not finite", INFINITY);
-    std::ofstream(path, std::ios::binary) << "\x89PNG\r\n\x1a\n and more";
-    expect_error<InputError>([&] { image::read_tensors(path); }, {"no file of tensors"});
-}
-
-TEST(Lpips, AFileWithoutTheNetworkIsRefused) {
-    TempFolder folder;
-    const std::string path = folder / "t";
-    write_tensors(path, R"({"alex.features.0.weight":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}})", 1);
-    expect_error<InputError>([&] { Meter({"lpips_vgg"}, path); },
-                             {path, "vgg.features.0.weight", "scripts/lpips-weights"});
-    expect_error<InputError>([&] { Meter({"lpips_alex"}, path); }, {path, "has 1 values, not 23232"});
-    EXPECT_TRUE(
-        std::isnan(Meter({"lpips_vgg"}).measure(grain(40, 40, 3, 1), grain(40, 40, 3, 2)).front().value));
 }
 
 /// Of an edge, a box of 11 px leaves an eleventh of the step between its pixels. A ramp has nothing that it could lose.

@@ -5,7 +5,6 @@ row_eval_prints_a_table_of_all_metrics() {
     run 0 ewa eval "$RUN" --metrics all --json all.json
     says cc2_ssim
     says psnr_16px
-    says "lpips_vgg and lpips_alex not computed: --lpips-weights FILE"
     grep -q '"ms_ssim": null' all.json || fail "MS-SSIM of an image of 64x48"
 }
 

@@ -454,7 +454,6 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                              {"keep", "3"},
                                              {"max-width", "800"},
                                              {"metrics", "ms_ssim"},
-                                             {"lpips-weights", "w"},
                                              {"tensorboard", "true"},
                                              {"inria", "true"},
                                              {"device", "cpu"},
