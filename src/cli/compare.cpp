@@ -42,8 +42,7 @@ struct CompareArguments {
     std::optional<double> threshold;  // dB: the least PSNR
     std::optional<double> max_error;  // the largest difference of two values, alpha included
     double heat_scale = 0.25;
-    std::optional<double> distance;  // meshes alone have these two
-    std::string mesh_protocol;
+    std::optional<double> distance;  // meshes alone have it
 };
 
 struct Compared {
@@ -275,16 +274,14 @@ bool compares_meshes(const CLI::App& app, const CompareArguments& arguments) {
         throw InputError(core::one_line((a ? arguments.inputs.a : arguments.inputs.b).string()) +
                          " is a mesh, and the other side is none");
     if (!a) {
-        for (const auto& [option, given] : {std::pair("--distance", arguments.distance.has_value()),
-                                            std::pair("--protocol", !arguments.mesh_protocol.empty())})
-            if (given) throw InputError(std::string(option) + " is for two meshes (.gltf, .glb, .ply, .obj)");
+        if (arguments.distance) throw InputError("--distance is for two meshes (.gltf, .glb, .ply, .obj)");
         return false;
     }
     for (const CLI::Option* option : app.get_options())
         if (option->count() > 0 && !option->get_lnames().empty() && option->get_lnames()[0] != "json" &&
-            option->get_lnames()[0] != "distance" && option->get_lnames()[0] != "protocol")
+            option->get_lnames()[0] != "distance")
             throw InputError("--" + option->get_lnames()[0] +
-                             " is for images; meshes have --distance, --protocol and --json");
+                             " is for images; meshes have --distance and --json");
     return true;
 }
 
@@ -318,15 +315,11 @@ Action add_compare(CLI::App& app) {
         ->type_name("OUT");
     app.add_option(
            "--distance", arguments->distance,
-           "Of two meshes (.gltf, .glb, .ply, .obj), of which B is the true one: points within this distance "
-           "count in the F-score, in the scene's units [0.005 of B's diagonal]")
+           "Of two meshes (.gltf, .glb, .ply, .obj), of which B is the true one, or a scan (a .ply of "
+           "points): "
+           "points within this distance count in the F-score, in the scene's units [0.005 of B's diagonal]")
         ->transform(in_range(1e-12, 1e12))
         ->type_name("D");
-    app.add_option("--protocol", arguments->mesh_protocol,
-                   "Measure meshes about as this benchmark does: dtu (B in mm), or tanks-and-temples:SCENE. "
-                   "B may be a "
-                   "scan, a .ply of points")
-        ->type_name("NAME");
     app.add_option("--heat-scale", arguments->heat_scale, "Error that the heat map shows brightest")
         ->transform(in_range(1e-9, 1e9))
         ->type_name("E")
@@ -349,8 +342,7 @@ Action add_compare(CLI::App& app) {
     return [&app, arguments] {
         CompareInputs& inputs = arguments->inputs;
         if (compares_meshes(app, *arguments)) {
-            compare_meshes(
-                {inputs.a, inputs.b, arguments->json, arguments->distance, arguments->mesh_protocol});
+            compare_meshes({inputs.a, inputs.b, arguments->json, arguments->distance});
             return 0;
         }
         if (!inputs.cameras.empty()) inputs.cameras = dataset_input(inputs.cameras);

@@ -12,7 +12,6 @@
 #include "io/meshes/mesh_files.h"
 #include "mesh/distance.h"
 #include "mesh/parts.h"
-#include "mesh/protocol.h"
 
 namespace ewa::cli {
 namespace {
@@ -47,36 +46,17 @@ void describe_mesh(const char* side, const fs::path& path, const scene::MeshScen
     json[side] = to_json(topology, mesh.triangles.size());
 }
 
-/// B as a scan, as the protocol thins it.
-mesh::Surface scan_of(const fs::path& path, const mesh::Protocol& protocol) {
-    const std::vector<glm::dvec3> points = io::read_points_ply(path).points.positions;
-    return mesh::Surface(protocol.cell > 0 ? mesh::thinned(points, protocol.cell) : points);
-}
-
-mesh::SurfaceComparison measures_of(const MeshComparison& comparison, const mesh::Protocol& protocol,
-                                    const mesh::Surface& a, const mesh::Surface& b) {
-    mesh::SurfaceComparison measures{
-        .threshold = comparison.distance.value_or(protocol.threshold.value_or(kUsualDistance * b.diagonal())),
-        .farthest = protocol.farthest};
-    if (protocol.spacing > 0) {
-        measures.points_a = mesh::points_at(a, protocol.spacing);
-        measures.points_b = b.scan() ? b.size() : mesh::points_at(b, protocol.spacing);
-    }
-    return measures;
-}
-
 }  // namespace
 
 void compare_meshes(const MeshComparison& comparison) {
     check_command_outputs({{"--json", comparison.json}}, {{"A", comparison.a}, {"B", comparison.b}});
-    const mesh::Protocol protocol =
-        comparison.protocol.empty() ? mesh::Protocol() : mesh::protocol_named(comparison.protocol);
     const bool scan = !io::is_mesh(comparison.b);
     const scene::MeshScene a = io::read_mesh(comparison.a);
     const scene::MeshScene b = scan ? scene::MeshScene() : io::read_mesh(comparison.b);
-    const mesh::Surface of_a(a), of_b = scan ? scan_of(comparison.b, protocol) : mesh::Surface(b);
-    const mesh::SurfaceComparison measures = measures_of(comparison, protocol, of_a, of_b);
-    const mesh::SurfaceDifference d = mesh::difference(of_a, of_b, measures);
+    const mesh::Surface of_a(a),
+        of_b = scan ? mesh::Surface(io::read_points_ply(comparison.b).points.positions) : mesh::Surface(b);
+    const mesh::SurfaceDifference d = mesh::difference(
+        of_a, of_b, {.threshold = comparison.distance.value_or(kUsualDistance * of_b.diagonal())});
     fmt::print("accuracy {:.4g}  completeness {:.4g}  chamfer {:.4g}{}\n", d.accuracy, d.completeness,
                d.chamfer(), scan ? "" : fmt::format("  normal error {:.3g}°", d.normal_error));
     fmt::print("within {:.4g}: precision {:.2f} %  recall {:.2f} %  F-score {:.2f} %\n", d.threshold,
@@ -89,7 +69,6 @@ void compare_meshes(const MeshComparison& comparison) {
                       {"precision", d.precision},
                       {"recall", d.recall},
                       {"f_score", d.f_score()}};
-    if (!comparison.protocol.empty()) json["protocol"] = comparison.protocol;
     describe_mesh("a", comparison.a, a, json);
     if (scan) {
         fmt::print("{}: {}\n", core::one_line(comparison.b.string()), core::counted(of_b.size(), "point"));

@@ -3,14 +3,12 @@
 #pragma once
 #include <filesystem>
 #include <optional>
-#include <string>
 
 namespace ewa::cli {
 
 struct MeshComparison {
     std::filesystem::path a, b, json;
-    std::optional<double> distance;  // world units; empty: a part of B's size, or the protocol's
-    std::string protocol;            // as mesh::protocol_named; empty: none
+    std::optional<double> distance;  // world units; empty: a part of B's size
 };
 
 /// Prints how far the mesh A is from B, the true surface, which may be a scan, and writes it as JSON. Throws InputError.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <tuple>
@@ -171,15 +172,12 @@ OneWay from_to(const Surface& from, const Surface& to, size_t points, uint32_t s
         }
     });
     OneWay out;
-    size_t near = 0;
     for (const Row& row : rows) {
         out.within += row.distance <= comparison.threshold ? 1 : 0;
         out.angle += std::acos(std::min(1.0, row.cosine));
-        if (!(row.distance < comparison.farthest)) continue;
         out.mean += row.distance;
-        ++near;
     }
-    out.mean /= double(near);
+    out.mean /= double(points);
     out.within /= double(points);
     out.angle *= 180 / std::numbers::pi / double(points);
     return out;

@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <glm/vec3.hpp>
-#include <limits>
 #include <vector>
 
 #include "pathtracer/hierarchy.h"
@@ -47,16 +46,13 @@ class Surface {
     pathtracer::Hierarchy hierarchy_;
 };
 
-inline constexpr double kAllDistances = std::numeric_limits<double>::infinity();
-
 struct SurfaceComparison {
     double threshold = 0;                         // world units
     size_t points_a = 100000, points_b = 100000;  // above 0
-    double farthest = kAllDistances;              // distances from here on are no part of the means
 };
 
 struct SurfaceDifference {
-    double accuracy = 0;      // mean distance of points of A from B; NaN where all are too far
+    double accuracy = 0;      // mean distance of points of A from B
     double completeness = 0;  // mean distance of points of B from A
     double chamfer() const { return (accuracy + completeness) / 2; }
     double threshold = 0;

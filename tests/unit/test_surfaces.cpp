@@ -17,7 +17,6 @@
 #include "mesh/mesh_files.h"
 #include "mesh/middle.h"
 #include "mesh/parts.h"
-#include "mesh/protocol.h"
 #include "support/sphere_views.h"
 #include "support/temp_folder.h"
 
@@ -281,34 +280,13 @@ TEST(MeshDistance, FromAScan) {
     const mesh::Surface a(scene_of(square(1, 0)));
     const mesh::Surface scan(std::vector<glm::dvec3>{{0.25, 0.5, 0.25}, {0.75, 0.5, 0.25}, {0.5, 0.5, 30}});
     EXPECT_EQ(scan.size(), 3u);
-    const auto compared = [&](double farthest) {
-        return mesh::difference(a, scan,
-                                {.threshold = 0.3, .points_a = 1000, .points_b = 3, .farthest = farthest});
-    };
-    const mesh::SurfaceDifference all = compared(mesh::kAllDistances), near = compared(20);
-    EXPECT_NEAR(all.completeness, (0.25 + 0.25 + 30) / 3, 1e-9);
-    EXPECT_NEAR(near.completeness, 0.25, 1e-9);
-    EXPECT_NEAR(near.recall, 2.0 / 3, 1e-9);
-    EXPECT_TRUE(std::isnan(near.normal_error));
-    EXPECT_TRUE(std::isnan(compared(0.1).completeness));
+    const mesh::SurfaceDifference found =
+        mesh::difference(a, scan, {.threshold = 0.3, .points_a = 1000, .points_b = 3});
+    EXPECT_NEAR(found.completeness, (0.25 + 0.25 + 30) / 3, 1e-9);
+    EXPECT_NEAR(found.recall, 2.0 / 3, 1e-9);
+    EXPECT_TRUE(std::isnan(found.normal_error));
     // From the square to the nearer of two points.
-    EXPECT_NEAR(near.accuracy, 0.38, 0.02);
-}
-
-TEST(MeshDistance, ByTheProtocolsOfBenchmarks) {
-    const mesh::Surface a(scene_of(square(3, 0)));
-    const mesh::Protocol dtu = mesh::protocol_named("dtu");
-    EXPECT_EQ(dtu.farthest, 20);
-    EXPECT_EQ(mesh::points_at(a, dtu.spacing), 225u);
-    const mesh::Protocol truck = mesh::protocol_named("tanks-and-temples:Truck");
-    EXPECT_EQ(truck.threshold, 0.005);
-    EXPECT_EQ(truck.spacing, 0.0025);
-    for (const char* name : {"DTU", "tanks-and-temples", "tanks-and-temples:truck", ""})
-        test::expect_error<InputError>([&] { mesh::protocol_named(name); },
-                                       {"--protocol", "Ignatius, Meetingroom"});
-    test::expect_error<InputError>([&] { mesh::points_at(a, 1e-5); }, {"its unit is another"});
-    EXPECT_EQ(mesh::thinned({{0.125, 0.25, 0.5}, {-0.5, 0, 0}, {0.375, 0.75, 0.5}}, 1),
-              (std::vector<glm::dvec3>{{-0.5, 0, 0}, {0.25, 0.5, 0.5}}));
+    EXPECT_NEAR(found.accuracy, 0.38, 0.02);
 }
 
 TEST(MeshDistance, IsThatToTheNearestTriangle) {
