@@ -13,6 +13,7 @@
 #include "cli/command.h"
 #include "cli/compare_inputs.h"
 #include "cli/compare_meshes.h"
+#include "cli/comparison.h"
 #include "cli/metric_arguments.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
@@ -45,23 +46,6 @@ struct CompareArguments {
     std::optional<double> distance;  // meshes alone have it
 };
 
-struct Compared {
-    std::string name;
-    ImageDifference difference;
-    std::vector<Figure> figures = {};
-    std::vector<std::string> failed = {};  // names of the figures that exceed their limit
-    std::string reasons = {};              // the same for the user
-};
-
-/// Means and extremes over the pairs.
-struct CompareTotals {
-    double psnr = 0, ssim = 0;        // means
-    std::vector<Figure> figures;      // means
-    double max_error = 0, rms = 0;    // largest
-    const Compared* worst = nullptr;  // the pair with the lowest PSNR, or RMS over all values in dB
-    bool passed = true;
-};
-
 /// Fills `failed` and `reasons`. NaN exceeds every limit. PSNR is of RGB clamped to [0, 1], as everywhere. The
 /// threshold also limits the RMS error over all values, so that alpha and values above white count too.
 void judge(Compared& pair, const CompareArguments& arguments) {
@@ -86,32 +70,21 @@ void judge(Compared& pair, const CompareArguments& arguments) {
     }
 }
 
-/// In dB: the lower of the PSNR and the RMS error over all values.
-double nearness(const ImageDifference& d) {
-    if (std::isnan(d.psnr) || std::isnan(d.rms_error)) return std::nan("");
-    return std::min(d.psnr, -20 * std::log10(d.rms_error));
-}
-
-/// JSON has no number for an infinite PSNR, which equal images have, nor for NaN: null. "identical" and "nan" tell
-/// which it is.
-Json number(double value) {
-    return std::isfinite(value) ? Json(value) : Json();
-}
-
-Json to_json(const Compared& compared) {
-    const ImageDifference& d = compared.difference;
-    Json json{{"name", compared.name},
-              {"psnr", number(d.psnr)},
-              {"ssim", number(d.ssim)},
-              {"max_error", number(d.max_error)},
+/// "identical" and "nan" tell which PSNR a null is.
+Json to_json(const Compared& one) {
+    const ImageDifference& d = one.difference;
+    Json json{{"name", one.name},
+              {"psnr", finite_number(d.psnr)},
+              {"ssim", finite_number(d.ssim)},
+              {"max_error", finite_number(d.max_error)},
               {"max_error_at", {d.max_x, d.max_y}},
-              {"mean_error", number(d.mean_error)},
-              {"rms", number(d.rms_error)},
+              {"mean_error", finite_number(d.mean_error)},
+              {"rms", finite_number(d.rms_error)},
               {"identical", d.max_error == 0},
               {"nan", std::isnan(d.psnr)},
-              {"passed", compared.failed.empty()},
-              {"failed", compared.failed}};
-    add_figures(json, compared.figures);
+              {"passed", one.failed.empty()},
+              {"failed", one.failed}};
+    add_figures(json, one.figures);
     return json;
 }
 
@@ -121,24 +94,6 @@ void print(const Compared& one) {
                core::one_line(one.name), one.name.empty() ? "" : "  ", d.psnr, d.ssim, d.rms_error,
                d.max_error, d.max_error > 0 ? fmt::format(" at {},{}", d.max_x, d.max_y) : "", one.reasons);
     std::fflush(stdout);
-}
-
-CompareTotals totals_of(const std::vector<Compared>& all) {
-    CompareTotals out;
-    for (const Figure& figure : all.front().figures) out.figures.push_back({figure.name, 0});
-    for (const Compared& one : all) {
-        for (size_t k = 0; k < out.figures.size(); ++k)
-            out.figures[k].value += one.figures[k].value / double(all.size());
-        out.psnr += one.difference.psnr / double(all.size());
-        out.ssim += one.difference.ssim / double(all.size());
-        out.max_error = std::max(out.max_error, one.difference.max_error);
-        // NaN is the worst, and stays.
-        if (!std::isnan(out.rms) && !(one.difference.rms_error <= out.rms))
-            out.rms = one.difference.rms_error;
-        out.passed = out.passed && one.failed.empty();
-        if (!out.worst || !(nearness(one.difference) >= nearness(out.worst->difference))) out.worst = &one;
-    }
-    return out;
 }
 
 /// The file of the pair's heat map; empty: none.
@@ -170,10 +125,9 @@ Compared compare(const ImagePair& pair, const Sides& sides, const CompareArgumen
     const bool drawn_a = sides.a->is_scene, drawn_b = sides.b->is_scene;
     if (drawn_a && !drawn_b) match_format(a, b, sides.options.background);
     if (drawn_b && !drawn_a) match_format(b, a, sides.options.background);
-    Compared out{pair.name, {}};
+    Compared out;
     try {
-        out.difference = compare_images(a.image, b.image);
-        if (!meter.empty()) out.figures = meter.measure(a.image, b.image);
+        out = compared(pair.name, a.image, b.image, meter);
     } catch (const InputError& error) {
         throw InputError(sides.a->place(pair.a) + " and " + sides.b->place(pair.b) + ": " + error.what() +
                          (drawn_a || drawn_b ? "; scenes are rendered through undistorted cameras, at "
@@ -242,10 +196,10 @@ int run(const CompareArguments& arguments) {
     const bool judged = arguments.threshold || arguments.max_error;
     const bool passed = !judged || (totals.passed && unpaired.empty());
     if (!arguments.json.empty()) {
-        Json json = {{"psnr", number(totals.psnr)},
-                     {"ssim", number(totals.ssim)},
-                     {"max_error", number(totals.max_error)},
-                     {"rms", number(totals.rms)},
+        Json json = {{"psnr", finite_number(totals.psnr)},
+                     {"ssim", finite_number(totals.ssim)},
+                     {"max_error", finite_number(totals.max_error)},
+                     {"rms", finite_number(totals.rms)},
                      {"identical", totals.max_error == 0},
                      {"nan", std::isnan(totals.psnr)},
                      {"worst", to_json(*totals.worst)},

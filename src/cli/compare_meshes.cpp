@@ -2,9 +2,9 @@
 #include "cli/compare_meshes.h"
 
 #include <spdlog/fmt/fmt.h>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "cli/comparison.h"
 #include "cli/output.h"
 #include "core/text.h"
 #include "core/typing.h"
@@ -28,11 +28,6 @@ report::Json to_json(const mesh::Topology& topology, size_t triangles) {
             {"border_edges", topology.border_edges},
             {"crowded_edges", topology.crowded_edges},
             {"watertight", topology.watertight()}};
-}
-
-/// JSON has no NaN.
-report::Json number(double value) {
-    return std::isfinite(value) ? report::Json(value) : report::Json();
 }
 
 std::string counted_mesh(const scene::MeshScene& mesh, const mesh::Topology& topology) {
@@ -61,10 +56,10 @@ void compare_meshes(const MeshComparison& comparison) {
                d.chamfer(), scan ? "" : fmt::format("  normal error {:.3g}°", d.normal_error));
     fmt::print("within {:.4g}: precision {:.2f} %  recall {:.2f} %  F-score {:.2f} %\n", d.threshold,
                100 * d.precision, 100 * d.recall, 100 * d.f_score());
-    report::Json json{{"accuracy", number(d.accuracy)},
-                      {"completeness", number(d.completeness)},
-                      {"chamfer", number(d.chamfer())},
-                      {"normal_error", number(d.normal_error)},
+    report::Json json{{"accuracy", finite_number(d.accuracy)},
+                      {"completeness", finite_number(d.completeness)},
+                      {"chamfer", finite_number(d.chamfer())},
+                      {"normal_error", finite_number(d.normal_error)},
                       {"threshold", d.threshold},
                       {"precision", d.precision},
                       {"recall", d.recall},

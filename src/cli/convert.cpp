@@ -6,16 +6,17 @@
 
 #include <algorithm>
 #include <glm/gtc/matrix_transform.hpp>
+#include <limits>
 #include <memory>
 #include <set>
 #include <sstream>
 
 #include "cli/arguments.h"
 #include "cli/command.h"
+#include "cli/comparison.h"
 #include "cli/convert_clean.h"
 #include "cli/convert_files.h"
 #include "cli/convert_output.h"
-#include "cli/orbit_check.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
 #include "cli/splat_statistics.h"
@@ -23,6 +24,7 @@
 #include "core/messages.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "ewa/render_options.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
 #include "io/splats/formats.h"
@@ -35,6 +37,8 @@ namespace {
 
 namespace fs = std::filesystem;
 using report::Json;
+
+constexpr int kCheckedSides = 8;
 
 struct ConvertArguments {
     std::vector<fs::path> files;         // the last is written
@@ -154,6 +158,32 @@ Work read_all(const ConvertArguments& arguments) {
         work.lost.push_back(
             "some inputs have --kernel density and others not; all opacities are fitted to 3DGS's kernel");
     return work;
+}
+
+/// Prints how much renders of the file differ from those of the scene that was written to it, unless quiet. Without a Vulkan device it
+/// prints the reason that there are none. Returns "views", "psnr" (mean; null: equal) and "worst_psnr", or "error".
+Json check_renders(const Gaussians& written, const SplatScene& read, bool quiet) {
+    if (written.size() == 0) return Json::object();
+    RenderOptions options;
+    if (read.antialiased) options.kernel = Footprint::antialias;
+    if (written.density) options.kernel = Footprint::density;
+    try {
+        const std::vector<Compared> all = compared_all_round(written, read.gaussians, options, kCheckedSides);
+        const double mean = totals_of(all).psnr;
+        double worst = std::numeric_limits<double>::infinity();
+        for (const Compared& side : all) worst = std::min(worst, side.difference.psnr);
+        if (!quiet && std::isinf(worst))
+            fmt::print("  renders from {} sides are equal\n", all.size());
+        else if (!quiet)
+            fmt::print(
+                "  renders from {} sides: PSNR {:.1f} dB, {:.1f} dB from the worst side; a difference is "
+                "hard to see over 40 dB\n",
+                all.size(), mean, worst);
+        return {{"views", all.size()}, {"psnr", finite_number(mean)}, {"worst_psnr", finite_number(worst)}};
+    } catch (const RunError& error) {
+        if (!quiet) fmt::print("  no renders to compare: {}\n", core::one_line(error.what()));
+        return {{"error", core::one_line(error.what())}};
+    }
 }
 
 Json check(const ConvertArguments& arguments, const Work& work) {
