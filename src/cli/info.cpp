@@ -51,8 +51,7 @@ struct InfoArguments {
 };
 
 Json range_json(const Spread& spread) {
-    return {
-        {"min", spread.min}, {"median", spread.median}, {"max", spread.max}, {"histogram", spread.histogram}};
+    return {{"min", spread.min}, {"median", spread.median}, {"max", spread.max}};
 }
 
 Json plan_json(const std::vector<PlanLine>& lines) {
@@ -71,8 +70,7 @@ void print_plan(const char* title, const std::vector<PlanLine>& lines) {
 }
 
 void print_spread(const char* name, const Spread& spread) {
-    fmt::print("{:<16}{:.4g} .. {:.4g}, median {:.4g}  [{}]\n", name, spread.min, spread.max, spread.median,
-               histogram_text(spread));
+    fmt::print("{:<16}{:.4g} .. {:.4g}, median {:.4g}\n", name, spread.min, spread.max, spread.median);
 }
 
 void print_file(const fs::path& path, const SplatScene& scene) {

@@ -14,8 +14,7 @@
 namespace ewa::cli {
 namespace {
 
-/// shown: an increasing function that maps a value to the one that is reported. The bins are equal in the
-/// values.
+/// shown: an increasing function that maps a value to the one that is reported.
 template <typename Shown>
 Spread make_spread(std::vector<double> values, Shown shown) {
     std::erase_if(values, [](double v) { return !std::isfinite(v); });
@@ -25,13 +24,8 @@ Spread make_spread(std::vector<double> values, Shown shown) {
     std::nth_element(values.begin(), middle, values.end());
     spread.median = shown(*middle);
     const auto [low, high] = std::minmax_element(values.begin(), values.end());
-    const double base = *low, range = *high - *low;
     spread.min = shown(*low);
     spread.max = shown(*high);
-    for (const double v : values) {
-        const int bin = range > 0 ? static_cast<int>((v - base) / range * kHistogramBins) : 0;
-        ++spread.histogram[static_cast<size_t>(std::min(bin, kHistogramBins - 1))];
-    }
     return spread;
 }
 
@@ -104,17 +98,6 @@ std::string skipped_text(uint64_t skipped, const std::string& why) {
     const std::string text = "skipped " + core::counted(skipped, "splat");
     if (why.empty()) return text + " with a value beyond the range of float32";
     return text + " with a value that is not finite: " + why;
-}
-
-std::string histogram_text(const Spread& spread) {
-    static constexpr std::string_view kShades = " .:-=+*#%@";
-    const size_t most = *std::max_element(spread.histogram.begin(), spread.histogram.end());
-    std::string text;
-    for (const size_t count : spread.histogram) {
-        const size_t shade = most == 0 || count == 0 ? 0 : 1 + (count * (kShades.size() - 2)) / most;
-        text += kShades[shade];
-    }
-    return text;
 }
 
 std::array<Difference, 6> differences(const Gaussians& a, const Gaussians& b) {

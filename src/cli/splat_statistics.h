@@ -10,13 +10,9 @@
 
 namespace ewa::cli {
 
-inline constexpr int kHistogramBins = 24;
-
 /// Figures of the finite values; zeros if there are none.
 struct Spread {
     double min = 0, median = 0, max = 0;
-    std::array<size_t, kHistogramBins>
-        histogram{};  // equal bins from min to max; of the logarithm for scales
 };
 
 struct SplatStatistics {
@@ -30,9 +26,6 @@ SplatStatistics splat_statistics(const Gaussians& gaussians);
 
 /// What a command says of splats that it could not draw. why: undrawable_text of the scene.
 std::string skipped_text(uint64_t skipped, const std::string& why);
-
-/// One character per bin, from " " (empty) to "@" (fullest).
-std::string histogram_text(const Spread& spread);
 
 struct Difference {
     std::string what, unit;
