@@ -115,7 +115,6 @@ struct TrainOptions {
     /// Uses the sum of the pixels' absolute gradients, which do not cancel (AbsGS), and their own threshold.
     bool absolute_gradients = false;
     double grow_gradient_absolute = 8e-4;  // gsplat's
-    bool revised_opacity = false;          // both halves of a split are together as opaque as their parent
     double split_scale = 0.01;             // larger splats are split, others cloned; share of scene extent
     double prune_opacity = 0.005;
     double prune_scale = 0.1;  // share of scene extent; used after the first opacity reset

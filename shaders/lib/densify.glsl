@@ -30,14 +30,6 @@ uint action_of(DensifyPush push, vec4 mean_logit, vec4 quaternion, vec4 scale_re
 // -ln(1 - opacity)
 float thickness_of(float logit) { return max(logit, 0.0) + log(1.0 + exp(-abs(logit))); }
 
-// Logit of 1 - t with t^2 = 1 - opacity: two splats of that opacity in one place transmit as much as one of
-// `logit`. (1 - t) / t = (1 - t^2) / (t (1 + t)), evaluated in logarithms with opacity = exp(logit) t^2. No
-// term cancels or overflows.
-float halved_logit(float logit) {
-    const float log_t = -0.5 * thickness_of(logit);
-    return logit + log_t - log(1.0 + exp(log_t));
-}
-
 // Logit of 1 - (1 - opacity)^share: so many splats of that opacity in one place as fit into 1 / share transmit as much as one of
 // `logit`. The small opacity is a series, where 1 - exp would cancel.
 float thinned_logit(float logit, float share) {

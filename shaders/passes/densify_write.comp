@@ -4,9 +4,8 @@
 // One invocation owns old splat i. It reads its parameters, one of its moments and its statistics, and the prefix sums of
 // the outputs. It writes the parameters or the moments of what the splat becomes, side by side in the old order.
 // A kept splat and a clone's original keep their moments; new splats start with zero moments. Children of a split are
-// drawn from the parent's Gaussian and are SPLIT_SCALE times smaller. With revised opacity, two children in one place
-// are together as opaque as the parent: 1 - (1 - o)^(1/2) (Rota Bulo et al. 2024, eq. 9). An even split puts them side by
-// side along the longest axis, and a clone and its original share the opacity.
+// drawn from the parent's Gaussian and are SPLIT_SCALE times smaller. An even split puts them side by side
+// along the longest axis, and a clone and its original share the opacity.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"
@@ -57,7 +56,6 @@ void main() {
             const vec3 normal = normal3(uvec4(push.first + i, 2u * push.step + child, push.seed[0], push.seed[1]));
             mean += rotation_of(normalize_quaternion(p1, norm)) * (exp(p2.xyz) * normal);
             log_scale -= log(float(SPLIT_SCALE));
-            if (push.split == SPLIT_REVISED) logit = halved_logit(logit);
         }
         [[unroll]] for (uint plane = 0; plane < PLANES; ++plane) {
             const uint from = param_texel(PLANES, plane, i);

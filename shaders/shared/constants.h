@@ -108,11 +108,10 @@ EWA_REAL(WIDEST_SHARE, 0.125);
 
 // Adaptive density control (3DGS, section 5.2 and its published code).
 EWA_REAL(SPLIT_SCALE, 1.6);  // a split child's scales are the parent's divided by this
-// What a clone and a split leave (DensifyPush). Drawn: children of a split are drawn from their parent, as opaque as it. Revised: the
-// same, but two children in one place are together as opaque as their parent. Even: the picture stays as it was, nearly.
+// What a clone and a split leave (DensifyPush). Drawn: children of a split are drawn from their parent, as opaque as it. Even: the
+// picture stays as it was, nearly.
 EWA_UINT(SPLIT_DRAWN, 0u);
-EWA_UINT(SPLIT_REVISED, 1u);
-EWA_UINT(SPLIT_EVEN, 2u);
+EWA_UINT(SPLIT_EVEN, 1u);
 // An even split puts two children at half a standard deviation on both sides along the longest axis. With this factor of that axis
 // they have the parent's second moment: 0.5^2 + factor^2 = 1. With this power of the transmittance they have its optical thickness.
 EWA_REAL(EVEN_OFFSET, 0.5);

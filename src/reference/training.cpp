@@ -142,7 +142,7 @@ std::vector<Decision> decide(const Values& values, const DensifyStatistics& stat
     return decisions;
 }
 
-Splat split_child(const Splat& parent, const glm::dvec3& normal, bool revised_opacity) {
+Splat split_child(const Splat& parent, const glm::dvec3& normal) {
     Splat child = parent;
     glm::dvec3 step(0);
     for (int k = 0; k < 3; ++k) {
@@ -150,12 +150,6 @@ Splat split_child(const Splat& parent, const glm::dvec3& normal, bool revised_op
         child.log_scale[k] = parent.log_scale[k] - std::log(SPLIT_SCALE);
     }
     child.mean += rotation_of(parent) * step;
-    if (revised_opacity) {
-        const double rest = 1 / (1 + std::exp(parent.opacity_logit));
-        const double opacity =
-            rest / (1 + std::sqrt(rest)) * std::exp(parent.opacity_logit);  // 1 - sqrt(rest)
-        child.opacity_logit = std::log(opacity) - std::log(std::sqrt(rest));
-    }
     return child;
 }
 

@@ -98,9 +98,8 @@ std::vector<Decision> decide(const Values& values, const DensifyStatistics& stat
                              const DensifyOptions& options);
 
 /// A split's child: mean + R (scale * normal), scales divided by SPLIT_SCALE, and the parent's other values.
-/// `normal` has three independent standard normal numbers. revised_opacity gives the child 1 - (1 -
-/// opacity)^(1/2) (Rota Bulo et al. 2024, "Revising densification", eq. 9).
-Splat split_child(const Splat& parent, const glm::dvec3& normal, bool revised_opacity = false);
+/// `normal` has three independent standard normal numbers.
+Splat split_child(const Splat& parent, const glm::dvec3& normal);
 
 /// The splat with opacity 1 - (1 - opacity)^share: 1 / share of them in one place let through as much as it.
 Splat thinned(Splat splat, double share);

@@ -317,9 +317,6 @@ std::vector<Row> rows() {
               "gradients "
               "do not cancel",
               [](RunOptions& o) -> bool& { return o.train.absolute_gradients; })},
-        {"Quality", "revised_opacity",
-         flag("revised-opacity", "adc: both halves of a split splat are together as opaque as it was",
-              [](RunOptions& o) -> bool& { return o.train.revised_opacity; })},
         {"Quality", "region", region_option()},
         {"Quality", "loss", loss_option()},
         {"Quality", "appearance", appearance_option()},

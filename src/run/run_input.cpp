@@ -517,8 +517,6 @@ constexpr std::array kRunExclusions{
                  [](const RunOptions& o) { return o.save_every > 0; }},
     RunExclusion{"--absgrad", [](const RunOptions& o) { return o.train.absolute_gradients; }, Relation::needs,
                  "--strategy adc", adds_by_gradient},
-    RunExclusion{"--revised-opacity", [](const RunOptions& o) { return o.train.revised_opacity; },
-                 Relation::needs, "--strategy adc", adds_by_gradient},
     RunExclusion{"--region", [](const RunOptions& o) { return o.train.region.has_value(); },
                  Relation::excludes, "--strategy none",
                  [](const RunOptions& o) { return o.train.strategy == Strategy::none; }, "it adds no splats"},

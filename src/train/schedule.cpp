@@ -218,7 +218,7 @@ Schedule schedule_for(const TrainOptions& options, size_t photos) {
     s.relocate_every = scaled(options.refine_every, std::min(options.refine_every, kLeastRelocateEvery));
     s.growth = std::pow(options.growth, std::max(1.0, s.relocate_every / (share * options.refine_every)));
     s.copy_spread = (1 - share) * options.copy_spread;
-    s.even_splits = options.steps <= kLongestEvenRun && !options.revised_opacity && !options.render.points;
+    s.even_splits = options.steps <= kLongestEvenRun && !options.render.points;
     s.bounded = options.steps <= kLongestBoundedRun && !options.render.points &&
                 options.render.integrator == Integrator::splat;
     if (options.opacity_reset_every > 0 && !options.render.points)
@@ -291,7 +291,7 @@ bool starts_coarse(const TrainOptions& options, const Dataset& dataset,
 
 TrainOptions resolve(TrainOptions options, const Dataset& dataset, const std::vector<int>& train_frames) {
     check(dataset, train_frames);
-    const bool adc_asked_for = options.absolute_gradients || options.revised_opacity || options.render.points;
+    const bool adc_asked_for = options.absolute_gradients || options.render.points;
     if (options.strategy == Strategy::automatic)
         options.strategy = adc_asked_for ? Strategy::adc : strategy_for(options.steps);
     if (options.sh_degree == kAutomaticShDegree)

@@ -361,9 +361,7 @@ void Training::control_density(int step) {
         rules.grow_gradient =
             float(plan_.absolute ? options_.grow_gradient_absolute : options_.grow_gradient);
         if (options_.render.points) rules.grow_gradient *= kPointsThreshold;
-        rules.split = schedule_.even_splits      ? shared::SPLIT_EVEN
-                      : options_.revised_opacity ? shared::SPLIT_REVISED
-                                                 : shared::SPLIT_DRAWN;
+        rules.split = schedule_.even_splits ? shared::SPLIT_EVEN : shared::SPLIT_DRAWN;
         rules.split_scale = float(options_.split_scale * extent_);
         rules.prune_logit = options_.render.points ? -std::numeric_limits<float>::infinity()
                                                    : float(logit(options_.prune_opacity));

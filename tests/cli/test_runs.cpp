@@ -102,7 +102,6 @@ TEST_F(Runs, PointsExcludeWhatSpheresDoNotHave) {
     const Names training{"train", folder / "data", "-o", folder / "t"};
     fails(training, {"--kernel", "antialias"}, "--points and --kernel antialias exclude each other");
     fails(training, {"--strategy", "mcmc"}, "--points and --strategy mcmc exclude each other");
-    fails(training, {"--revised-opacity"}, "--points and --revised-opacity exclude each other");
     fails(training, {"--init-opacity", "0.5"}, "--init-opacity and --points exclude each other");
     fails(training, {"--refine-poses"}, "--points and --refine-poses exclude each other");
     expect_failure(run_ewa({"train", folder / "data", "-o", folder / "t", "--nearest", "3"}), 2,

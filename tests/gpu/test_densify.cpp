@@ -109,9 +109,7 @@ Expected expected_of(const Start& start, const DensifyRules& rules) {
         for (uint32_t child = 0; decisions[i] == Decision::split && child < 2; ++child) {
             const auto n = core::normal3(
                 {uint32_t(i), 2 * rules.step + child, uint32_t(rules.seed), uint32_t(rules.seed >> 32)});
-            add(even ? even_child(splat, child == 0)
-                     : split_child(splat, {n[0], n[1], n[2]}, rules.split == shared::SPLIT_REVISED),
-                i, true);
+            add(even ? even_child(splat, child == 0) : split_child(splat, {n[0], n[1], n[2]}), i, true);
         }
     }
     out.values.sh_degree = old.sh_degree;
@@ -179,8 +177,7 @@ TEST_P(Densify, WritesTheReferencesNextGeneration) {
 
 INSTANTIATE_TEST_SUITE_P(Sizes, Densify,
                          testing::Values(DensifyCase{3, 0}, DensifyCase{1500, 0}, DensifyCase{777, 1},
-                                         DensifyCase{300, 3}, DensifyCase{1500, 0, shared::SPLIT_REVISED},
-                                         DensifyCase{1500, 0, shared::SPLIT_EVEN},
+                                         DensifyCase{300, 3}, DensifyCase{1500, 0, shared::SPLIT_EVEN},
                                          DensifyCase{1500, 1, shared::SPLIT_DRAWN, true}));
 
 /// The kernel that writes, on its own: nothing past its capacity.

@@ -127,7 +127,7 @@ TEST_P(RestoredTrainer, GoesOnAsIfNothingHadHappened) {
     options.random_background = true;
     options.exposure = options.refine_poses = options.refine_focal = true;
     options.halvings = 1;
-    options.absolute_gradients = options.revised_opacity = true;  // of adc
+    options.absolute_gradients = true;  // of adc
     options.grow_gradient_absolute = 1e-5;
     const Gaussians start = shaken_start(small_capture(), 0.05, 1, 1);
     const auto frames = split().train;

@@ -416,7 +416,6 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                              {"final-splats", "5"},
                                              {"sh-degree", "2"},
                                              {"absgrad", "true"},
-                                             {"revised-opacity", "true"},
                                              {"region", "-1,-2,-3,0.5,1,2"},
                                              {"loss", "l1=0.5,l2=2,ssim=0.25,alpha=0.5"},
                                              {"exposure", "true"},

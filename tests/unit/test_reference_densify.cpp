@@ -141,17 +141,6 @@ TEST(ReferenceDensify, WhatComesOfEachDecision) {
     EXPECT_EQ(first.sh, parent.sh);
 }
 
-TEST(ReferenceDensify, TwoChildrenOfRevisedOpacityLetThroughWhatTheirParentDid) {
-    for (const double logit : {-12.0, -2.0, 0.0, 3.0, 12.0}) {
-        Splat parent = make(0.5, 0.5);
-        parent.opacity_logit = logit;
-        const Splat child = split_child(parent, {1, 0, 0}, true);
-        const double through = 1 / (1 + std::exp(child.opacity_logit));
-        EXPECT_NEAR(through * through * (1 + std::exp(logit)), 1, 1e-12) << logit;
-        EXPECT_LT(child.opacity_logit, logit);
-    }
-}
-
 TEST(ReferenceDensify, ThinnedSplatsLetThroughTogetherWhatOneDid) {
     for (const double logit : {-12.0, -2.0, 0.0, 3.0, 12.0}) {
         Splat parent = make(0.5, 0.5);
