@@ -30,9 +30,10 @@ enum class SplatFormat {
 struct SplatScene {
     Gaussians gaussians;  // in the frame of an INRIA PLY (x right, y down, z forward), whatever the file uses
     SplatFormat format = SplatFormat::ply;
-    std::string variant;       // of the format, e.g. "version 3", "ascii"; may be empty
-    int file_sh_degree = 0;    // may exceed 3; gaussians holds at most degree 3
-    bool antialiased = false;  // the file states that the scene was trained with --antialias (Mip-Splatting)
+    std::string variant;     // of the format, e.g. "version 3", "ascii"; may be empty
+    int file_sh_degree = 0;  // may exceed 3; gaussians holds at most degree 3
+    bool antialiased =
+        false;  // the file states that the scene was trained with --kernel antialias (Mip-Splatting)
     std::vector<std::string> comments;
     std::vector<std::string> remarks;  // one line for each kind of content that is skipped
 };

@@ -57,13 +57,10 @@ int whole_number(const char* name, int value, int most) {
 }
 
 Footprint kernel_of(const LookArguments& arguments, const Splats& splats) {
-    scene::check_look({.antialias = arguments.antialias.has_value(), .kernel = arguments.kernel.has_value()});
     if (arguments.kernel) return asked_for("kernel", *arguments.kernel).train.render.kernel;
-    if (arguments.points) return footprint_of(arguments.antialias.value_or(false));
-    if (!splats.gaussians.density) return footprint_of(arguments.antialias.value_or(splats.antialiased));
-    if (arguments.antialias.value_or(false))
-        throw InputError("antialias: splats of the density kernel have no such renders");
-    return Footprint::density;
+    if (arguments.points) return Footprint::peak;
+    if (splats.gaussians.density) return Footprint::density;
+    return splats.antialiased ? Footprint::antialias : Footprint::peak;
 }
 
 }  // namespace

@@ -35,13 +35,8 @@ std::string list_text(nanobind::handle value);
 /// The usual options with this one, which is named as on the command line. Throws InputError.
 RunOptions asked_for(const char* name, const std::string& text);
 
-inline Footprint footprint_of(bool antialias) {
-    return antialias ? Footprint::antialias : Footprint::peak;
-}
-
 /// How splats are rendered or evaluated, besides the background. Empty values are not given.
 struct LookArguments {
-    std::optional<bool> antialias;
     std::optional<std::string> kernel;
     std::string integrator = "splat";
     std::optional<int> samples;
@@ -56,11 +51,11 @@ RenderOptions look_of(const LookArguments& arguments, const Splats& splats);
 /// The splats with opacities of the kernel. `fitted` holds them if they are not these already.
 const Gaussians& fitted_to(Footprint kernel, const Splats& splats, Gaussians& fitted);
 
-#define EWA_LOOK_TYPES                                                                                       \
-    "antialias: bool | None = None, kernel: typing.Literal['peak', 'antialias', 'density', 'ewa'] | None = " \
-    "None, "                                                                                                 \
-    "integrator: typing.Literal['splat', 'ray', 'fast-ray', 'march'] = 'splat', "                            \
-    "samples: int | None = None, "                                                                           \
+#define EWA_LOOK_TYPES                                                            \
+    "kernel: typing.Literal['peak', 'antialias', 'density', 'ewa'] | None = "     \
+    "None, "                                                                      \
+    "integrator: typing.Literal['splat', 'ray', 'fast-ray', 'march'] = 'splat', " \
+    "samples: int | None = None, "                                                \
     "points: bool = False, nearest: int | None = None"
 
 }  // namespace ewa::python

@@ -197,11 +197,10 @@ class SceneRenderer {
 Renders render(const ObjectOrPath<Splats>& splats, nb::handle viewmats, nb::handle intrinsics, int width,
                int height, nb::handle background, const std::string& mode, const std::string& camera_model,
                nb::object distortion, const std::string& rolling_shutter, nb::object viewmats_end,
-               std::optional<bool> antialias, std::optional<std::string> kernel,
-               const std::string& integrator, std::optional<int> samples, bool points,
-               std::optional<int> nearest, int sh_degree) {
+               std::optional<std::string> kernel, const std::string& integrator, std::optional<int> samples,
+               bool points, std::optional<int> nearest, int sh_degree) {
     return SceneRenderer(*Opened<Splats>(splats, open_splats),
-                         {antialias, std::move(kernel), integrator, samples, points, nearest, sh_degree})
+                         {std::move(kernel), integrator, samples, points, nearest, sh_degree})
         .render(viewmats, intrinsics, width, height, background, mode, camera_model, std::move(distortion),
                 rolling_shutter, std::move(viewmats_end));
 }
@@ -226,7 +225,7 @@ constexpr const char* kRenderHelp =
     "With a rolling_shutter, viewmats are the poses when the readout leaves the first border of the image, "
     "and "
     "viewmats_end those when it reaches the opposite one. "
-    "Without antialias and kernel, the kernel is that of the splats. Ctrl-C ends it after "
+    "Without kernel, it is that of the splats. Ctrl-C ends it after "
     "a "
     "camera.";
 
@@ -278,15 +277,15 @@ void bind_render(nb::module_& module) {
         module, "Renderer", "A scene on the device, for more than one call of render(). Threads take turns.")
         .def(
             "__init__",
-            [](SceneRenderer* self, const ObjectOrPath<Splats>& splats, std::optional<bool> antialias,
-               std::optional<std::string> kernel, const std::string& integrator, std::optional<int> samples,
-               bool points, std::optional<int> nearest, int sh_degree) {
-                new (self) SceneRenderer(
-                    *Opened<Splats>(splats, open_splats),
-                    {antialias, std::move(kernel), integrator, samples, points, nearest, sh_degree});
+            [](SceneRenderer* self, const ObjectOrPath<Splats>& splats, std::optional<std::string> kernel,
+               const std::string& integrator, std::optional<int> samples, bool points,
+               std::optional<int> nearest, int sh_degree) {
+                new (self)
+                    SceneRenderer(*Opened<Splats>(splats, open_splats),
+                                  {std::move(kernel), integrator, samples, points, nearest, sh_degree});
             },
-            "splats"_a, nb::kw_only(), "antialias"_a = nb::none(), "kernel"_a = nb::none(),
-            "integrator"_a = "splat", "samples"_a = nb::none(), "points"_a = false, "nearest"_a = nb::none(),
+            "splats"_a, nb::kw_only(), "kernel"_a = nb::none(), "integrator"_a = "splat",
+            "samples"_a = nb::none(), "points"_a = false, "nearest"_a = nb::none(),
             "sh_degree"_a = kMaxShDegree,
             nb::sig("def __init__(self, splats: " EWA_SPLATS_TYPE ", *, " EWA_SCENE_TYPES ") -> None"),
             "Uploads a copy of the splats.")
@@ -301,9 +300,9 @@ void bind_render(nb::module_& module) {
     module.def("render", render, "splats"_a, "viewmats"_a, "Ks"_a.none(), "width"_a, "height"_a,
                nb::kw_only(), "background"_a = nb::make_tuple(0, 0, 0), "mode"_a = "color",
                "camera_model"_a = "pinhole", "distortion"_a = nb::none(), "rolling_shutter"_a = "global",
-               "viewmats_end"_a = nb::none(), "antialias"_a = nb::none(), "kernel"_a = nb::none(),
-               "integrator"_a = "splat", "samples"_a = nb::none(), "points"_a = false,
-               "nearest"_a = nb::none(), "sh_degree"_a = kMaxShDegree,
+               "viewmats_end"_a = nb::none(), "kernel"_a = nb::none(), "integrator"_a = "splat",
+               "samples"_a = nb::none(), "points"_a = false, "nearest"_a = nb::none(),
+               "sh_degree"_a = kMaxShDegree,
                nb::sig("def render(splats: " EWA_SPLATS_TYPE ", " EWA_CAMERA_TYPES ", " EWA_SCENE_TYPES
                        ") -> Renders"),
                kRenderHelp);

@@ -27,6 +27,7 @@
 #include "live/run_inputs.h"
 #include "metrics.h"
 #include "options.h"
+#include "report/former_options.h"
 #include "report/run_file_names.h"
 #include "run/evaluation.h"
 #include "run/first_checks.h"
@@ -277,7 +278,7 @@ void read_settings(const Json& settings, TrainerStart& start) {
         return;
     }
     RunOptions run = usual_options();
-    const Json stored = settings.value("options", Json::object());
+    const Json stored = report::with_present_names(settings.value("options", Json::object()));
     for (const train::RunOption& option : train::run_options()) {
         if (!option.decides_result || !stored.contains(option.name)) continue;
         const Json& value = stored[option.name];
@@ -375,17 +376,16 @@ void add_figures(Evaluation& evaluation, const std::vector<std::string>& names,
 
 Evaluation evaluate_splats(const ObjectOrPath<Splats>& given_splats,
                            const ObjectOrPath<LoadedDataset>& given_dataset, nb::handle frames,
-                           nb::handle metrics, nb::handle background, std::optional<bool> antialias,
-                           std::optional<std::string> kernel, const std::string& integrator,
-                           std::optional<int> samples, bool points, std::optional<int> nearest) {
+                           nb::handle metrics, nb::handle background, std::optional<std::string> kernel,
+                           const std::string& integrator, std::optional<int> samples, bool points,
+                           std::optional<int> nearest) {
     const AskedMetrics asked = asked_metrics(metrics);
     const Opened<LoadedDataset> dataset(given_dataset, open_dataset);
     const Opened<Splats> splats(given_splats, open_splats);
     std::vector<int> chosen = frames.is_none() ? split_frames(*dataset->dataset, dataset->test_every).test
                                                : frames_of(frames, *dataset->dataset, "frames");
     if (chosen.empty()) throw InputError("frames is empty: there is nothing to evaluate");
-    RenderOptions options =
-        look_of({antialias, std::move(kernel), integrator, samples, points, nearest}, *splats);
+    RenderOptions options = look_of({std::move(kernel), integrator, samples, points, nearest}, *splats);
     if (background.is_none())
         options.background = dataset->background;
     else
@@ -521,7 +521,8 @@ void bind_trainer(nb::module_& module) {
         .def("splats", &Training::splats, "The splats after the last step.")
         .def("exposures", &Training::exposures,
              nb::sig("def exposures(self) -> numpy.typing.NDArray[numpy.float32]"),
-             "[m, 3, 4], the affine map of colours for each training frame; empty unless exposure=True.")
+             "[m, 3, 4], the affine map of colours for each training frame; empty unless "
+             "appearance=\"affine\".")
         .def("sky", &Training::sky, nb::sig("def sky(self) -> numpy.typing.NDArray[numpy.float32]"),
              "[n, n, 3], the sky that render() and evaluate() take as background; empty unless "
              "background=\"sky\".")
@@ -561,7 +562,7 @@ void bind_train(nb::module_& module) {
     module.attr("_argument_names") = argument_names();
     module.attr("_value_words") = value_words();
     module.def("evaluate", evaluate_splats, "splats"_a, "dataset"_a, "frames"_a = nb::none(), nb::kw_only(),
-               "metrics"_a = nb::tuple(), "background"_a = nb::none(), "antialias"_a = nb::none(),
+               "metrics"_a = nb::tuple(), "background"_a = nb::none(),
                "kernel"_a = nb::none(), "integrator"_a = "splat", "samples"_a = nb::none(),
                "points"_a = false, "nearest"_a = nb::none(),
                nb::sig("def evaluate(splats: " EWA_SPLATS_TYPE ", dataset: " EWA_DATASET_TYPE

@@ -16,6 +16,7 @@
 #include "core/words.h"
 #include "ewa/error.h"
 #include "options.h"
+#include "report/former_options.h"
 #include "run/loss_option.h"
 #include "run/option_table.h"
 #include "scene/looks.h"
@@ -98,12 +99,6 @@ constexpr Special bytes(const char* name) {
 }
 
 constexpr std::array kSpecials{
-    Special{
-        "antialias", "bool",
-        [](const RunOptions& o) -> nb::object {
-            return nb::bool_(o.train.render.kernel == Footprint::antialias);
-        },
-        [](RunOptions& o, nb::handle value) { o.train.render.kernel = footprint_of(nb::cast<bool>(value)); }},
     Special{"background", "numpy.typing.ArrayLike | str", background_value, set_background},
     Special{"region", "str | collections.abc.Sequence[float]", region_value, set_region},
     Special{"loss", "str | dict[str, float]", loss_value, set_loss},
@@ -269,7 +264,8 @@ Json options_json(const RunOptions& options) {
     return json;
 }
 
-void read_options(const Json& json, RunOptions& options) {
+void read_options(const Json& stored, RunOptions& options) {
+    const auto json = report::with_present_names(stored);
     for (const auto& [name, value] : options_dict(options)) {
         const auto key = nb::cast<std::string>(name);
         try {

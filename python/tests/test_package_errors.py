@@ -144,7 +144,7 @@ def test_other_texts_stay():
 @pytest.mark.parametrize(
     "text, expected",
     [
-        ("--bands and --exposure exclude each other", "bands= and exposure= exclude each other"),
+        ("--bands and --appearance exclude each other", "bands= and appearance= exclude each other"),
         ("more than --max-splats 300.", "more than max_splats=300."),
         ("--steps 300; give a larger --steps", "steps=300; give a larger steps="),
         ("take --integrator splat, fewer --samples", 'take integrator="splat", fewer samples='),
@@ -230,7 +230,7 @@ def test_every_option_in_an_error_of_libewa_is_an_argument():
 
 def test_errors_of_training_name_arguments(still_life, tmp_path):
     for options, text in (
-        (dict(bands=2, exposure=True), "bands= and exposure= exclude each other"),
+        (dict(bands=2, appearance="affine"), "bands= and appearance= exclude each other"),
         (dict(batch=2, refine_poses=True), "batch= and refine_poses= exclude each other"),
         (dict(steps=5, max_splats=1, init=SPLATS), "max_splats=1"),
         (dict(train_frames=[]), "name some as train_frames="),

@@ -183,7 +183,7 @@ def test_a_renderer_keeps_its_scene_until_it_is_replaced():
 def test_antialias_and_degree():
     splats = make_splats(20)
     view = camera(30)
-    plain, mip = (ewa.render(splats, *view, antialias=a).alpha for a in (False, True))
+    plain, mip = (ewa.render(splats, *view, kernel=k).alpha for k in ("peak", "antialias"))
     assert mip.sum() < plain.sum()
     splats.antialiased = True
     assert np.array_equal(ewa.render(splats, *view).alpha, mip)
@@ -207,7 +207,7 @@ def test_kernels_points_and_integrators_are_those_of_the_command_line(tmp_path, 
         {"points": True, "nearest": 1},
         {"points": True},
         {"integrator": "ray"},
-        {"integrator": "fast-ray", "antialias": True},
+        {"integrator": "fast-ray", "kernel": "antialias"},
         {"integrator": "march", "samples": 2},
         {"integrator": "march", "kernel": "density"},
     ):
@@ -238,16 +238,15 @@ def test_densities_can_be_rendered_as_opacities():
     "look, message",
     [
         ({"kernel": "box"}, "kernel: 'box' is not one of peak, antialias, density"),
-        ({"kernel": "peak", "antialias": True}, "antialias= and kernel= exclude each other"),
         ({"integrator": "marsh"}, "integrator: 'marsh' is not one of splat, ray, fast-ray, march; did you mean march?"),
         ({"samples": 4}, 'samples= is an option of integrator="march"'),
         ({"integrator": "march", "samples": 0}, "samples is not from 1 to 4096"),
         ({"integrator": "march", "samples": 5000}, "samples is not from 1 to 4096"),
-        ({"integrator": "march", "antialias": True}, 'integrator="march" and kernel="antialias" exclude each other'),
+        ({"integrator": "march", "kernel": "antialias"}, 'integrator="march" and kernel="antialias" exclude each other'),
         ({"nearest": 3}, "nearest= is an option of points="),
         ({"points": True, "nearest": 0}, "nearest is not from 1 to 1000"),
         ({"points": True, "kernel": "density"}, 'points= and kernel="density" exclude each other'),
-        ({"points": True, "antialias": True}, 'points= and kernel="antialias" exclude each other'),
+        ({"points": True, "kernel": "antialias"}, 'points= and kernel="antialias" exclude each other'),
         ({"points": True, "integrator": "ray"}, "points= and integrator= exclude each other"),
     ],
 )

@@ -214,7 +214,7 @@ def test_the_cap_is_chosen_and_kept(still_life, tmp_path):
         ({"strategy": "mcm"}, ewa.InputError, "strategy='mcm': .*; did you mean mcmc"),
         ({"sh_degree": 4}, ewa.InputError, "sh_degree=4: '4' is not a whole number from 0 to 3"),
         ({"moment_bits": 8}, ewa.InputError, "moment_bits=8: '8' is neither 16 nor 32"),
-        ({"antialias": "yes"}, TypeError, "antialias='yes' is of the wrong type"),
+        ({"refine_poses": "yes"}, TypeError, "refine_poses='yes' is of the wrong type"),
         ({"background": [1, 2]}, ValueError, r"background has the shape \(2,\); expected \(3,\)"),
         ({"train_frames": []}, ewa.InputError, "no training image"),
         (
@@ -272,15 +272,15 @@ def test_whole_floats_and_numpy_numbers_are_options(still_life):
 
 
 def test_antialiased_training_makes_antialiased_splats(still_life):
-    splats = ewa.Trainer(still_life, steps=1, antialias=True, train_frames=[0]).splats()
+    splats = ewa.Trainer(still_life, steps=1, kernel="antialias", train_frames=[0]).splats()
     assert splats.antialiased
-    usual, plain = ewa.evaluate(splats, still_life, [0]), ewa.evaluate(splats, still_life, [0], antialias=False)
-    assert usual.psnr == ewa.evaluate(splats, still_life, [0], antialias=True).psnr != plain.psnr
+    usual, plain = ewa.evaluate(splats, still_life, [0]), ewa.evaluate(splats, still_life, [0], kernel="peak")
+    assert usual.psnr == ewa.evaluate(splats, still_life, [0], kernel="antialias").psnr != plain.psnr
 
 
 def test_densities_are_trained_and_kept(still_life, tmp_path):
     trainer = ewa.Trainer(still_life, steps=1, kernel="density", train_frames=[0])
-    assert trainer.options["kernel"] == "density" and not trainer.options["antialias"]
+    assert trainer.options["kernel"] == "density"
     assert ewa.Trainer(still_life, steps=1, kernel="ewa", train_frames=[0]).options == trainer.options
     splats = trainer.splats()
     assert splats.density and not splats.antialiased
@@ -289,8 +289,6 @@ def test_densities_are_trained_and_kept(still_life, tmp_path):
     assert again.density and np.allclose(again.opacity_logits, splats.opacity_logits, atol=1e-5)
     usual = ewa.evaluate(splats, still_life, [0])
     assert abs(usual.psnr - ewa.evaluate(again, still_life, [0]).psnr) < 1e-3
-    with pytest.raises(ewa.InputError, match="density kernel"):
-        ewa.evaluate(splats, still_life, [0], antialias=True)
     splats.density = False
     assert ewa.evaluate(splats, still_life, [0]).psnr != usual.psnr
     with pytest.raises(ewa.InputError, match="kernel"):
@@ -298,7 +296,7 @@ def test_densities_are_trained_and_kept(still_life, tmp_path):
 
 
 def test_exposures_are_learned(still_life):
-    trainer = ewa.Trainer(still_life, steps=2, exposure=True, train_frames=[0, 1, 2])
+    trainer = ewa.Trainer(still_life, steps=2, appearance="affine", train_frames=[0, 1, 2])
     assert np.array_equal(trainer.exposures(), np.tile(np.eye(3, 4, dtype=np.float32), (3, 1, 1)))
     trained(trainer)
     assert not np.array_equal(

@@ -87,11 +87,6 @@ core::PixelSize size_of(const std::string& text) {
     return *size;
 }
 
-Footprint settled_kernel(Footprint kernel, bool antialias) {
-    scene::check_look({.antialias = antialias, .kernel = kernel == Footprint::density});
-    return antialias ? Footprint::antialias : kernel;
-}
-
 RenderOptions DrawArguments::options() const {
     RunOptions drawn;
     const auto set = [&](const char* name, const std::string& text) {
@@ -108,7 +103,6 @@ RenderOptions DrawArguments::options() const {
     set("kernel", kernel);
     RenderOptions render = drawn.train.render;
     if (sky) render.sky = std::make_shared<const SkyMap>(load_sky(background));
-    render.kernel = settled_kernel(render.kernel, antialias);
     render.sh_degree = sh_degree;
     render.points = points;
     render.nearest = nearest.value_or(render.nearest);
@@ -145,7 +139,6 @@ void add_draw_options(CLI::App& app, DrawArguments& arguments) {
     arguments.kernel_option = app.add_option("--kernel", arguments.kernel, kernel.help)
                                   ->transform(one_of(kernel.choices))
                                   ->capture_default_str();
-    app.add_flag("--antialias", arguments.antialias, "The same as --kernel antialias");
     app.add_flag("--points", arguments.points, train::run_option("points").help);
     const train::RunOption& nearest = train::run_option("nearest");
     app.add_option_function<std::string>(

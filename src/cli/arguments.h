@@ -38,14 +38,10 @@ CLI::Validator accepted_by(const train::RunOption& option);
 /// The size that --size names, such as 1280x720. Throws InputError.
 core::PixelSize size_of(const std::string& text);
 
-/// The kernel, or that of --antialias if it is given. Throws InputError if they exclude each other.
-Footprint settled_kernel(Footprint kernel, bool antialias);
-
-/// How a scene is rendered: --background, --kernel, --antialias, --sh-degree, --points, --nearest, --integrator, --samples.
+/// How a scene is rendered: --background, --kernel, --sh-degree, --points, --nearest, --integrator, --samples.
 struct DrawArguments {
     std::string background = "0,0,0";
     std::string kernel = "peak";
-    bool antialias = false;  // the short form of --kernel antialias
     int sh_degree = kMaxShDegree;
     bool points = false;
     std::optional<int> nearest;
@@ -56,7 +52,7 @@ struct DrawArguments {
     /// Throws InputError if the background is not a colour, or the options exclude each other.
     RenderOptions options() const;
     bool names_background() const { return background_option && background_option->count() > 0; }
-    bool names_kernel() const { return antialias || (kernel_option && kernel_option->count() > 0); }
+    bool names_kernel() const { return kernel_option && kernel_option->count() > 0; }
     /// Reads splats to draw, with warnings of what is skipped. Without a kernel that is named, sets options.kernel to
     /// that of the file: of its density, or its mark of antialiasing. Without a background that is named, a sky.json beside the
     /// file is options.sky. Fits densities to the kernel.

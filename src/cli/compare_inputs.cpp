@@ -181,7 +181,7 @@ void resolve_runs(CLI::App& app, CompareInputs& inputs) {
                                  " were trained with another --" + option +
                                  "; choose one with --cameras DATASET --" + option);
         if (first->flag("points") != input.run->flag("points") && app.count("--points") == 0 &&
-            app.count("--kernel") + app.count("--antialias") == 0)
+            app.count("--kernel") == 0)
             throw InputError(first->folder.string() + " and " + input.run->folder.string() +
                              ": one was trained with --points; choose how both are drawn, with --points or "
                              "--kernel peak");

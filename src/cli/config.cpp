@@ -14,6 +14,7 @@
 #include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "report/former_options.h"
 #include "report/summary.h"
 #include "run/option_table.h"
 
@@ -79,7 +80,7 @@ CLI::Option* find_option(CLI::App& app, const std::string& name) {
 
 bool given(CLI::App& app, const std::string& name) {
     // Each of these says how a splat is drawn.
-    const std::array ways{"kernel", "antialias", "points"};
+    const std::array ways{"kernel", "points"};
     if (std::ranges::find(ways, name) != ways.end())
         return std::ranges::any_of(ways, [&](const char* way) {
             const CLI::Option* option = find_option(app, way);
@@ -91,12 +92,14 @@ bool given(CLI::App& app, const std::string& name) {
 }  // namespace
 
 void apply_config(CLI::App& app, const std::filesystem::path& file) {
-    const Json json = core::read_json_file<Json>(file);
+    const auto json = report::with_present_names(core::read_json_file<Json>(file));
     if (!json.is_object()) throw InputError(file.string() + ": not a JSON object of options");
     std::vector<std::pair<CLI::Option*, std::string>> values;
     for (const auto& [name, value] : json.items()) {
         const std::string where = file.string() + ": \"" + name + "\"";
         CLI::Option* option = find_option(app, name);
+        // A run of another version of ewa writes its options without a value, too.
+        if (!option && (says_nothing(value) || value == false)) continue;
         if (!option) throw InputError(where + " is not an option of ewa " + app.get_name());
         // A file from a stranger decides neither what is replaced nor who may connect.
         if (std::ranges::find(kOnlyOnCommandLine, name) != kOnlyOnCommandLine.end())

@@ -11,8 +11,9 @@ class App;
 
 namespace ewa::cli {
 
-/// Gives each option of `app` the file's value if the command line has none. --kernel and --antialias
-/// count as one option. Throws InputError for a file that is not a JSON object of known names, and for a value of
+/// Gives each option of `app` the file's value if the command line has none. --kernel and --points
+/// count as one option. It reads names of earlier versions of ewa, and ignores unknown names without a value.
+/// Throws InputError for a file that is not a JSON object of known names, and for a value of
 /// another JSON type than a run's config.json has. Throws CLI::Error for a value that its option refuses.
 void apply_config(CLI::App& app, const std::filesystem::path& file);
 

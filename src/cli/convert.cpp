@@ -153,7 +153,8 @@ Work read_all(const ConvertArguments& arguments) {
     if (moved || placed + 1 < arguments.files.size() || !io::place_in(work.save.comments)) drop_place(work);
     if (marks.size() > 1)
         work.lost.push_back(
-            "some inputs were trained with --antialias and others not; the output is marked as anti-aliased");
+            "some inputs were trained with --kernel antialias and others not; the output is marked as "
+            "anti-aliased");
     if (densities.size() > 1)
         work.lost.push_back(
             "some inputs have --kernel density and others not; all opacities are fitted to 3DGS's kernel");

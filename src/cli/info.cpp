@@ -78,7 +78,7 @@ void print_file(const fs::path& path, const SplatScene& scene) {
                scene.variant.empty() ? "" : " (" + scene.variant + ")",
                core::bytes_text(fs::file_size(path)));
     fmt::print("opens in        {}\n", readers_of(scene.format));
-    if (scene.antialiased) fmt::print("anti-aliased    yes: drawn as with --antialias\n");
+    if (scene.antialiased) fmt::print("anti-aliased    yes: drawn as with --kernel antialias\n");
     if (scene.gaussians.density)
         fmt::print("kernel          density; opacities in the file are fitted to 3DGS's kernel\n");
     for (const std::string& comment : scene.comments)

@@ -63,7 +63,7 @@ void take_options_of_run(CLI::App& app, RunOptions& options, bool keep_steps) {
     nlohmann::json values = run->config;
     values.erase("dataset");
     if (keep_steps) values.erase("steps");
-    if (app.count("--kernel") + app.count("--antialias") > 0) values.erase("nearest");  // of --points
+    if (app.count("--kernel") > 0) values.erase("nearest");  // of --points
     const bool own_init = app.count("--init") == 0;
     apply_run_config(app, values, folder / "config.json");
     if (own_init) options.init_folder = live::base_of(folder, options.init).value_or(fs::path());

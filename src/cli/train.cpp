@@ -42,7 +42,7 @@ struct TrainArguments {
     RunOptions run;
     TrainOutput output;
     fs::path config;
-    bool antialias = false, accuracy = false, check_only = false;
+    bool accuracy = false, check_only = false;
     bool makes_dataset = false;  // of RunOptions::scene
     std::string quality;         // empty: not given
 };
@@ -69,8 +69,6 @@ void add_run_options(CLI::App& app, TrainArguments& arguments) {
     for (const train::RunOption& option : train::run_options()) {
         if (option.name == "device") continue;  // comes with --validation
         add_run_option(app, option, arguments.run);
-        if (option.name == "kernel")
-            app.add_flag("--antialias", arguments.antialias, "The same as --kernel antialias");
     }
 }
 
@@ -202,15 +200,11 @@ int run_follower(const RunOptions& options) {
 int run(CLI::App& app, TrainArguments& arguments) {
     const auto begin = Clock::now();
     RunOptions& options = arguments.run;
-    // What the command line alone says is checked before any file is looked at.
-    settled_kernel(options.train.render.kernel, arguments.antialias);
     settle_dataset(options);
     note_scene(arguments);
     take_options_of_run(app, options, app.count("--steps") > 0 || !arguments.quality.empty());
     if (options.dataset.empty()) throw InputError("DATASET is required (see ewa train --help)");
     if (fs::is_directory(options.init)) options.init = splat_input(options.init).file.string();
-    Footprint& kernel = options.train.render.kernel;
-    kernel = settled_kernel(kernel, arguments.antialias);
     if (arguments.accuracy)
         options.report_section = [quiet = arguments.output.quiet](const RunScene& scene) {
             return accuracy_section(scene, quiet);

@@ -28,7 +28,7 @@ const std::map<std::string, std::string>& subjects() {
              "size",      "look-at",  "up",    "orbit",     "film-seconds", "matching",      "visible",
              "view-time", "aperture", "focus", "shutter",   "scene-splats", "geo",           "scale-to"});
         add("Quality",
-            {"quality", "antialias", "integrator", "samples", "runs", "training-steps", "blur-samples"});
+            {"quality", "integrator", "samples", "runs", "training-steps", "blur-samples"});
         add("Output",
             {"output",      "format",    "mode",        "json",      "svg",       "heat-map",    "heat-scale",
              "serve",       "accuracy",  "spz-version", "levels",    "check",     "ranks",       "quiet",

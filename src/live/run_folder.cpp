@@ -7,6 +7,7 @@
 #include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "report/former_options.h"
 #include "report/run_file_names.h"
 
 namespace ewa::live {
@@ -91,7 +92,7 @@ std::optional<Run> find_run(const fs::path& folder) {
     Run run;
     run.folder = folder;
     if (present("splats.ply")) run.splats = folder / "splats.ply";
-    run.config = read_object(folder / "config.json");
+    run.config = report::with_present_names(read_object(folder / "config.json"));
     run.named_dataset = run.text("dataset");
     run.dataset = dataset_of(folder, run.named_dataset);
     return run;

@@ -6,7 +6,9 @@
 
 #include "core/hash.h"
 #include "core/json.h"
+#include "core/text.h"
 #include "ewa/error.h"
+#include "report/former_options.h"
 #include "report/run_file_names.h"
 #include "run/option_table.h"
 #include "train/schedule.h"
@@ -32,6 +34,7 @@ Json parse_settings(const std::filesystem::path& path, const std::string& stored
     }
     if (!json.is_object() || !json.contains("options") || !json["options"].is_object())
         throw InputError(path.string() + ": its settings cannot be read" + kWaysOut);
+    json["options"] = report::with_present_names(std::move(json["options"]));
     return json;
 }
 
@@ -57,6 +60,10 @@ Json normalised(const RunOption& option, const Json& value) {
     } catch (const InputError&) {
         return value;
     }
+}
+
+bool is_option(const std::string& name) {
+    return std::ranges::any_of(run_options(), [&](const RunOption& option) { return option.name == name; });
 }
 
 void add_camera(Hash& hash, const Camera& camera) {
@@ -186,6 +193,11 @@ void check_resumable(const std::filesystem::path& path, const std::string& store
                              other.dump().substr(0, kLongestValue) + ", not " + value.dump() +
                              "; with its own value the run continues, -o DIR starts another run");
     }
+    for (const auto& [name, value] : then["options"].items())
+        if (!is_option(name) && value != false && value != "")
+            throw InputError(path.string() + ": was written with --" + core::one_line(name) + " " +
+                             value.dump().substr(0, kLongestValue) + ", which this version of ewa lacks" +
+                             kWaysOut);
     if (now.contains(kMasksSetting) && then.value(kMasksSetting, Json()) != now[kMasksSetting])
         throw InputError(path.string() + ": the masks of --robust beside it, in " + report::kPassersByFolder +
                          "/, have changed; with the former ones it continues, -o DIR starts another run");

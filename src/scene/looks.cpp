@@ -43,8 +43,6 @@ bool points(const Look& look) {
 
 constexpr std::string_view kNoFootprint = "a sphere has no footprint";
 constexpr std::array kRows{
-    Row{"--antialias", [](const Look& look) { return look.antialias; }, Relation::excludes, "--kernel",
-        [](const Look& look) { return look.kernel; }, "--antialias is the kernel antialias"},
     Row{"--points", points, Relation::excludes, "--kernel antialias", drawn_with<Footprint::antialias>,
         kNoFootprint},
     Row{"--points", points, Relation::excludes, "--kernel density", drawn_with<Footprint::density>,

@@ -25,7 +25,7 @@ inline const core::Words<LensUse> kLensWords{
 /// The options of a render, and which of them are given, be it with the usual value.
 struct Look {
     RenderOptions render = {};
-    bool antialias = false, kernel = false, nearest = false, samples = false;
+    bool nearest = false, samples = false;
 };
 
 /// Throws InputError for options that exclude each other, or need another one.

@@ -90,11 +90,8 @@ void check_exclusions(const TrainOptions& options, int ranks) {
                                               options.device_memory_bytes > 0};
     for (const Exclusion& row : kExclusions)
         for (size_t by = 0; by < divisions; ++by)
-            if (row.used(options) && divided[by] && row.excludes[by]) {
-                const bool synonym = row.option == "--appearance" && options.exposure;
-                throw InputError(
-                    core::excluded(kDivisions[by], synonym ? "--exposure" : row.option, row.reason));
-            }
+            if (row.used(options) && divided[by] && row.excludes[by])
+                throw InputError(core::excluded(kDivisions[by], row.option, row.reason));
 }
 
 void check_training(const TrainOptions& options, int ranks) {
@@ -117,7 +114,8 @@ void check_training(const TrainOptions& options, int ranks) {
     core::check_exclusions(kSkyExclusions, options);
     if (options.exposure && options.appearance != AppearanceModel::none &&
         options.appearance != AppearanceModel::automatic && options.appearance != AppearanceModel::affine)
-        throw InputError("--exposure is --appearance affine: name one of them");
+        throw InputError(
+            "TrainOptions::exposure is AppearanceModel::affine, and appearance names another model");
 }
 
 bool Schedule::densifies(int step) const {

@@ -21,10 +21,12 @@
 #include "core/pixel_size.h"
 #include "core/terminal.h"
 #include "core/typing.h"
+#include "core/words.h"
 #include "ewa/error.h"
 #include "live/run_folder.h"
 #include "run/earlier_run.h"
 #include "scene/dataset_files.h"
+#include "scene/looks.h"
 #include "scene/names.h"
 #include "viewer/app.h"
 #include "viewer/kept_settings.h"
@@ -46,7 +48,8 @@ struct Arguments {
         std::filesystem::path token_file;
     } connect;
     std::string size, background, frame;
-    bool train = false, antialias = false;
+    bool train = false;
+    std::string kernel;  // empty: that of the scene
     std::vector<std::string> train_options;
     DeviceOptions device{.selector = {}, .own_queue = false};  // the window shows what this queue renders
     Startup startup;
@@ -198,8 +201,8 @@ Startup open(const Arguments& arguments) {
     startup.frame = frame_of(arguments.frame, startup.scene.dataset.get());
     startup.settings.cameras = startup.scene.gaussians->size() == 0;
     Look& look = startup.settings.look;
-    look.kernel = arguments.antialias ? Footprint::antialias : startup.scene.look.kernel;
-    look.points = startup.scene.look.points && !arguments.antialias;
+    look.kernel = core::find_value(scene::kKernelWords, arguments.kernel).value_or(startup.scene.look.kernel);
+    look.points = startup.scene.look.points && arguments.kernel.empty();
     look.nearest = startup.scene.look.nearest;
     look.background = startup.scene.look.background;
     look.sky = startup.scene.look.sky;
@@ -287,7 +290,12 @@ void add_options(CLI::App& app, Arguments& arguments) {
         ->transform(one_of(kComparisons));
     option("--background", arguments.background, "COLOUR",
            "Background colour: r,g,b in 0..1, a name such as white, or #rrggbb");
-    app.add_flag("--antialias", arguments.antialias, "Render with the filter of Mip-Splatting");
+    option(
+        "--kernel", arguments.kernel, "peak|antialias|density",
+        "Footprint of a splat: peak (3DGS), antialias (Mip-Splatting) or density (EWA) [that of the scene]")
+        ->transform(CLI::Validator(
+            [](std::string& text) { return core::settle_word(text, core::words_of(scene::kKernelWords)); },
+            ""));
     option("--budget", arguments.budget, "N",
            "Splats to show of a lod-meta.json while the view changes: a level with at most so many [1M]")
         ->transform(CLI::Validator(
@@ -314,7 +322,7 @@ void group_options(CLI::App& app) {
     const std::pair<const char*, std::vector<const char*>> subjects[] = {
         {"Data", {"--cameras", "--frame", "--views"}},
         {"Training", {"--train", "--output", "--connect", "--token", "--token-file"}},
-        {"Quality", {"--mode", "--compare", "--background", "--antialias", "--budget"}},
+        {"Quality", {"--mode", "--compare", "--background", "--kernel", "--budget"}},
         {"Output", {"--size", "--screenshot", "--film", "--film-seconds", "--verbose"}},
         {"Device", {"--device"}}};
     for (const auto& [subject, names] : subjects)

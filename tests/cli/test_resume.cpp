@@ -163,7 +163,7 @@ TEST_F(ResumeEdges, RefusesWhatWouldEndDifferently) {
     expect_failure(train("o", {"--steps", "5", "--seed", "1", "--resume"}), 2,
                    "is at step 6, after the last of --steps 5");
     expect_failure(train("o", {"--steps", "6", "--seed", "2", "--resume"}), 2, "--seed 1, not 2");
-    refused({"--antialias"}, "--kernel");
+    refused({"--kernel", "antialias"}, "--kernel");
     refused({"--background", "1,1,1"}, "--background");
     refused({"--sh-degree", "1"}, "--sh-degree");
     refused({"--test-every", "2"}, "--test-every 8, not 2");

@@ -96,7 +96,7 @@ TEST_F(Runs, PointsExcludeWhatSpheresDoNotHave) {
     };
     const Names drawing{"render", folder / "s.ply", "--cameras", folder / "data", "-o", folder / "r"};
     fails(drawing, {"--kernel", "ewa"}, "--points and --kernel density exclude each other");
-    fails(drawing, {"--antialias"}, "--points and --kernel antialias exclude each other");
+    fails(drawing, {"--kernel", "antialias"}, "--points and --kernel antialias exclude each other");
     fails(drawing, {"--integrator", "ray"}, "--points and --integrator exclude each other");
     fails(drawing, {"--nearest", "0"}, "'0' is not a whole number from 1 to 1000");
     const Names training{"train", folder / "data", "-o", folder / "t"};
@@ -117,7 +117,7 @@ TEST_F(Runs, PointsExcludeWhatSpheresDoNotHave) {
 }
 
 TEST_F(Runs, EvalAndRenderUseTheExposures) {
-    const std::string run = train("run", {"--exposure"});
+    const std::string run = train("run", {"--appearance", "affine"});
     const auto train_psnr = [&](const Names& more) {
         Names all{"eval", run, "--split", "train", "--json", folder / "e.json"};
         all.insert(all.end(), more.begin(), more.end());
@@ -182,9 +182,6 @@ TEST_F(Runs, EvalAndRenderUseTheAppearances) {
     EXPECT_NE(psnr({"--appearance-of", "images/1.png"}), psnr({}));
     expect_failure(run_ewa({"render", run, "--appearance-of", "images/1.pgn", "-o", folder / "r"}), 2,
                    "did you mean images/1.png?");
-    expect_failure(
-        run_ewa({"train", folder / "data", "-o", folder / "t", "--appearance", "grid", "--exposure"}), 2,
-        "--exposure is --appearance affine: name one of them");
     const Outcome chosen =
         run_ewa({"train", folder / "data", "-o", folder / "auto", "--steps", "2", "--appearance", "auto"});
     EXPECT_NE((chosen.out + chosen.err).find("appearance none: "), std::string::npos) << chosen.out;
@@ -408,7 +405,7 @@ TEST_F(Runs, RenderShowsTheViewsOfTheDataset) {
     const std::string run = train("run");
     expect_success(run_ewa({"render", run, "-o", folder / "views"}));
     EXPECT_EQ(files_below(folder / "views"), (Names{"0.png", "1.png", "2.png", "3.png", "4.png"}));
-    const Names options{"--background", "0.9,0.8,1", "--downscale", "2", "--antialias"};
+    const Names options{"--background", "0.9,0.8,1", "--downscale", "2", "--kernel", "antialias"};
     Names plain{"render", run + "/splats.ply", "--cameras", folder / "data", "-o", folder / "plain"};
     plain.insert(plain.end(), options.begin(), options.end());
     expect_success(run_ewa(plain));

@@ -80,15 +80,16 @@ TEST_F(Train, VerboseTellsThePlan) {
     EXPECT_EQ(plain.out.find("left out: densification statistics"), std::string::npos) << plain.out;
     EXPECT_NE(read_file(folder / "o/report.html").find("appearance of images, its passes"),
               std::string::npos);
-    const Outcome other = train("p", {"--steps", "1", "--strategy", "mcmc", "--exposure", "--verbose"});
+    const Outcome other =
+        train("p", {"--steps", "1", "--strategy", "mcmc", "--appearance", "affine", "--verbose"});
     expect_success(other);
     EXPECT_EQ(other.out.find("left out: appearance of images"), std::string::npos) << other.out;
     EXPECT_NE(other.out.find("left out: densification statistics"), std::string::npos) << other.out;
 }
 
 TEST_F(Train, ConfigOfARunRepeatsIt) {
-    expect_success(
-        train("a", {"--steps", "15", "--seed", "3", "--antialias", "--background", "1,1,1", "--quiet"}));
+    expect_success(train(
+        "a", {"--steps", "15", "--seed", "3", "--kernel", "antialias", "--background", "1,1,1", "--quiet"}));
     expect_success(run_ewa({"train", "--config", folder / "a/config.json", "-o", folder / "b", "--quiet"}));
     EXPECT_EQ(read_file(folder / "a/splats.ply"), read_file(folder / "b/splats.ply"));
     EXPECT_EQ(read_file(folder / "a/config.json"), read_file(folder / "b/config.json"));

@@ -41,7 +41,7 @@ TEST_F(Typed, IntegratorsTakeWhatTheyCanUse) {
     };
     expect_failure(render({"--samples", "8"}), 2, "--samples is an option of --integrator march");
     expect_failure(render({"--integrator", "march", "--samples", "5000"}), 2, "--samples");
-    expect_failure(render({"--integrator", "march", "--antialias"}), 2,
+    expect_failure(render({"--integrator", "march", "--kernel", "antialias"}), 2,
                    "--integrator march and --kernel antialias exclude each other");
     expect_failure(render({"--integrator", "march", "--mode", "depth"}), 2,
                    "the integrator march draws no depth; the others do");
@@ -137,8 +137,8 @@ TEST_F(Typed, ConfigValuesHaveTheirType) {
         {R"({"steps": true})", "\"steps\" takes a value, not true or false"},
         {R"({"steps": [3]})", "\"steps\" takes one value, not a list"},
         {R"({"sh-degree": "2"})", "\"sh-degree\" must be a number"},
-        {R"({"exposure": "true"})", "\"exposure\" must be true or false, without quotes"},
-        {R"({"exposure": 1})", "\"exposure\" must be true or false"},
+        {R"({"absgrad": "true"})", "\"absgrad\" must be true or false, without quotes"},
+        {R"({"absgrad": 1})", "\"absgrad\" must be true or false"},
         {R"({"quiet": "yes"})", "\"quiet\" must be true or false"},
         {R"({"init": 3})", "\"init\" must be a text in quotes"},
         {R"({"dataset": 3})", "\"dataset\" must be a text in quotes"}};
@@ -150,13 +150,32 @@ TEST_F(Typed, ConfigValuesHaveTheirType) {
             2, std::string("c.json: ") + mistake);
     }
     write_file(file,
-               R"({"steps": 2.0, "sh-degree": "auto", "background": [1, 1, 1], "device": 0, "exposure": true,
-                         "strategy": "none", "quiet": true, "save-every": null})");
+               R"({"steps": 2.0, "sh-degree": "auto", "background": [1, 1, 1], "device": 0, "absgrad": true,
+                         "strategy": "adc", "quiet": true, "save-every": null})");
     expect_success(train({"--config", file}));
     const auto config = read_json(folder / "run/config.json");
     EXPECT_EQ(config["steps"], 2);
     EXPECT_EQ(config["background"], "1,1,1");
-    EXPECT_EQ(config["exposure"], true);
+    EXPECT_EQ(config["absgrad"], true);
+}
+
+/// Runs of earlier versions of ewa have flags of their own for two values, and options that are gone.
+TEST_F(Typed, ConfigsOfEarlierVersionsAreRead) {
+    const std::string file = folder / "c.json";
+    write_file(file, R"({"steps": 2, "appearance": "none", "exposure": true, "antialias": true,
+                         "smoothness": false, "smoothing-file": "", "quiet": true})");
+    expect_success(train({"--config", file}));
+    auto config = read_json(folder / "run/config.json");
+    EXPECT_EQ(config["appearance"], "affine");
+    EXPECT_EQ(config["kernel"], "antialias");
+    config["appearance"] = "none";
+    config["exposure"] = true;
+    write_file(folder / "run/config.json", config.dump());
+    expect_success(run_ewa({"train", folder / "run", "--resume", "--steps", "3", "--quiet"}));
+    EXPECT_EQ(read_json(folder / "run/config.json")["appearance"], "affine");
+    EXPECT_EQ(read_json(folder / "run/config.json")["steps"], 3);
+    write_file(file, R"({"smoothness": 3})");
+    expect_failure(train({"--config", file}), 2, "\"smoothness\" is not an option of ewa train");
 }
 
 TEST_F(Typed, NoLibrarySpeaks) {

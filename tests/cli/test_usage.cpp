@@ -124,7 +124,6 @@ INSTANTIATE_TEST_SUITE_P(
         WrongUse{{"train", "/nowhere", "--save-every", "x"}, "--save-every"},
         WrongUse{{"train", "/nowhere", "--strategy", "luck"}, "--strategy"},
         WrongUse{{"train", "/nowhere", "--kernel", "box"}, "--kernel"},
-        WrongUse{{"train", "/nowhere", "--kernel", "ewa", "--antialias"}, "--antialias"},
         WrongUse{{"train", "/nowhere", "--background", "1,1"}, "--background"},
         WrongUse{{"train", "/nowhere", "--background", "1,nan,1"}, "--background"},
         WrongUse{{"train", "/nowhere", "--background", "0,0,2"}, "--background"},

@@ -191,7 +191,7 @@ TEST_F(Views, TheMarkOfAntialiasingIsUsed) {
         return folder / name;
     };
     const std::string marked_image = image("marked.png", {});
-    EXPECT_TRUE(same_pixels(marked_image, image("antialias.png", {"--antialias"})));
+    EXPECT_TRUE(same_pixels(marked_image, image("antialias.png", {"--kernel", "antialias"})));
     EXPECT_FALSE(same_pixels(marked_image, folder / "peak.png"));
     EXPECT_TRUE(same_pixels(image("given.png", {"--kernel", "peak"}), folder / "peak.png"));
     // Through the cameras of a dataset too.
@@ -207,13 +207,13 @@ TEST_F(Views, TheMarkOfAntialiasingIsUsed) {
         arguments.insert(arguments.end(), more.begin(), more.end());
         return arguments;
     };
-    EXPECT_EQ(text(eval), text(with(eval, {"--antialias"})));
+    EXPECT_EQ(text(eval), text(with(eval, {"--kernel", "antialias"})));
     EXPECT_NE(text(eval), text(with(eval, {"--kernel", "peak"})));
     const Names frame{"render", file, "--cameras", data, "--frames", "0", "--quiet", "-o"};
     text(with(frame, {folder / "f.png"}));
-    text(with(frame, {folder / "g.png", "--antialias"}));
+    text(with(frame, {folder / "g.png", "--kernel", "antialias"}));
     EXPECT_TRUE(same_pixels(folder / "f.png", folder / "g.png"));
-    text({"render", file, "--cameras", data, "--antialias", "--format", "exr", "--quiet", "-o",
+    text({"render", file, "--cameras", data, "--kernel", "antialias", "--format", "exr", "--quiet", "-o",
           folder / "all"});
     text({"compare", file, folder / "all", "--cameras", data, "--max-error", "1e-6"});
     // What has no footprints ignores it.

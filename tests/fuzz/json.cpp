@@ -56,7 +56,7 @@ void configure(const std::string& path) {
     app.add_option("--steps", steps)->check(CLI::Range(1, 1000000));
     app.add_option("--background", background);
     app.add_option("--kernel", kernel)->check(CLI::IsMember({"peak", "antialias", "density", "ewa"}));
-    app.add_flag("--antialias", quiet);
+    app.add_flag("--absgrad", quiet);
     try {
         cli::apply_config(app, path);
     } catch (const CLI::Error&) {

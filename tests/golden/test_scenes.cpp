@@ -89,7 +89,7 @@ TEST(GoldenOneSplat, ReferenceIsTheClosedForm) {
     EXPECT_TRUE(matches_golden("one_splat", expected, {1e-5, 1e-5, 0}, "closed form"));
 }
 
-/// What --antialias is for: the mean over many rays through each pixel. The peak kernel draws sub-pixel
+/// What --kernel antialias is for: the mean over many rays through each pixel. The peak kernel draws sub-pixel
 /// splats too large.
 TEST(GoldenAntialias, IsNearerToSupersampling) {
     constexpr int kFactor = 8;

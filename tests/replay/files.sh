@@ -109,7 +109,7 @@ row_one_frame_of_a_run_is_one_image() {
 }
 
 row_the_mark_of_antialiasing_survives_every_format_that_has_one() {
-    run 0 ewa train "$DATASET" -o run --steps 2 --antialias --quiet
+    run 0 ewa train "$DATASET" -o run --steps 2 --kernel antialias --quiet
     for name in m.ply m.compressed.ply m.spz m.sog meta.json; do
         run 0 ewa convert run $name --quiet
         run 0 ewa info $name
@@ -119,7 +119,7 @@ row_the_mark_of_antialiasing_survives_every_format_that_has_one() {
     says "anti-aliased is dropped"
     run 0 ewa eval m.ply "$DATASET" --split all
     grep -o 'PSNR.*dB' ../out > marked
-    run 0 ewa eval m.ply "$DATASET" --split all --antialias
+    run 0 ewa eval m.ply "$DATASET" --split all --kernel antialias
     grep -o 'PSNR.*dB' ../out > given
     same marked given
 }

@@ -29,8 +29,8 @@ row_save_makes_its_folder() {
 }
 
 row_errors_of_training_name_arguments() {
-    run 1 in_python "import ewa; ewa.Trainer(ewa.Dataset('$DATASET'), bands=2, exposure=True)"
-    says "bands= and exposure= exclude each other"
+    run 1 in_python "import ewa; ewa.Trainer(ewa.Dataset('$DATASET'), bands=2, appearance='affine')"
+    says "bands= and appearance= exclude each other"
     silent_about "--bands"
 }
 

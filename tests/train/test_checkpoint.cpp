@@ -189,6 +189,24 @@ TEST(CheckpointSettings, WithoutMomentsHave32Bits) {
     EXPECT_NO_THROW(train::check_resumable("c", stored.dump(), train::checkpoint_settings(options, "x")));
 }
 
+TEST(CheckpointSettings, OfEarlierVersionsHaveTheirOwnNames) {
+    RunOptions options;
+    options.train.appearance = AppearanceModel::affine;
+    const auto now = train::checkpoint_settings(options, "x");
+    auto stored = now;
+    stored["options"]["appearance"] = "none";
+    stored["options"]["exposure"] = true;
+    stored["options"]["smoothness"] = false;
+    EXPECT_NO_THROW(train::check_resumable("c", stored.dump(), now));
+    stored["options"]["exposure"] = false;
+    expect_error<InputError>([&] { train::check_resumable("c", stored.dump(), now); },
+                             {"--appearance \"none\", not \"affine\""});
+    stored["options"]["exposure"] = true;
+    stored["options"]["smoothness"] = 3;
+    expect_error<InputError>([&] { train::check_resumable("c", stored.dump(), now); },
+                             {"--smoothness 3, which this version of ewa lacks"});
+}
+
 TEST(TrainerRestore, RefusesMomentsOfOtherBits) {
     TrainOptions options;
     options.steps = 10;

@@ -418,7 +418,6 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                              {"absgrad", "true"},
                                              {"region", "-1,-2,-3,0.5,1,2"},
                                              {"loss", "l1=0.5,l2=2,ssim=0.25,alpha=0.5"},
-                                             {"exposure", "true"},
                                              {"appearance", "grid"},
                                              {"resolution-schedule", "3"},
                                              {"init", "random"},

@@ -25,8 +25,8 @@ TEST_F(Window, ShowsWhatRenderWrites) {
 }
 
 TEST_F(Window, ShowsWhatRenderWritesWithItsOptions) {
-    EXPECT_LE(largest_difference(shown({"--frame", "1", "--background", "1,0.5,0", "--antialias"}),
-                                 rendered("1", {"--background", "1,0.5,0", "--antialias"})),
+    EXPECT_LE(largest_difference(shown({"--frame", "1", "--background", "1,0.5,0", "--kernel", "antialias"}),
+                                 rendered("1", {"--background", "1,0.5,0", "--kernel", "antialias"})),
               kRounding);
     EXPECT_LE(
         largest_difference(shown({"--frame", "1", "--mode", "alpha"}), rendered("1", {"--mode", "alpha"})),
@@ -78,10 +78,11 @@ TEST_F(Window, ADatasetShowsItsPoints) {
 
 TEST_F(Window, ARunIsShownWithItsDatasetAndItsOptions) {
     expect_success(run_ewa({"train", cameras_, "-o", folder_ / "run", "--steps", "3", "--init", splats_,
-                            "--background", "1,1,1", "--antialias", "--quiet"}));
+                            "--background", "1,1,1", "--kernel", "antialias", "--quiet"}));
     expect_silent(run_view({folder_ / "run", "--frame", "1", "--screenshot", folder_ / "shown.png"}));
-    expect_silent(run_ewa({"render", folder_ / "run/splats.ply", "--cameras", cameras_, "--frames", "1", "-o",
-                           folder_ / "rendered", "--background", "1,1,1", "--antialias", "--quiet"}));
+    expect_silent(
+        run_ewa({"render", folder_ / "run/splats.ply", "--cameras", cameras_, "--frames", "1", "-o",
+                 folder_ / "rendered", "--background", "1,1,1", "--kernel", "antialias", "--quiet"}));
     EXPECT_LE(largest_difference(load_image(folder_ / "shown.png"), load_image(folder_ / "rendered/1.png")),
               kRounding);
 }
