@@ -74,7 +74,7 @@ bool says_nothing(const Json& value) {
 
 CLI::Option* find_option(CLI::App& app, const std::string& name) {
     if (name == "dataset") return app.get_option_no_throw("DATASET");
-    if (name == "config" || name == "help") return nullptr;
+    if (name == "config" || name == "help" || name == "help-all") return nullptr;
     return app.get_option_no_throw("--" + name);
 }
 

@@ -10,6 +10,7 @@
 #include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/interrupt.h"
+#include "cli/short_help.h"
 #include "cli/status.h"
 #include "cli/usage.h"
 #include "core/exclusion.h"
@@ -27,7 +28,7 @@ struct Command {
     Action action = {};
 };
 
-/// --help and --version: what CLI11 prints.
+/// --help, --help-all and --version: what CLI11 prints.
 int print_text(const CLI::App& app, const CLI::ParseError& asked) {
     std::ostringstream text;
     app.exit(asked, text, text);
@@ -100,6 +101,7 @@ int run_arguments(int argc, char** argv) {
         command.app = app.add_subcommand(command.name, command.description);
         command.action = command.add(*command.app);
         group_by_subject(*command.app);
+        use_short_help(*command.app);
     }
     core::refuse_empty_values<CLI::Validator>(app);
 

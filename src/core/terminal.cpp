@@ -58,6 +58,11 @@ std::string wrapped_help(std::string_view text, size_t column, size_t width) {
     return result;
 }
 
+std::string first_sentence(std::string_view text) {
+    const size_t end = text.find(". ");
+    return std::string(text.substr(0, end));
+}
+
 std::string help_text(std::string_view text, size_t column) {
     return wrapped_help(text, column, terminal_width());
 }

@@ -4,10 +4,13 @@
 #include <cctype>
 #include <charconv>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
+#include <vector>
 
 #include "ewa/error.h"
 
@@ -52,13 +55,37 @@ std::optional<T> parse_integer(std::string_view word) {
 /// column: where the descriptions of options begin.
 std::string help_text(std::string_view text, size_t column);
 
+/// The text up to its first full stop that a blank follows, without that stop.
+std::string first_sentence(std::string_view text);
+
+/// The options that a short help shows, by their long names or those of positionals. A text replaces the first sentence
+/// of the option's own; empty: none.
+using ShortHelp = std::map<std::string, std::string>;
+
 /// Makes a CLI11 parser and the sub-commands that are added later print their help in this way, with defaults in
 /// brackets. A template, so that this module does not need CLI11: Formatter is CLI::Formatter.
+/// brief: the options that --help shows; --help-all shows all of them. Empty: --help shows all.
 template <class Formatter, class App>
-void use_help_text(App& app) {
-    app.formatter_fn([](const App* shown, const std::string& name, auto mode) {
+void use_help_text(App& app, ShortHelp brief = {}) {
+    app.formatter_fn([brief = std::move(brief)](const App* shown, const std::string& name, auto mode) {
         using Option = std::remove_pointer_t<typename decltype(shown->get_options({}))::value_type>;
         struct Plain : Formatter {
+            const ShortHelp* brief = nullptr;
+            std::string name_of(const Option* option) const {
+                return option->get_lnames().empty() ? option->get_name() : option->get_lnames().front();
+            }
+            std::string make_group(std::string group, bool positional,
+                                   std::vector<const Option*> options) const override {
+                if (brief)
+                    std::erase_if(options, [&](auto* option) { return !brief->contains(name_of(option)); });
+                return options.empty() ? "" : Formatter::make_group(std::move(group), positional, options);
+            }
+            std::string make_option_desc(const Option* option) const override {
+                std::string whole = Formatter::make_option_desc(option);
+                if (!brief) return whole;
+                const std::string& text = brief->at(name_of(option));
+                return text.empty() ? first_sentence(whole) : text;
+            }
             std::string make_option_opts(const Option* option) const override {
                 std::string text = option->get_type_size() == 0 ? "" : option->get_type_name();
                 // Options of a few words have these in place of a type.
@@ -74,7 +101,12 @@ void use_help_text(App& app) {
         constexpr size_t kColumn = 30;
         Plain formatter;
         formatter.column_width(kColumn);
-        return help_text(formatter.make_help(shown, name, mode), kColumn);
+        std::string rest;
+        if (!brief.empty() && mode != decltype(mode)::All) {
+            formatter.brief = &brief;
+            rest = "\n" + name + " --help-all has the other options, and says more about these.\n";
+        }
+        return help_text(formatter.make_help(shown, name, mode) + rest, kColumn);
     });
 }
 

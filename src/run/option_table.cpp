@@ -224,11 +224,10 @@ RunOption tensorboard_option() {
 }
 
 RunOption keep_option() {
-    RunOption option = number<int>(
+    return number<int>(
         "keep", "N",
         "With --save-every: also keep the splats of the last N saves, as splats_007000.ply and so on",
         kDoesNotDecide, [](RunOptions& o) -> int& { return o.keep; }, 0, 1000000);
-    return option;
 }
 
 RunOption inria_option() {
@@ -291,15 +290,17 @@ struct Row {
     const char* subject;
     const char* python;  // empty: Python does not have it
     RunOption option;
+    const char* brief = "";
 };
 
 std::vector<Row> rows() {
     return {
-        {"Data", "", dataset_option()},
+        {"Data", "", dataset_option(), "Dataset, photos, a video, a glTF scene, or a run"},
         {"Quality", "steps",
          number<int>(
              "steps", "N", "Training views: an optimisation step takes one of them, or --batch", kDecides,
-             [](RunOptions& o) -> int& { return o.train.steps; }, 1, kMostSteps)},
+             [](RunOptions& o) -> int& { return o.train.steps; }, 1, kMostSteps),
+         "Training views; each step takes one"},
         {"Quality", "batch", batch_option()},
         {"Quality", "bands", bands_option()},
         {"Quality", "strategy",
@@ -307,10 +308,11 @@ std::vector<Row> rows() {
              "strategy",
              "adc adds and removes splats (3DGS). mcmc relocates dead splats and grows to --max-splats "
              "(3DGS-MCMC). none keeps the number of splats. auto is mcmc from 5000 steps on, else adc",
-             [](RunOptions& o) -> Strategy& { return o.train.strategy; }, kStrategies)},
-        {"Quality", "max_splats", max_splats_option()},
+             [](RunOptions& o) -> Strategy& { return o.train.strategy; }, kStrategies),
+         "adc adds splats as 3DGS does, mcmc as 3DGS-MCMC"},
+        {"Quality", "max_splats", max_splats_option(), "Upper limit of the number of splats"},
         {"Quality", "final_splats", final_splats_option()},
-        {"Quality", "sh_degree", sh_degree_option()},
+        {"Quality", "sh_degree", sh_degree_option(), "Highest SH degree of view-dependent colour"},
         {"Quality", "absolute_gradients",
          flag("absgrad",
               "adc: add splats where the sum of the pixels' absolute gradients is large (AbsGS). Such "
@@ -319,8 +321,8 @@ std::vector<Row> rows() {
               [](RunOptions& o) -> bool& { return o.train.absolute_gradients; })},
         {"Quality", "region", region_option()},
         {"Quality", "loss", loss_option()},
-        {"Quality", "appearance", appearance_option()},
-        {"Quality", "refine_poses", refine_poses_option()},
+        {"Quality", "appearance", appearance_option(), "Learn the colours of images of varying exposure"},
+        {"Quality", "refine_poses", refine_poses_option(), "Learn a small correction of each camera"},
         {"Quality", "refine_focal", refine_focal_option()},
         {"Quality", "", rolling_shutter_option()},
         {"Quality", "halvings", resolution_schedule_option()},
@@ -331,7 +333,8 @@ std::vector<Row> rows() {
                "stereo: points on whose depth the images agree. random: where the cameras look. FILE: a "
                "splat file, "
                "a PLY of points, or the folder of a run",
-               kDecides, [](RunOptions& o) -> std::string& { return o.init; })},
+               kDecides, [](RunOptions& o) -> std::string& { return o.init; }),
+         "First splats. sfm: at the points of the dataset"},
         {"Data", "dense_start", dense_start_option()},
         {"Data", "init_opacity",
          real(
@@ -344,19 +347,21 @@ std::vector<Row> rows() {
              "file has "
              "its own",
              [](RunOptions& o) -> double& { return o.init_scale; }, 0.001, 1000)},
-        {"Data", "", frames_option()},
+        {"Data", "", frames_option(), "Use only these images, such as 0,3 or 5-9"},
         {"Data", "", level_option()},
         {"Data", "",
          number<int>(
              "downscale", "K", "Divide the images' width and height by this", kDecides,
-             [](RunOptions& o) -> int& { return o.downscale; }, 1, 1024)},
-        {"Data", "", max_width_option()},
+             [](RunOptions& o) -> int& { return o.downscale; }, 1, 1024),
+         "Divide the images' width and height by this"},
+        {"Data", "", max_width_option(), "Reduce wider images to this width, px. 0: no limit"},
         {"Data", "",
          choice<MaskUse>(
              "masks",
              "What masks/ and alpha are for. ignore: masked pixels do not count. cut: masked pixels have the "
              "background's colour. none: neither is used. auto: ignore if there are mask files, else cut",
-             [](RunOptions& o) -> MaskUse& { return o.masks; }, scene::kMaskWords)},
+             [](RunOptions& o) -> MaskUse& { return o.masks; }, scene::kMaskWords),
+         "What masks/ and alpha do"},
         {"Data", "",
          choice<LensUse>(
              "lens",
@@ -365,11 +370,13 @@ std::vector<Row> rows() {
              "lens. undistort: the images are resampled. auto: native for 360 degrees and parallel rays, "
              "else "
              "undistort",
-             [](RunOptions& o) -> LensUse& { return o.lens; }, scene::kLensWords)},
+             [](RunOptions& o) -> LensUse& { return o.lens; }, scene::kLensWords),
+         "Render through lenses, or undistort their images"},
         {"Data", "",
          number<int>(
              "test-every", "K", "Hold out every K-th image in name order. 0: none", kDecides,
-             [](RunOptions& o) -> int& { return o.test_every; }, 0, 1000000000)},
+             [](RunOptions& o) -> int& { return o.test_every; }, 0, 1000000000),
+         "Hold out every K-th image for evaluation"},
         {"Data", "",
          later_flag("skip-blurred", "Do not train on images that are blurred far more than the others",
                     [](RunOptions& o) -> bool& { return o.skip_blurred; })},
@@ -380,15 +387,17 @@ std::vector<Row> rows() {
          later_flag("robust",
                     "Mask what single images show and the others do not, such as people who pass by. A short "
                     "training first finds it; DIR/passers_by has the masks",
-                    [](RunOptions& o) -> bool& { return o.robust; })},
+                    [](RunOptions& o) -> bool& { return o.robust; }),
+         "Mask what only single images show: passers-by"},
         {"Quality", "seed",
          number<uint64_t>(
              "seed", "S", "The same seed on the same device gives the same bytes", kDecides,
-             [](RunOptions& o) -> uint64_t& { return o.train.seed; }, uint64_t(0), UINT64_MAX)},
+             [](RunOptions& o) -> uint64_t& { return o.train.seed; }, uint64_t(0), UINT64_MAX),
+         "The same seed gives the same bytes"},
         {"Device", "moment_bits", moments_option()},
         {"Device", "image_cache_bytes", image_cache_option()},
         {"Device", "device_memory_bytes", device_memory_option()},
-        {"Quality", "background", background_option()},
+        {"Quality", "background", background_option(), "r,g,b in 0..1, a name such as white, random or sky"},
         {"Quality", "kernel",
          choice<Footprint>(
              "kernel",
@@ -401,7 +410,8 @@ std::vector<Row> rows() {
         {"Output", "",
          number<int>(
              "eval-every", "N", "Evaluate the held-out views every N steps. 0: only at the end",
-             kDoesNotDecide, [](RunOptions& o) -> int& { return o.eval_every; }, 0, kMostSteps)},
+             kDoesNotDecide, [](RunOptions& o) -> int& { return o.eval_every; }, 0, kMostSteps),
+         "Evaluate the held-out views every N steps"},
         {"Output", "", metrics_option()},
         {"Output", "", tensorboard_option()},
         {"Output", "",
@@ -409,12 +419,14 @@ std::vector<Row> rows() {
              "save-every", "N",
              "Save splats.ply and checkpoint.ewa every N steps. 0: save the checkpoint every 30 seconds or "
              "more",
-             kDoesNotDecide, [](RunOptions& o) -> int& { return o.save_every; }, 0, kMostSteps)},
+             kDoesNotDecide, [](RunOptions& o) -> int& { return o.save_every; }, 0, kMostSteps),
+         "Save splats and a checkpoint every N steps"},
         {"Output", "", keep_option()},
         {"Output", "", inria_option()},
         {"Device", "",
          words("device", "NAME|N", "Number of a device, or part of its name (see ewa devices)",
-               kDoesNotDecide, [](RunOptions& o) -> std::string& { return o.device.selector; })},
+               kDoesNotDecide, [](RunOptions& o) -> std::string& { return o.device.selector; }),
+         "Device by its number or name (see ewa devices)"},
         {"Device", "",
          number<int>(
              "rank-timeout", "S",
@@ -428,6 +440,7 @@ std::vector<RunOption> make_table() {
     for (Row& row : rows()) {
         row.option.subject = row.subject;
         row.option.python = row.python;
+        row.option.brief = row.brief;
         table.push_back(std::move(row.option));
     }
     std::ranges::move(advanced_options(), std::back_inserter(table));

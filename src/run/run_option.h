@@ -25,6 +25,7 @@ struct RunOption {
     std::string before = {};
     std::string subject =
         {};  // the heading in the help; empty: an advanced option, which the help does not show
+    std::string brief = {};   // in the short help; empty: only the whole help has the option
     std::string python = {};  // the argument of ewa.Trainer; empty: it has none
 };
 

@@ -114,7 +114,7 @@ TEST_F(Train, ConfigSetsRatesThatTheHelpDoesNotShow) {
     EXPECT_EQ(read_file(folder / "b/splats.ply"), read_file(folder / "c/splats.ply"));
     expect_failure(train("d", {"--config", folder / "wrong.json"}), 2,
                    "'0.5' is not a number from 1 to 1000");
-    EXPECT_EQ(run_ewa({"train", "--help"}).out.find("means-rate"), std::string::npos);
+    EXPECT_EQ(run_ewa({"train", "--help-all"}).out.find("means-rate"), std::string::npos);
 }
 
 TEST_F(Train, QualityGivesWhatIsNotGiven) {

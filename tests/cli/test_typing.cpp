@@ -282,7 +282,7 @@ TEST(Help, FailsWhereTheDiskIsFull) {
 }
 
 TEST(Help, GroupsOptionsBySubject) {
-    const std::string help = run_ewa({"train", "--help"}).out;
+    const std::string help = run_ewa({"train", "--help-all"}).out;
     size_t at = 0;
     for (const char* part :
          {"\nOptions:\n", "--help", "\nOutput:\n", "--output", "\nQuality:\n", "--steps, --iterations",

@@ -2,6 +2,8 @@
 // Wrong use: exit status 2, one line, nothing written.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <set>
 #include <sstream>
 
 #include "cli/expect.h"
@@ -34,11 +36,13 @@ TEST(Usage, HelpFitsATerminal) {
         for (std::string line; std::getline(help, line); ++lines) EXPECT_LE(line.size(), 80u) << line;
         EXPECT_GT(lines, 5u) << command;
     }
-    const std::string help = run_ewa({"train", "--help"}).out;
+    const std::string help = run_ewa({"train", "--help-all"}).out;
     EXPECT_NE(help.find("\n  -o, --output DIR  "), std::string::npos) << help;
     EXPECT_NE(help.find("--strategy auto|adc|mcmc|none [auto]"), std::string::npos) << help;
     EXPECT_EQ(help.find("Excludes:"), std::string::npos) << help;
 }
+
+constexpr const char* kWithShortHelp[] = {"train", "render", "convert", "compare"};
 
 /// Each line of the help, and that no line breaks a word: a terminal of 80 columns wraps longer lines
 /// anywhere.
@@ -61,17 +65,59 @@ TEST(Usage, HelpFits80ColumnsForEveryCommand) {
             commands.push_back(line.substr(2, line.find(' ', 2) - 2));
     EXPECT_GE(commands.size(), 10u) << all.out;
     for (const std::string& command : commands) expect_80_columns(command, run_ewa({command, "--help"}));
+    for (const char* command : kWithShortHelp) expect_80_columns(command, run_ewa({command, "--help-all"}));
 #ifdef EWA_VIEW_PROGRAM
     expect_80_columns("ewa-view", run_ewa({"--help"}, {.program = EWA_VIEW_PROGRAM}));
 #endif
     // Wrapping loses no words, and the rest of a description continues in its own column.
-    const std::string train = run_ewa({"train", "--help"}).out;
+    const std::string train = run_ewa({"train", "--help-all"}).out;
     const size_t from = train.find("--strategy"), to = train.find("\n  --max-splats");
     ASSERT_TRUE(from < to && to != std::string::npos) << train;
     const std::string strategy = train.substr(from, to - from);
     EXPECT_NE(strategy.find("\n" + std::string(30, ' ')), std::string::npos) << strategy;
     for (const char* word : {"adc", "mcmc", "none", "auto", "5000"})
         EXPECT_NE(strategy.find(word), std::string::npos) << strategy;
+}
+
+/// The lines of a help that name an option or a positional, up to the description.
+std::set<std::string> entries_of(const std::string& help) {
+    std::set<std::string> entries;
+    std::istringstream lines(help);
+    for (std::string line; std::getline(lines, line);)
+        if (line.size() > 2 && line.starts_with("  ") && line[2] != ' ')
+            entries.insert(line.substr(2, line.find("  ", 2) - 2));
+    return entries;
+}
+
+TEST(Usage, HelpOfLargeCommandsIsShort) {
+    const std::string train = run_ewa({"train", "--help"}).out;
+    EXPECT_LE(std::ranges::count(train, '\n'), 53) << train;
+    for (const char* command : kWithShortHelp) {
+        const std::string brief = run_ewa({command, "--help"}).out,
+                          whole = run_ewa({command, "--help-all"}).out;
+        const std::set<std::string> some = entries_of(brief), all = entries_of(whole);
+        EXPECT_TRUE(std::ranges::includes(all, some)) << brief;
+        EXPECT_LT(some.size() + 3, all.size()) << brief;
+        EXPECT_LT(4 * std::ranges::count(brief, '\n'), 3 * std::ranges::count(whole, '\n')) << brief;
+        EXPECT_TRUE(brief.ends_with("\newa " + std::string(command) +
+                                    " --help-all has the other options, and says more about these.\n"))
+            << brief;
+        EXPECT_EQ(whole.find("--help-all has"), std::string::npos) << whole;
+    }
+    EXPECT_NE(run_ewa({"info", "--help-all"}).status, 0) << "its help has all options";
+}
+
+TEST(Usage, HelpOfTrainHasTheOptionsThatPeopleUse) {
+    const std::string help = run_ewa({"train", "--help"}).out;
+    for (const char* option :
+         {"DATASET",      "-h, --help",     "--help-all",  "-o, --output", "--steps",      "--quality",
+          "--max-splats", "--downscale",    "--max-width", "--test-every", "--frames",     "--init",
+          "--masks",      "--lens",         "--strategy",  "--sh-degree",  "--background", "--appearance",
+          "--robust",     "--refine-poses", "--seed",      "--device",     "--eval-every", "--save-every",
+          "--resume",     "--force",        "--config",    "--serve"})
+        EXPECT_NE(help.find("\n  " + std::string(option)), std::string::npos) << option;
+    for (const char* option : {"--bands", "--moments", "--validation", "For developers"})
+        EXPECT_EQ(help.find(option), std::string::npos) << option;
 }
 
 struct WrongUse {
@@ -162,7 +208,7 @@ TEST(Usage, HelpAndVersionAsPeopleTypeThem) {
     EXPECT_EQ(printed({"help", "train"}), printed({"train", "--help"}));
     for (const char* version : {"version", "-v", "-V"}) EXPECT_EQ(printed({version}), printed({"--version"}));
     EXPECT_NE(printed({"train", "--help"}).find("--serve [ADDRESS:]PORT"), std::string::npos);
-    EXPECT_NE(printed({"convert", "--help"}).find("--spz-version 3|4"), std::string::npos);
+    EXPECT_NE(printed({"convert", "--help-all"}).find("--spz-version 3|4"), std::string::npos);
 }
 
 TEST(Usage, TheEnvironmentMayNameTheDevice) {

@@ -33,6 +33,11 @@ TEST(Text, OneLineShowsWhatItIsSafeToShow) {
     EXPECT_EQ(one_line(""), "");
 }
 
+TEST(Text, AShortHelpHasTheFirstSentence) {
+    EXPECT_EQ(ewa::core::first_sentence("Splat file (.ply, .spz). Or a run. Or"), "Splat file (.ply, .spz)");
+    EXPECT_EQ(ewa::core::first_sentence("What masks/ do"), "What masks/ do");
+}
+
 TEST(Text, HelpBreaksBetweenWords) {
     const std::string twelve = "twelve chars", long_word(90, 'x');
     const auto repeated = [&](int count) {
