@@ -33,10 +33,6 @@ inline constexpr int kAutomaticHalvings = -1;
 /// TrainOptions::max_splats: splat_cap() of ewa/training_needs.h chooses it.
 inline constexpr uint32_t kAutomaticMaxSplats = 0;
 
-struct TrainOptions;
-/// TrainOptions::appearance, or affine with TrainOptions::exposure.
-AppearanceModel appearance_of(const TrainOptions& options);
-
 /// Options of a Trainer. Learning rates are those of Adam. Lengths are in world units. "Scene extent" is
 /// scene_extent() of ewa/dataset.h, or the median distance of the start's splats if all cameras coincide.
 struct TrainOptions {
@@ -85,9 +81,8 @@ struct TrainOptions {
 
     /// Learns the appearance of each training image (docs/training_options.md).
     AppearanceModel appearance = AppearanceModel::none;
-    bool exposure = false;  // AppearanceModel::affine; not with another model
-    double exposure_rate = 0.01, exposure_rate_final = 0.001;
-    double appearance_rate = 0.002;  // of ppisp and grid, per step of a full run
+    double exposure_rate = 0.01, exposure_rate_final = 0.001;  // of affine
+    double appearance_rate = 0.002;                            // of ppisp and grid, per step of a full run
     /// ppisp starts from the exposures that points or EXIF say. A trainer that is restored needs none.
     bool measure_exposures = true;
 

@@ -562,9 +562,9 @@ void bind_train(nb::module_& module) {
     module.attr("_argument_names") = argument_names();
     module.attr("_value_words") = value_words();
     module.def("evaluate", evaluate_splats, "splats"_a, "dataset"_a, "frames"_a = nb::none(), nb::kw_only(),
-               "metrics"_a = nb::tuple(), "background"_a = nb::none(),
-               "kernel"_a = nb::none(), "integrator"_a = "splat", "samples"_a = nb::none(),
-               "points"_a = false, "nearest"_a = nb::none(),
+               "metrics"_a = nb::tuple(), "background"_a = nb::none(), "kernel"_a = nb::none(),
+               "integrator"_a = "splat", "samples"_a = nb::none(), "points"_a = false,
+               "nearest"_a = nb::none(),
                nb::sig("def evaluate(splats: " EWA_SPLATS_TYPE ", dataset: " EWA_DATASET_TYPE
                        ", frames: collections.abc.Sequence[int] | None = None, *, "
                        "metrics: str | collections.abc.Sequence[str] = (), "

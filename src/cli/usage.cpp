@@ -27,8 +27,7 @@ const std::map<std::string, std::string>& subjects() {
              "sort",      "splats",   "cases", "decimate",  "level",        "bake-sky",      "views",
              "size",      "look-at",  "up",    "orbit",     "film-seconds", "matching",      "visible",
              "view-time", "aperture", "focus", "shutter",   "scene-splats", "geo",           "scale-to"});
-        add("Quality",
-            {"quality", "integrator", "samples", "runs", "training-steps", "blur-samples"});
+        add("Quality", {"quality", "integrator", "samples", "runs", "training-steps", "blur-samples"});
         add("Output",
             {"output",      "format",    "mode",        "json",      "svg",       "heat-map",    "heat-scale",
              "serve",       "accuracy",  "spz-version", "levels",    "check",     "ranks",       "quiet",

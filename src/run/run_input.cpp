@@ -455,7 +455,7 @@ RunInput load_run(const RunOptions& options) {
         if (!remark.empty()) input.remarks.push_back(remark);
     }
     TrainOptions& train = input.options.train;
-    if (train.appearance == AppearanceModel::automatic && !train.exposure) {
+    if (train.appearance == AppearanceModel::automatic) {
         input.images = scene::read_images(input.dataset, compared_frames(input.split.train));
         const AppearanceChoice choice = choose_appearance(train, input.dataset, input.split.train);
         train.appearance = choice.model;

@@ -211,7 +211,6 @@ std::vector<float> first_exposures(const Dataset& dataset, const std::vector<int
 
 AppearanceChoice choose_appearance(const TrainOptions& options, const Dataset& dataset,
                                    const std::vector<int>& frames) {
-    if (options.exposure) return {AppearanceModel::none, "exposures are learned"};
     if (options.bands > 1) return {AppearanceModel::none, "--bands cuts the images"};
     if (frames.size() < 2) return {AppearanceModel::none, "there are no two training images"};
     const Disagreement found = disagreement_of(dataset, frames);

@@ -52,7 +52,7 @@ inline constexpr std::array kExclusions{
     Exclusion{"--loss sfm-depth", compares_point_depths, {true, true, true, true}, kDepthReason},
     Exclusion{"--appearance",
               [](const TrainOptions& options) {
-                  const AppearanceModel model = appearance_of(options);
+                  const AppearanceModel model = options.appearance;
                   return model != AppearanceModel::none && model != AppearanceModel::automatic;
               },
               {false, false, true, false},

@@ -75,7 +75,7 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
             .masks = masks,
             .alpha = cut,
             .depths = true,
-            .appearance = appearance_of(options),
+            .appearance = options.appearance,
             .motion = options.refine_poses,
             .sky = options.sky,
             .statistics = options.strategy == Strategy::adc,
@@ -112,10 +112,6 @@ void check_training(const TrainOptions& options, int ranks) {
     core::check_exclusions(kDepthExclusions, options);
     core::check_exclusions(kRayExclusions, options);
     core::check_exclusions(kSkyExclusions, options);
-    if (options.exposure && options.appearance != AppearanceModel::none &&
-        options.appearance != AppearanceModel::automatic && options.appearance != AppearanceModel::affine)
-        throw InputError(
-            "TrainOptions::exposure is AppearanceModel::affine, and appearance names another model");
 }
 
 bool Schedule::densifies(int step) const {
@@ -303,10 +299,6 @@ TrainOptions resolve(TrainOptions options, const Dataset& dataset, const std::ve
     if (options.appearance == AppearanceModel::automatic)
         options.appearance = train::choose_appearance(options, dataset, train_frames).model;
     return options;
-}
-
-AppearanceModel appearance_of(const TrainOptions& options) {
-    return options.exposure ? AppearanceModel::affine : options.appearance;
 }
 
 Strategy strategy_for(int steps) {

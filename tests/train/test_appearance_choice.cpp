@@ -117,9 +117,6 @@ TEST(AppearanceChoice, IsAModelWhereImagesDisagreeOnThePoints) {
     const std::vector<float> first = train::first_exposures(brighter, all_frames(brighter));
     for (size_t k = 0; k < stops.size(); ++k) EXPECT_NEAR(first[k], stops[k], 0.02) << k;
     TrainOptions options;
-    options.exposure = true;
-    EXPECT_EQ(choice(brighter, options).model, AppearanceModel::none);
-    options = {};
     options.bands = 2;
     EXPECT_EQ(choice(brighter, options).model, AppearanceModel::none);
 

@@ -125,7 +125,8 @@ TEST_P(RestoredTrainer, GoesOnAsIfNothingHadHappened) {
     options.final_splats = 100;
     options.sh_degree = 1;
     options.random_background = true;
-    options.exposure = options.refine_poses = options.refine_focal = true;
+    options.refine_poses = options.refine_focal = true;
+    options.appearance = AppearanceModel::affine;
     options.halvings = 1;
     options.absolute_gradients = true;  // of adc
     options.grow_gradient_absolute = 1e-5;

@@ -147,7 +147,7 @@ TEST_P(ChunksTrain, TheBytesOfOneThatFits) {
 }
 
 void exposed_views(TrainOptions& options) {
-    options.exposure = true;
+    options.appearance = AppearanceModel::affine;
 }
 void ppisp_views(TrainOptions& options) {
     options.appearance = AppearanceModel::ppisp;

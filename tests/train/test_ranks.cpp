@@ -119,7 +119,7 @@ void antialiased(TrainOptions& options) {
 }
 
 void exposed_photos(TrainOptions& options) {
-    options.exposure = true;
+    options.appearance = AppearanceModel::affine;
 }
 template <AppearanceModel model>
 void with_model(TrainOptions& options) {

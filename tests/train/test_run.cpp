@@ -33,7 +33,7 @@ RunOptions small_run(const fs::path& output) {
     options.train.strategy = Strategy::mcmc;
     options.train.max_splats = 60;
     options.train.seed = 3;
-    options.train.exposure = true;
+    options.train.appearance = AppearanceModel::affine;
     options.test_every = 4;
     options.eval_every = 20;
     return options;
@@ -269,7 +269,7 @@ TEST(Run, WithMoreStepsKeepsTheSizesOfImagesThatItHadChosen) {
     TempFolder folder;
     RunOptions options = small_run(folder / "o");
     options.train.strategy = Strategy::adc;
-    options.train.exposure = false;
+    options.train.appearance = AppearanceModel::none;
     options.train.few_photos = 1;
     options.train.steps = 280;
     options.eval_every = 0;

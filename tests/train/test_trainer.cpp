@@ -364,7 +364,8 @@ TEST(Trainer, RunsThePlanThatItTells) {
         for (const bool exposure : {false, true}) {
             TrainOptions options = quick(10);
             options.strategy = strategy;
-            options.exposure = options.refine_poses = options.absolute_gradients = exposure;
+            options.refine_poses = options.absolute_gradients = exposure;
+            if (exposure) options.appearance = AppearanceModel::affine;
             const Gaussians start = shaken_start(spoilt.data, 0.05, 1, 0);
             const Trainer masked(device(), spoilt.masked, frames, start, options);
             const Trainer plain(device(), spoilt.unmasked, frames, start, options);
@@ -446,7 +447,7 @@ TEST(Trainer, LearnsTheExposureOfEachImage) {
     const Gaussians start = shaken_start(made, 0.05, 11, 0);
     const auto learn = [&](bool exposure) {
         TrainOptions options = quick(400);
-        options.exposure = exposure;
+        if (exposure) options.appearance = AppearanceModel::affine;
         options.exposure_rate = 0.03;  // each training image is used 50 times
         Trainer trainer(device(), dataset, all_frames(dataset), start, options);
         for (int step = 0; step < 400; ++step) trainer.step();
