@@ -47,8 +47,8 @@ struct Capture {
     bool interrupted = false;             // the other members are then not known
     std::vector<std::string> not_placed;  // names
     std::vector<std::string> remarks;     // for the user: a line each
-    std::string
-        axes;  // a line on the world's axes and scale; empty: they are COLMAP's, or of an earlier search
+    /// A line on the world's axes and scale. Empty: they are COLMAP's, or of an earlier search.
+    std::string axes;
 };
 
 /// Whether the path is a video by its extension, a zip archive, or a folder with photos or videos that load_dataset does not

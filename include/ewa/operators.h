@@ -116,8 +116,8 @@ struct DepthOrder {
 /// Which splats a pixel draws: the list of its tile, in the order of the list.
 struct TileLists {
     uint32_t tile_size = 16;  // px, a multiple of 4
-    std::span<const int32_t>
-        offsets;  // [tiles + 1], row by row: where each tile's list begins; the last is the end
+    /// [tiles + 1], row by row: where each tile's list begins. The last is the end.
+    std::span<const int32_t> offsets;
     std::span<const int32_t> splats;  // the lists, one after another
 };
 

@@ -43,8 +43,8 @@ struct RunOptions {
     /// First splats: "sfm" (the dataset's points), "stereo" (points on whose depth the images agree), "random", or a file of
     /// splats or points.
     std::string init = "sfm";
-    std::filesystem::path
-        init_folder;  // that a relative file of `init` is relative to; empty: the current one
+    /// A relative file of `init` is relative to this folder. Empty: to the current one.
+    std::filesystem::path init_folder;
     DenseStart dense_start = DenseStart::automatic;  // of first splats that come from points
     double init_opacity = 0.1;   // of first splats that come from points or at random; above 0, below 1
     double init_scale = 1;       // factor of their scales, which are the distance to their neighbours

@@ -22,8 +22,8 @@ using SharedDataset = std::shared_ptr<const Dataset>;
 /// ewa.Dataset, which never changes once it is made.
 struct LoadedDataset {
     SharedDataset dataset;
-    std::filesystem::path
-        path;  // absolute; it and the options below load the dataset again in another process
+    /// Absolute. It and the options below load the dataset again in another process.
+    std::filesystem::path path;
     DatasetOptions options;
     int test_every = 0;                 // every which frame is held out
     bool archived = false;              // `dataset` then keeps what was unpacked

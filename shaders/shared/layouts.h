@@ -590,10 +590,10 @@ struct DensifyPush {
     uint step;
     uint first;  // number of the first splat, among those of all ranks
     uint split;  // SPLIT_*
-    float
-        region[6];  // low corner, then high corner: a splat whose mean is outside is neither cloned nor split
-    float ball
-        [4];  // of the cameras: middle, radius. A splat that is larger than its distance to all of it is pruned
+    // Low corner, then high corner: a splat whose mean is outside is neither cloned nor split.
+    float region[6];
+    // Middle and radius of the cameras' ball: a splat that is larger than its distance to the ball is pruned.
+    float ball[4];
 };
 
 struct ResetPush {

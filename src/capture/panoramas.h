@@ -35,8 +35,8 @@ std::pair<int, std::string> photo_of_view(const std::string& view);
 /// The views of panoramas, which COLMAP gets in their place. One camera is one view of the photos of one width.
 struct PanoramaViews {
     Photos photos;
-    std::map<std::pair<int, int>, std::vector<std::filesystem::path>>
-        cameras;  // by width of the views, px, and k
+    /// By width of the views, px, and k.
+    std::map<std::pair<int, int>, std::vector<std::filesystem::path>> cameras;
 };
 
 /// Writes the pinhole views of all photos into the folder. Those that are there stay. Throws RunError, Stopped.

@@ -32,8 +32,8 @@ pid_t start_program(std::vector<std::string> command, const std::vector<std::str
 struct Program {
     std::vector<std::string> command;      // the name or path of the program, then its arguments
     std::vector<std::string> environment;  // NAME=value, beside those of this process
-    std::filesystem::path
-        log;  // standard error is appended, up to kMostLog bytes; empty: it is this process's
+    /// Standard error is appended to it, up to kMostLog bytes. Empty: it is this process's.
+    std::filesystem::path log;
     bool output_to_log = false;  // standard output is appended to the log, as well as given to `output`
     bool joined = false;         // standard error is part of the output
 };

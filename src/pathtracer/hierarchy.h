@@ -23,8 +23,8 @@ struct Node {
 
 struct Hierarchy {
     std::vector<Node> nodes;  // the first is the root
-    std::vector<uint32_t>
-        order;  // leaves refer to sorted indices; order[i] is the triangle at sorted index i
+    /// Leaves refer to sorted indices. order[i] is the triangle at sorted index i.
+    std::vector<uint32_t> order;
 };
 
 /// `boxes` are the finite bounds of at most 2^28 triangles. A leaf has at most TRACE_LEAF_MAX triangles, and

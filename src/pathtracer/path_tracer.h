@@ -27,8 +27,9 @@ class PathTracer {
     Image radiance(const Camera& camera, int samples, uint64_t seed, double brightest);
 
     struct Seen {
-        Image
-            depth;  // one channel: camera z of the pixel's centre, or its distance through a lens or a rolling shutter, in world units; 0: nothing
+        /// One channel: camera z of the pixel's centre, or its distance through a lens or a rolling shutter, in world units. 0:
+        /// nothing.
+        Image depth;
         std::vector<uint32_t> triangles;  // sorted index in PackedScene::order, 0xffffffff: none
     };
     Seen seen(const Camera& camera);

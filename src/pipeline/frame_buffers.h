@@ -73,8 +73,8 @@ struct FrameBuffers {
     uint32_t instance_capacity = 0;
 
     gpu::Buffer counts;  // every splat adds to them: they lie in device memory
-    gpu::Buffer
-        counts_copy;  // host visible, for frames_in_flight frames; empty where the host can read counts
+    /// Host visible, for frames_in_flight frames. Empty where the host can read counts.
+    gpu::Buffer counts_copy;
     gpu::Buffer records, depth_keys[2], order[2], tile_counts, prefix, scan_totals, first_instances;
     gpu::Buffer counters, counter_prefix, digit_totals;
     gpu::Buffer instance_keys[2], instance_splats[2], sorted_indices[2], tile_starts;

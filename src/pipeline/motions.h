@@ -36,8 +36,8 @@ MotionBases motion_bases(const std::vector<Camera>& cameras, const Gaussians& ga
 /// Motions of all training cameras: a row of each, then one of each readout.
 struct Motions : LearnedTable {
     uint32_t photos = 0;
-    std::vector<bool>
-        rolling;  // whether a photo's readout has a motion, the photos-th after that of its pose
+    /// Whether a photo's readout has a motion, the photos-th row after that of its pose.
+    std::vector<bool> rolling;
     gpu::Buffer bases;
     gpu::Buffer camera;  // the moved camera of the frame
 

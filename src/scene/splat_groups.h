@@ -11,8 +11,8 @@ namespace ewa::scene {
 
 struct SplatGroups {
     std::vector<uint32_t> of;  // the group of each splat
-    std::vector<uint32_t>
-        sizes;  // splats in each group; the largest comes first, then by the lowest index of a splat
+    /// Splats in each group. The largest comes first, then by the lowest index of a splat.
+    std::vector<uint32_t> sizes;
 };
 
 /// Groups of splats that touch. Two splats touch if their largest standard deviations differ by less than a factor of 2, and

@@ -34,8 +34,8 @@ struct OpenedScene {
     std::filesystem::path cameras;           // what gave the dataset, if not `path`
     /// Of the run's splats.ply.
     std::filesystem::file_time_type splats_time = std::filesystem::file_time_type::min();
-    std::map<std::string, Appearance>
-        appearances;  // of the dataset's frames, by name, as the run learned them
+    /// Those of the dataset's frames, by name, as the run learned them.
+    std::map<std::string, Appearance> appearances;
     NewViewAppearance of_new_views;
     Look look;           // as the file or the run asks for
     std::string remark;  // one line: what is missing

@@ -29,8 +29,8 @@ inline constexpr const char* kTilesetName = "tileset.json";
 glm::dmat4 earth_of_place(const Place& place);
 
 struct TilesetOptions {
-    SaveOptions
-        save;  // levels: 0 for tiles of at most 100,000 splats; else the most levels whose tiles have 1,000 splats
+    /// levels: 0 for tiles of at most 100,000 splats; else the most levels whose tiles have 1,000 splats.
+    SaveOptions save;
     /// From the scene's world to earth-centred, earth-fixed coordinates. Empty: the scene is at no place.
     std::optional<glm::dmat4> earth;
 };

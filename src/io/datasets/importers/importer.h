@@ -28,10 +28,10 @@ struct ImportSource {
 /// and the place.
 struct CameraImporter {
     std::string_view format;  // Dataset::format
-    std::vector<std::string_view>
-        places;  // folders of a dataset that may hold the file; "" is the dataset's own
-    std::string_view
-        usual;  // how the file's name begins, where nobody names the file; photos may have other files beside them
+    /// Folders of a dataset that may hold the file. "" is the dataset's own.
+    std::vector<std::string_view> places;
+    /// How the file's name begins, where nobody names the file: photos may have other files beside them.
+    std::string_view usual;
     bool (*named)(const std::filesystem::path& name);  // whether a file's name may be of the format
     bool (*begins)(std::string_view head);             // whether these first bytes are; at most kHeadBytes
     ImageRecords (*read)(const ImportSource& source);
