@@ -7,7 +7,7 @@
 
 #include "ewa/device.h"
 #include "ewa/run_options.h"
-#include "run/viewed_sphere.h"
+#include "prepare/viewed_sphere.h"
 #include "scene/frame_images.h"
 
 namespace ewa::train {

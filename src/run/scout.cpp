@@ -19,10 +19,10 @@
 #include "ewa/trainer.h"
 #include "gpu/device.h"
 #include "portions/collect.h"
+#include "prepare/blurred_images.h"
+#include "prepare/passers_by.h"
 #include "report/pictures.h"
 #include "report/run_file_names.h"
-#include "run/blurred_images.h"
-#include "run/passers_by.h"
 #include "run/run_files.h"
 
 namespace ewa::train {

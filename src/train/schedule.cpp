@@ -10,8 +10,8 @@
 
 #include "ewa/error.h"
 #include "ewa/training_needs.h"
+#include "prepare/appearance_choice.h"
 #include "scene/looks.h"
-#include "train/appearance_choice.h"
 #include "train/exclusions.h"
 
 namespace ewa::train {

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "ewa/error.h"
+#include "prepare/appearance_choice.h"
 #include "scene/looks.h"
 #include "scene/readout.h"
-#include "train/appearance_choice.h"
 
 namespace ewa::train {
 

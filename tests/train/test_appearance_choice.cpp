@@ -11,9 +11,9 @@
 #include "ewa/error.h"
 #include "ewa/run_options.h"
 #include "ewa/training_needs.h"
+#include "prepare/appearance_choice.h"
 #include "scene/frame_images.h"
 #include "support/shared_by_tests.h"
-#include "train/appearance_choice.h"
 #include "train/synthetic.h"
 
 namespace ewa::test {

@@ -10,7 +10,7 @@
 #include "ewa/run.h"
 #include "ewa/trainer.h"
 #include "gpu/test_device.h"
-#include "run/passers_by.h"
+#include "prepare/passers_by.h"
 #include "support/temp_folder.h"
 #include "support/thread_ranks.h"
 #include "train/checkpoint.h"

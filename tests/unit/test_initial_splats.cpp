@@ -10,7 +10,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 #include "io/datasets/image_records.h"
-#include "run/depth_points.h"
+#include "prepare/depth_points.h"
 #include "run/run_input.h"
 #include "support/temp_folder.h"
 

@@ -8,8 +8,8 @@
 #include <glm/matrix.hpp>
 
 #include "ewa/error.h"
+#include "prepare/stereo_points.h"
 #include "run/run_input.h"
-#include "run/stereo_points.h"
 #include "scene/plane_sweep.h"
 
 #include "support/temp_folder.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "run/photo_background.h"
+#include "prepare/photo_background.h"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "run/depth_points.h"
+#include "prepare/depth_points.h"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "run/stereo_points.h"
+#include "prepare/stereo_points.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 #include <glm/matrix.hpp>
 
 #include "core/parallel.h"
-#include "run/depth_points.h"
-#include "run/viewed_sphere.h"
+#include "prepare/depth_points.h"
+#include "prepare/viewed_sphere.h"
 #include "scene/frame_images.h"
 #include "scene/plane_sweep.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "run/passers_by.h"
+#include "prepare/passers_by.h"
 
 #include <algorithm>
 #include <array>

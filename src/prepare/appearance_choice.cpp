@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/appearance_choice.h"
+#include "prepare/appearance_choice.h"
 
 #include <spdlog/fmt/fmt.h>
 

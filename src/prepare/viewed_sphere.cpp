@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "run/viewed_sphere.h"
+#include "prepare/viewed_sphere.h"
 
 #include <algorithm>
 #include <glm/geometric.hpp>

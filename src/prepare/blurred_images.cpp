@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "run/blurred_images.h"
+#include "prepare/blurred_images.h"
 
 #include <spdlog/fmt/fmt.h>
 
