@@ -28,7 +28,7 @@ constexpr double kNearest =
     8;  // largest inverse depth at first, times the distance of what the cameras look at
 constexpr float kClearScore = 0.8f, kLeastScore = 0.6f;
 constexpr double kAgreement = 0.015;  // of the inverse depth
-constexpr size_t kLeastPixels = 500, kLeastPoints = 1000;
+constexpr size_t kLeastPixels = 500, kLeastStereoPoints = 1000;
 constexpr float kOpaque = 0.5f;
 
 struct View {
@@ -226,7 +226,7 @@ StereoPoints points_by_stereo(const Dataset& dataset, const std::vector<int>& fr
         all += pixels;
         if (pixels > 0) useful.push_back(i);
     }
-    if (all < kLeastPoints) return {};
+    if (all < kLeastStereoPoints) return {};
     // As many of each view: most of them see little of what is hard to see.
     StereoPoints points;
     for (size_t k = 0; k < useful.size(); ++k) {
