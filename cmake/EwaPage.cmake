@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Bundles web/ into the one page that src/report/scene_page.cpp completes, and embeds it in a library.
+# Bundles web/ into the one page that src/io/splats/scene_page.cpp completes, and embeds it in a library.
 find_program(ESBUILD esbuild REQUIRED)
 
 file(GLOB page_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/web/src/*.js)

@@ -17,7 +17,7 @@ std::string_view name_of(SplatFormat format);
 std::string_view readers_of(SplatFormat format);
 
 /// The format of an extension, in upper or lower case: .ply .compressed.ply .splat .ksplat .spz .glb .gltf
-/// .sog .usda .usdz, or of the names meta.json and lod-meta.json. Throws InputError for any other.
+/// .sog .usda .usdz .html, or of the names meta.json, lod-meta.json and tileset.json. Throws InputError for any other.
 SplatFormat format_of_name(const std::filesystem::path& path);
 
 /// The same for a file to write. Throws InputError also for .ksplat, which ewa only reads.
@@ -27,7 +27,7 @@ SplatFormat format_to_write(const std::filesystem::path& path);
 /// Throws InputError.
 SplatFormat format_of_file(const std::filesystem::path& path);
 
-/// Reads any of the formats but .usda and .usdz, which ewa only writes. The peak memory is at most twice the larger of the file and the scene. A file is
+/// Reads any of the formats but .usda, .usdz, .html and tileset.json, which ewa only writes. The peak memory is at most twice the larger of the file and the scene. A file is
 /// refused if it claims more than 4 times its size and 40 MiB; for SPZ and SOG, which are compressed, 32 times. Values
 /// may be infinite or NaN if the format can store that. Throws InputError that names the file and the byte or
 /// property.
@@ -51,8 +51,12 @@ Gaussians load_splats(const std::filesystem::path& path);
 std::vector<std::string> save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                      const SaveOptions& options);
 
+/// The same with a scene that is not needed afterwards. So a lod-meta.json, a tileset.json and an .html take no memory for a copy.
+std::vector<std::string> save_splats(const std::filesystem::path& path, Gaussians&& gaussians,
+                                     const SaveOptions& options);
+
 /// Writes a lod-meta.json and its chunks, in folders beside it: the scene as level 0, and further levels that decimate_splats halves
-/// in place. So it takes no memory for a copy. Returns and throws as save_splats does, which writes a lod-meta.json from a copy.
+/// in place. So it takes no memory for a copy. Returns and throws as save_splats does.
 std::vector<std::string> save_levels(const std::filesystem::path& path, Gaussians gaussians,
                                      const SaveOptions& options);
 

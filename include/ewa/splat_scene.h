@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // A splat scene with the other contents of its file, and the options of saving one.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <functional>
+#include <glm/mat4x4.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,7 +14,8 @@
 namespace ewa {
 
 /// The sources in src/io/splats describe the layouts. sog is one file, sog_meta a meta.json with images beside it, and sog_levels a
-/// lod-meta.json with folders of those beside it.
+/// lod-meta.json with folders of those beside it. tileset is a tileset.json of 3D Tiles with the tiles beside it, and page an .html that
+/// shows the scene in a browser.
 enum class SplatFormat {
     ply,
     compressed_ply,
@@ -24,7 +28,9 @@ enum class SplatFormat {
     sog_levels,
     usda,
     usdz,
-    ksplat
+    ksplat,
+    tileset,
+    page
 };
 
 struct SplatScene {
@@ -38,12 +44,27 @@ struct SplatScene {
     std::vector<std::string> remarks;  // one line for each kind of content that is skipped
 };
 
+struct Dataset;
+
+/// What a page shows besides the scene.
+struct PageOptions {
+    std::string title = {};            // empty: the name of the file
+    bool unbundled = false;            // the scene is beside it, in NAME-levels/lod-meta.json
+    const Dataset* cameras = nullptr;  // its views, in the order of their names; null: none
+    std::array<float, 3> background{};
+};
+
 struct SaveOptions {
     std::vector<std::string> comments = {};  // one line each; kept by the formats that can store them
     bool antialiased = false;
     int spz_version = 3;    // of an .spz: 2, 3 or 4
     bool gltf_spz = false;  // a glTF holds an SPZ of version 2, by KHR_gaussian_splatting_compression_spz_2
-    int levels = 0;         // of a lod-meta.json; 0: until one has a million splats
+    int levels =
+        0;  // of a lod-meta.json or tileset.json; 0: until one has a million splats, or a tile 100,000
+    /// Of a tileset.json: from the scene's world to earth-centred, earth-fixed coordinates (EPSG 4978), metres. Empty: by the place
+    /// that the comments name, if any.
+    std::optional<glm::dmat4> earth = {};
+    PageOptions page = {};
     std::function<void(uint64_t, uint64_t)> progress = {};  // splats written, all splats
 };
 

@@ -23,7 +23,7 @@ Splats edited(const Splats& splats, const Edit& edit) {
 }
 
 Splats with(const Splats& splats, const scene::Edits& edits) {
-    return edited(splats, [&](Gaussians& g) { scene::apply_edits(g, edits, SplatFormat::ply); });
+    return edited(splats, [&](Gaussians& g) { scene::apply_edits(g, edits); });
 }
 
 Splats cleaned(const Splats& splats, const scene::Cleaning& cleaning,

@@ -15,8 +15,10 @@
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
 #include "inputs.h"
+#include "io/splats/format_table.h"
+#include "io/splats/output_options.h"
+#include "io/splats/prepare.h"
 #include "options.h"
-#include "report/scene_output.h"
 #include "scene/edits.h"
 
 namespace ewa::python {
@@ -153,7 +155,7 @@ struct FileArguments {
     nb::handle geo;
     std::optional<ObjectOrPath<LoadedDataset>> cameras;
 
-    report::OutputOptions options() const {
+    io::OutputOptions options() const {
         constexpr int kMostLevels = 32;
         if (levels && (*levels < 1 || *levels > kMostLevels))
             throw InputError("levels is not from 1 to " + std::to_string(kMostLevels));
@@ -169,24 +171,22 @@ std::vector<std::string> save(const std::filesystem::path& path, const Splats& s
                               const std::vector<std::string>& comments, std::optional<bool> antialiased,
                               int spz_version, const FileArguments& arguments) {
     if (spz_version != 3 && spz_version != 4) throw nb::value_error("spz_version is neither 3 nor 4");
-    const report::OutputOptions options = arguments.options();
-    const report::SceneOutput output = report::output_of(path, options);
-    if (arguments.cameras && !output.page) throw InputError("cameras: only a page has views");
-    report::PageCameras page;
-    if (arguments.cameras)
-        page.dataset = *Opened<LoadedDataset>(*arguments.cameras, [](const std::filesystem::path& named) {
-                            return open_dataset(named, {.need_images = false});
-                        })->dataset;
     SaveOptions save{comments, antialiased.value_or(splats.antialiased), spz_version};
-    save.gltf_spz = options.gltf_spz;
-    save.levels = options.levels;
+    io::set_output_options(save, path, arguments.options());
+    const io::FormatRow& row = io::row_to_write(path);
+    if (arguments.cameras && row.format != SplatFormat::page)
+        throw InputError("cameras: only a page has views");
+    Dataset cameras;
+    if (arguments.cameras)
+        cameras = *Opened<LoadedDataset>(*arguments.cameras, [](const std::filesystem::path& named) {
+                       return open_dataset(named, {.need_images = false});
+                   })->dataset;
+    save.page.cameras = &cameras;
     std::vector<std::string> remarks = with_new_file(path, [&] {
-        if (!output.page && !output.tiles) return save_splats(path, splats.gaussians, save);
+        if (row.write) return save_splats(path, splats.gaussians, save);
         Gaussians written = splats.gaussians;
-        // As ewa convert: without splats that cannot be drawn, in the order of the format.
-        std::vector<std::string> lost = scene::apply_edits(written, {}, output.format);
-        for (std::string& line : report::write_output(output, options, written, save, page))
-            lost.push_back(std::move(line));
+        std::vector<std::string> lost = io::match_file(written, row);  // as ewa convert
+        for (std::string& line : save_splats(path, std::move(written), save)) lost.push_back(std::move(line));
         return lost;
     });
     for (std::string& remark : remarks) remark = spelled(remark.c_str());

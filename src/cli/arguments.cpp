@@ -17,6 +17,7 @@
 #include "ewa/sky_map.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
+#include "io/splats/format_table.h"
 #include "report/run_file_names.h"
 #include "scene/camera.h"
 #include "scene/looks.h"
@@ -195,8 +196,7 @@ void add_test_every_option(CLI::App& app, int& test_every) {
 
 void add_splats(CLI::App& app, fs::path& splats) {
     app.add_option("SPLATS", splats,
-                   "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json lod-meta.json .glb "
-                   ".gltf), or folder of a training run")
+                   "Splat file (" + io::extension_list(io::Uses::read) + "), or folder of a training run")
         ->required()
         ->type_name("");
 }

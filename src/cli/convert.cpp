@@ -27,8 +27,10 @@
 #include "ewa/render_options.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
-#include "io/splats/formats.h"
+#include "io/splats/format_table.h"
 #include "io/splats/place.h"
+#include "io/splats/prepare.h"
+#include "io/splats/scene_page.h"
 #include "report/run_file_names.h"
 #include "scene/edits.h"
 
@@ -48,7 +50,7 @@ struct ConvertArguments {
     std::string scale_to, decimate, sort;
     scene::Edits edits;
     Cleaning cleaning;
-    OutputOptions output_options;
+    io::OutputOptions output_options;
     int level = 0;  // of the inputs
     fs::path json;
     bool bake_sky = false, check = false, allow_empty = false, quiet = false;
@@ -115,9 +117,8 @@ void drop_place(Work& work) {
         work.lost.emplace_back("the place on the globe is dropped: splats are elsewhere than there");
 }
 
-/// Reads the inputs and appends each to the one before.
-Work read_all(const ConvertArguments& arguments) {
-    Work work;
+/// Reads the inputs into `work` and appends each to the one before.
+void read_all(const ConvertArguments& arguments, Work& work) {
     std::set<bool> marks, densities;
     size_t placed = 0;  // inputs that know their place
     for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
@@ -158,7 +159,6 @@ Work read_all(const ConvertArguments& arguments) {
     if (densities.size() > 1)
         work.lost.push_back(
             "some inputs have --kernel density and others not; all opacities are fitted to 3DGS's kernel");
-    return work;
 }
 
 /// Prints how much renders of the file differ from those of the scene that was written to it, unless quiet. Without a Vulkan device it
@@ -204,27 +204,23 @@ Json check(const ConvertArguments& arguments, const Work& work) {
 /// Throws if an output is another file of this command, or cannot be written.
 void check_files(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
+    const bool unbundled = arguments.output_options.unbundled;
     std::vector<NamedFile> inputs,
         outputs = {{"OUT", out}, {"--json", arguments.json}, {"--dry-run", arguments.cleaning.picture}};
     for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
         inputs.push_back({"an input", arguments.files[i]});
-        if (names_tileset(out) || arguments.output_options.unbundled ||
-            core::lower(out.filename().string()) == "lod-meta.json")
-            check_not_a_part(arguments.output_options.unbundled ? levels_of_page(out) : out,
-                             arguments.files[i]);
+        check_not_a_part(unbundled ? io::levels_of_page(out) : out, arguments.files[i]);
         for (const fs::path& values : values_of(arguments.files[i]))
             inputs.push_back({"values of an input", values});
     }
-    if (arguments.output_options.unbundled) outputs.push_back({"the levels of OUT", levels_of_page(out)});
+    if (unbundled) outputs.push_back({"the levels of OUT", io::levels_of_page(out)});
     check_command_outputs(outputs, inputs);
-    if (names_page(out) || names_tileset(out)) return;
-    const SplatFormat format = format_of_name(out);
-    io::ValueFiles beside;
-    if (format == SplatFormat::gltf) beside = io::gltf_value_files(out);
-    if (format == SplatFormat::sog_meta) beside = io::sog_value_files(out);
+    const io::FormatRow& row = io::row_to_write(out);
+    if (!row.beside) return;
+    const io::ValueFiles beside = row.beside(out);
     for (const fs::path& file : beside.written) outputs.push_back({"the file of OUT's values", file});
     for (const fs::path& file : beside.removed) outputs.push_back({"the file of OUT's older values", file});
-    if (outputs.size() > 3) check_command_outputs(outputs, inputs);
+    check_command_outputs(outputs, inputs);
 }
 
 /// Throws unless splats are left to write, or --allow-empty is given. read: the number of splats in the inputs.
@@ -240,7 +236,7 @@ Json output_json(const ConvertArguments& arguments, const SceneSize& size) {
     const fs::path& out = arguments.files.back();
     const std::vector<fs::path> values = parts_of(out, arguments.output_options.unbundled);
     Json json = {{"file", out.string()},
-                 {"format", format_text(out)},
+                 {"format", io::row_to_write(out).name},
                  {"splats", size.splats},
                  {"sh_degree", size.sh_degree},
                  {"bytes", fs::file_size(out)}};
@@ -273,8 +269,10 @@ bool clean_scene(const ConvertArguments& arguments, Work& work, bool in_place) {
 
 int run(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
-    const ConvertOutput output = report::output_of(out, arguments.output_options);
-    if (arguments.check) check_readable(output);
+    Work work;
+    io::set_output_options(work.save, out, arguments.output_options);
+    const io::FormatRow& row = io::row_to_write(out);
+    if (arguments.check && !row.unchecked.empty()) throw InputError("--check: " + std::string(row.unchecked));
     // Report wrong use before the inputs are read: they may be large.
     scene::Edits edits = arguments.edits;
     edits.transform = scene::parse_transform(arguments.transform);
@@ -284,13 +282,12 @@ int run(const ConvertArguments& arguments) {
         if (!arguments.quiet) fmt::print("--scale-to: times {:.6g}\n", factor);
     }
     edits.decimation = scene::parse_decimation(arguments.decimate);
-    edits.morton = arguments.sort == "morton";
     if (!arguments.cleaning.picture.empty() && !arguments.cleaning.any())
         throw InputError(
             "--dry-run: no option removes splats; see --remove-floaters and others of ewa convert --help");
     scene::check_cleaning(arguments.cleaning);
     check_files(arguments);
-    Work work = read_all(arguments);
+    read_all(arguments, work);
     const size_t read = work.gaussians.size();
     const bool in_place = edits.transform == glm::dmat4(1);
     if (!in_place) drop_place(work);
@@ -300,7 +297,9 @@ int run(const ConvertArguments& arguments) {
                                                       : "--transform and --scale-to");
     edits.transform = glm::dmat4(1);
     if (arguments.cleaning.any() && clean_scene(arguments, work, in_place)) return 0;
-    for (std::string& remark : scene::apply_edits(work.gaussians, edits, output.format))
+    for (std::string& remark : scene::apply_edits(work.gaussians, edits))
+        work.lost.push_back(std::move(remark));
+    for (std::string& remark : io::match_file(work.gaussians, row, arguments.sort == "morton"))
         work.lost.push_back(std::move(remark));
 
     const SceneSize size = scene_size(work.gaussians);
@@ -312,22 +311,24 @@ int run(const ConvertArguments& arguments) {
                       arguments.quiet || count < kShowFrom);
     work.save.progress = [&](uint64_t done, uint64_t) { progress.update(static_cast<int>(done)); };
     std::vector<std::string> remarks = work.lost;
-    const bool shows_run = output.page && in_place;
-    const report::PageCameras cameras = page_cameras(shows_run ? arguments.run : std::nullopt, remarks);
-    const std::vector<std::string> quantised =
-        report::write_output(output, arguments.output_options, work.gaussians, work.save, cameras);
+    Dataset cameras;
+    if (row.format == SplatFormat::page && in_place && arguments.run)
+        show_run(*arguments.run, cameras, work.save.page, remarks);
+    const std::vector<std::string> quantised = row.write
+                                                   ? save_splats(out, work.gaussians, work.save)
+                                                   : save_splats(out, std::move(work.gaussians), work.save);
     remarks.insert(remarks.end(), quantised.begin(), quantised.end());
 
     if (!arguments.quiet) {
-        fmt::print("{}\n", described(out, format_text(out), "", size, fs::file_size(out)));
+        fmt::print("{}\n", described(out, row.name, "", size, fs::file_size(out)));
         const std::vector<fs::path> values = parts_of(out, arguments.output_options.unbundled);
         if (!values.empty())
             fmt::print("{}{}: the values of this {}, {}\n", core::one_line(values[0].string()),
                        values.size() > 1
                            ? fmt::format(" and {} other {}", values.size() - 1,
-                                         output.format == SplatFormat::sog_meta ? "images" : "files")
+                                         row.format == SplatFormat::sog_meta ? "images" : "files")
                            : "",
-                       format_text(out), core::bytes_text(bytes_of(values)));
+                       row.name, core::bytes_text(bytes_of(values)));
         for (const std::string& remark : remarks) fmt::print("  {}\n", core::one_line(remark));
     }
     Json json = {{"inputs", work.inputs}, {"output", output_json(arguments, size)}, {"remarks", remarks}};
@@ -362,12 +363,13 @@ Action add_convert(CLI::App& app) {
     const auto arguments = std::make_shared<ConvertArguments>();
     app.add_option(
            "FILES", arguments->files,
-           "One or more inputs, which are joined, then the output unless -o names it. Formats: .ply "
-           ".compressed.ply .splat .spz .sog meta.json lod-meta.json .glb .gltf, inputs also "
-           ".ksplat, and an output also .usda .usdz, .html, a page that shows the scene in a browser, "
-           "and tileset.json, 3D Tiles. An input may be the folder of a training run. IN:STEP, as in "
-           "b.ply:move=1,0,0, moves one input alone; more steps follow "
-           "after more colons")
+           "One or more inputs, which are joined, then the output unless -o names it. Formats: " +
+               io::extension_list(io::Uses::both) + ", inputs also " +
+               io::extension_list(io::Uses::only_read) + ", and an output also " +
+               io::extension_text(io::Uses::only_written) +
+               ". A page shows the scene in a browser, and a tileset.json is of 3D Tiles. An input may be "
+               "the folder of a training run. IN:STEP, as in b.ply:move=1,0,0, moves one input alone; "
+               "more steps follow after more colons")
         ->required()
         ->expected(1, -1)
         ->type_name("IN... OUT");

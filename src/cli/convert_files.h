@@ -3,12 +3,11 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
-#include <string_view>
 #include <vector>
 
 namespace ewa::cli {
 
-/// The files that hold the values of an existing .gltf, meta.json, lod-meta.json or tileset.json; empty for other formats.
+/// The files that hold the values of an existing file, such as those of a .gltf or meta.json; empty for formats of one file.
 std::vector<std::filesystem::path> values_of(const std::filesystem::path& path);
 
 /// The files that a written output consists of besides itself. unbundled: it is a page with its scene beside it.
@@ -20,8 +19,5 @@ uint64_t bytes_of(const std::vector<std::filesystem::path>& files);
 /// Throws InputError if an input is one of the parts that `out` writes: a chunk in a folder N_M of a lod-meta.json, or a tile of a
 /// tileset.json.
 void check_not_a_part(const std::filesystem::path& out, const std::filesystem::path& input);
-
-/// What the output is, for messages.
-std::string_view format_text(const std::filesystem::path& out);
 
 }  // namespace ewa::cli

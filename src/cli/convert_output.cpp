@@ -10,7 +10,7 @@
 
 namespace ewa::cli {
 
-void add_output_options(CLI::App& app, OutputOptions& options) {
+void add_output_options(CLI::App& app, io::OutputOptions& options) {
     app.add_option("--spz-version", options.spz_version,
                    "SPZ version of an .spz: 3 (every reader supports it) or 4 (newer, smaller files) [3]")
         ->transform(one_of({"3", "4"}))
@@ -36,28 +36,14 @@ void add_output_options(CLI::App& app, OutputOptions& options) {
         ->type_name("LAT,LON,HEIGHT[,HEADING]|ecef");
 }
 
-void check_readable(const ConvertOutput& output) {
-    if (output.page) throw InputError("--check: ewa does not read a page; check a .sog, which it holds");
-    if (output.tiles)
-        throw InputError("--check: ewa reads no tileset; check a .glb with --gltf-spz, which its tiles are");
-    if (output.format == SplatFormat::usda || output.format == SplatFormat::usdz)
-        throw InputError(
-            "--check: ewa writes USD and does not read it; check a .ply, which has the same values");
-    if (output.format == SplatFormat::sog_levels)
-        throw InputError(
-            "--check: its splats are in another order; check a .sog, which level 0 holds in chunks");
-}
-
-report::PageCameras page_cameras(const std::optional<live::Run>& run, std::vector<std::string>& remarks) {
-    report::PageCameras cameras;
-    if (!run) return cameras;
-    cameras.background = core::parse_colour(run->text("background")).value_or(cameras.background);
+void show_run(const live::Run& run, Dataset& cameras, PageOptions& page, std::vector<std::string>& remarks) {
+    page.background = core::parse_colour(run.text("background")).value_or(page.background);
     try {
-        cameras.dataset = cameras_of_run(*run);
+        cameras = cameras_of_run(run);
+        page.cameras = &cameras;
     } catch (const InputError& error) {
         remarks.push_back("the page has no views of photos: " + core::one_line(error.what()));
     }
-    return cameras;
 }
 
 }  // namespace ewa::cli

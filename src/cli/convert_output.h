@@ -5,8 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "ewa/dataset.h"
+#include "io/splats/output_options.h"
 #include "live/run_folder.h"
-#include "report/scene_output.h"
 
 namespace CLI {
 class App;
@@ -14,18 +15,9 @@ class App;
 
 namespace ewa::cli {
 
-using report::levels_of_page;
-using report::names_page;
-using report::names_tileset;
-using report::OutputOptions;
-using ConvertOutput = report::SceneOutput;
+void add_output_options(CLI::App& app, io::OutputOptions& options);
 
-void add_output_options(CLI::App& app, OutputOptions& options);
-
-/// Throws InputError where the output cannot be read back.
-void check_readable(const ConvertOutput& output);
-
-/// What the page of a run shows: its dataset's cameras, and its background. run: empty: none. Adds a remark where they cannot be read.
-report::PageCameras page_cameras(const std::optional<live::Run>& run, std::vector<std::string>& remarks);
+/// Lets the page of a run show its dataset's cameras, which `cameras` holds, and its background. Adds a remark where they cannot be read.
+void show_run(const live::Run& run, Dataset& cameras, PageOptions& page, std::vector<std::string>& remarks);
 
 }  // namespace ewa::cli

@@ -30,6 +30,7 @@
 #include "image/image_files.h"
 #include "io/datasets/importers/importer.h"
 #include "io/gltf/mesh.h"
+#include "io/splats/format_table.h"
 #include "io/splats/formats.h"
 #include "io/splats/place.h"
 #include "io/splats/zip_files.h"
@@ -460,10 +461,10 @@ int run(const InfoArguments& arguments) {
 Action add_info(CLI::App& app) {
     const auto arguments = std::make_shared<InfoArguments>();
     app.add_option("PATH", arguments->path,
-                   "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json lod-meta.json .glb "
-                   ".gltf), COLMAP folder, "
-                   "transforms.json, cameras of another program, zip archive of one of these, "
-                   "glTF file of meshes, image, folder of photos, video, or folder of a training run")
+                   "Splat file (" + io::extension_list(io::Uses::read) +
+                       "), COLMAP folder, "
+                       "transforms.json, cameras of another program, zip archive of one of these, "
+                       "glTF file of meshes, image, folder of photos, video, or folder of a training run")
         ->required();
     add_test_every_option(app, arguments->test_every);
     app.add_flag("--json", arguments->json, "Print JSON");

@@ -266,20 +266,6 @@ std::string series_svg(const Axes& axes, const WorkSeries& series, size_t number
 
 }  // namespace
 
-std::string escape_html(std::string_view text) {
-    constexpr std::string_view kSpecial = "&<>\"'";
-    constexpr const char* kEscaped[] = {"&amp;", "&lt;", "&gt;", "&quot;", "&#39;"};
-    std::string out;
-    for (const char c : text) {
-        const size_t special = kSpecial.find(c);
-        if (special != std::string_view::npos)
-            out += kEscaped[special];
-        else if (static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\t')
-            out += c;
-    }
-    return out;
-}
-
 std::string short_number(double value, int digits) {
     if (!std::isfinite(value)) return std::isnan(value) ? "n/a" : value > 0 ? "∞" : "-∞";
     static constexpr const char* kSuffix[] = {"", "k", "M", "G", "T"};

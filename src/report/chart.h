@@ -8,10 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "core/html.h"
+
 namespace ewa::report {
 
-/// The text as HTML or attribute content: escapes & < > " ' and drops control characters.
-std::string escape_html(std::string_view text);
+using core::escape_html;
 
 /// A number with at most `digits` significant digits, and k, M, G above a thousand.
 std::string short_number(double value, int digits = 3);

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// File names of renders, error maps, and base64.
+// File names of renders, and error maps.
 #pragma once
 #include <filesystem>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -24,7 +23,5 @@ Image error_map(const Image& a, const Image& b, double full_scale);
 /// The largest |a - b| of a pixel's values, not clamped, in the same colours. Alpha counts too; it is 1 where
 /// only one image has it. A value that is not finite is brightest, unless both are equal.
 Image value_error_map(const Image& a, const Image& b, double full_scale);
-
-std::string base64(std::span<const unsigned char> bytes);
 
 }  // namespace ewa::report

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <set>
 
+#include "core/html.h"
 #include "core/typing.h"
 #include "image/image_files.h"
 #include "report/chart.h"
@@ -34,7 +35,7 @@ int small_factor(const Image& image) {
 
 std::string picture(const ReportView::Jpeg& bytes, const char* alt) {
     return fmt::format("<img class=\"{0}\" alt=\"{0}\" src=\"data:image/jpeg;base64,{1}\">", alt,
-                       base64(bytes));
+                       core::base64(bytes));
 }
 
 std::string figures(const ReportView& view) {

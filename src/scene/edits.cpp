@@ -11,7 +11,6 @@
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
-#include "scene/splat_arrays.h"
 
 namespace ewa::scene {
 namespace {
@@ -139,7 +138,7 @@ size_t left_of(size_t count, const Decimation& decimation) {
     return std::min(count, std::max<size_t>(1, size_t(std::llround(double(count) * decimation.part))));
 }
 
-std::vector<std::string> apply_edits(Gaussians& gaussians, const Edits& edits, SplatFormat format) {
+std::vector<std::string> apply_edits(Gaussians& gaussians, const Edits& edits) {
     place_splats(gaussians, edits.transform, "--transform");
     if (gaussians.sh_degree > edits.max_sh) set_sh_degree(gaussians, edits.max_sh);
     std::vector<std::string> remarks;
@@ -150,22 +149,7 @@ std::vector<std::string> apply_edits(Gaussians& gaussians, const Edits& edits, S
             remarks.push_back(
                 fmt::format("--decimate left {} of {}", gaussians.size(), core::counted(before, "splat")));
     }
-    if (format != SplatFormat::ply) {
-        const size_t before = gaussians.size();
-        const std::string why = scene::undrawable_text(gaussians);
-        std::vector<uint32_t> kept;
-        for (size_t i = 0; i < before; ++i)
-            if (drawable(gaussians, i)) kept.push_back(static_cast<uint32_t>(i));
-        if (kept.size() < before) keep_splats(gaussians, kept);
-        if (gaussians.size() < before)
-            remarks.push_back("skipped " + core::counted(before - gaussians.size(), "splat") +
-                              " with a value that is not finite or a zero quaternion: " + why);
-        if (!scene::is_computable(gaussians)) gaussians = scene::computable(std::move(gaussians));
-    }
-    // The order in which these formats are written: --check compares splat by splat.
-    const bool ordered = format == SplatFormat::compressed_ply || format == SplatFormat::sog ||
-                         format == SplatFormat::sog_meta;
-    if (edits.morton || ordered) select_splats(gaussians, morton_order(gaussians));
+    if (edits.morton) select_splats(gaussians, morton_order(gaussians));
     return remarks;
 }
 

@@ -41,10 +41,7 @@ std::optional<Decimation> parse_decimation(const std::string& text);
 /// The number of splats that `decimation` leaves of `count`.
 size_t left_of(size_t count, const Decimation& decimation);
 
-/// Applies the user's edits, then those that the format needs. The result is the scene that the file will
-/// hold. Returns lines on splats that were merged, and on those that were
-/// dropped for the format. Throws InputError if the transform makes a
-/// splat undrawable.
-std::vector<std::string> apply_edits(Gaussians& gaussians, const Edits& edits, SplatFormat format);
+/// Applies the user's edits. Returns lines on splats that were merged. Throws InputError if the transform makes a splat undrawable.
+std::vector<std::string> apply_edits(Gaussians& gaussians, const Edits& edits);
 
 }  // namespace ewa::scene

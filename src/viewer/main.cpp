@@ -23,6 +23,7 @@
 #include "core/typing.h"
 #include "core/words.h"
 #include "ewa/error.h"
+#include "io/splats/format_table.h"
 #include "live/run_folder.h"
 #include "run/earlier_run.h"
 #include "scene/dataset_files.h"
@@ -257,13 +258,15 @@ int print_text(const CLI::App& app, const CLI::ParseError& asked) {
 
 void add_options(CLI::App& app, Arguments& arguments) {
     Startup& startup = arguments.startup;
-    const auto option = [&](const char* name, auto& value, const char* type, const char* help) {
+    const auto option = [&](const char* name, auto& value, const char* type, const std::string& help) {
         return app.add_option(name, value, help)->type_name(type);
     };
-    option("PATH", arguments.path, "",
-           "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json lod-meta.json .glb .gltf), "
-           "dataset, folder of a training run, folder of photos, or video. Without it, the window waits for "
-           "a file");
+    option(
+        "PATH", arguments.path, "",
+        "Splat file (" + io::extension_list(io::Uses::read) +
+            "), "
+            "dataset, folder of a training run, folder of photos, or video. Without it, the window waits for "
+            "a file");
     CLI::Option* train = app.add_flag("--train", arguments.train,
                                       "Train on the dataset, photos or video, and watch. Other options are "
                                       "passed to ewa train, such as --steps");

@@ -357,7 +357,8 @@ TEST(Convert, WritesAPage) {
     expect_failure(run_ewa({"convert", folder / "s.ply", folder / "c.obj"}), 2,
                    "tileset.json, .html (a page); ewa mesh makes meshes: ewa mesh IN -o c.obj");
     expect_failure(run_ewa({"convert", folder / "s.ply", folder / "c.html", "--check"}), 2, "check a .sog");
-    expect_failure(run_ewa({"convert", folder / "a <b>.html", folder / "d.ply"}), 2, "not a supported kind");
+    expect_failure(run_ewa({"convert", folder / "a <b>.html", folder / "d.ply"}), 2,
+                   "ewa writes pages and does not read them");
     EXPECT_EQ(files_below(folder / ""), (Names{"a <b>.html", "j.json", "s.ply"}));
 }
 

@@ -188,7 +188,7 @@ void use_scene(const Gaussians& gaussians, bool write) {
             if (std::string_view(name) == "lod-meta.json")
                 io::write_levels(folder / name, whole, options);
             else
-                io::write_tileset(folder / name, whole, {.save = options, .earth = {}});
+                io::write_tileset(folder / name, whole, options);
         } catch (const InputError&) {  // values that a format has no room for
         }
 }

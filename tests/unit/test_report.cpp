@@ -14,13 +14,13 @@
 #include <string>
 #include <vector>
 
+#include "core/html.h"
 #include "ewa/error.h"
 #include "image/image_files.h"
 #include "report/chart.h"
 #include "report/html.h"
 #include "report/pictures.h"
 #include "report/run_file_names.h"
-#include "report/scene_page.h"
 #include "report/summary.h"
 #include "report/tensorboard.h"
 #include "support/temp_folder.h"
@@ -256,7 +256,7 @@ TEST(Report, ShowsMaskedPixelsOfTrainingImages) {
     std::ranges::fill(image.pixels, 0.25f);
     mask.pixels = {1, 0};
     const LeftOutView view = left_out_view("<a>.jpg", image, mask, 0.5);
-    TempFolder folder;
+    test::TempFolder folder;
     const Image shown =
         load_image(folder.write("a.jpg", std::string(view.picture.begin(), view.picture.end())));
     ASSERT_EQ(shown.width, 32);
@@ -458,7 +458,7 @@ TEST(Report, ChartNeedsTwoFinitePoints) {
 
 TEST(Report, Base64) {
     auto encode = [](std::string_view text) {
-        return base64({reinterpret_cast<const unsigned char*>(text.data()), text.size()});
+        return core::base64({reinterpret_cast<const unsigned char*>(text.data()), text.size()});
     };
     EXPECT_EQ(encode(""), "");
     EXPECT_EQ(encode("f"), "Zg==");
@@ -525,21 +525,6 @@ TEST(Report, PictureNamesNeverCollideNorEscape) {
     EXPECT_EQ(names_of({"../../etc/1.jpg", "/2.jpg"}), (Names{"etc/1", "2"}));
     EXPECT_EQ(names_of({"a\\1.jpg", "b\\1.jpg"}), (Names{"a/1", "b/1"}));
     EXPECT_EQ(names_of({"", ".."}), (Names{"frame", "frame-2"}));
-}
-
-TEST(ScenePage, HoldsTheSceneAndItsViews) {
-    ScenePage page;
-    page.title = "a <b> & @SCENE@";
-    page.sog = "PK\3\4 scene";
-    page.start = {4, 3, 5, 6, 2, 1.5};
-    page.views = {{"</script>.jpg", page.start}};
-    const std::string html = scene_page_html(page);
-    EXPECT_NE(html.find("<title>a &lt;b&gt; &amp; @SCENE@</title>"), std::string::npos);
-    EXPECT_NE(html.find(R"(id="scene">UEsDBCBzY2VuZQ==</script>)"), std::string::npos);
-    EXPECT_NE(html.find(R"("name":"\u003c/script>.jpg")"), std::string::npos);
-    EXPECT_NE(html.find(R"("fx":5.0,"fy":6.0)"), std::string::npos);
-    for (const char* mark : {"@TITLE@", "@SETTINGS@", "@STYLE@", "@SCRIPT@"})
-        EXPECT_EQ(html.find(mark), std::string::npos) << mark;
 }
 
 }  // namespace

@@ -74,7 +74,7 @@ double farthest_of_scene(const test::TempFolder& folder, const Gaussians& scene)
 }
 
 std::vector<std::string> write(const test::TempFolder& folder, const Gaussians& scene, int levels) {
-    return io::write_tileset(folder / "tileset.json", scene, {.save = {.levels = levels}, .earth = {}});
+    return io::write_tileset(folder / "tileset.json", scene, {.levels = levels});
 }
 
 TEST(Tileset, EachLevelIsTheWholeScene) {
@@ -125,7 +125,7 @@ TEST(Tileset, TheSceneIsAtItsPlace) {
     const test::TempFolder folder;
     Gaussians scene = test::storable_splats(5, 50, 0);
     scene.origin = {4279807, 642676, 4670024};
-    io::write_tileset(folder / "tileset.json", scene, {.save = {}, .earth = glm::dmat4(1)});
+    io::write_tileset(folder / "tileset.json", scene, {.earth = glm::dmat4(1)});
     const json root = read_tileset(folder)["root"];
     glm::dmat4 transform;
     for (int i = 0; i < 16; ++i) transform[i / 4][i % 4] = root["transform"][size_t(i)];

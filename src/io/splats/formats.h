@@ -152,4 +152,9 @@ std::vector<std::string> write_usda(const std::filesystem::path& path, const Gau
 std::vector<std::string> write_usdz(const std::filesystem::path& path, const Gaussians& gaussians,
                                     const SaveOptions& options);
 
+/// An HTML file that shows the scene in a browser, with options.page (scene_page.h), and its levels if it is unbundled. Splats must be
+/// drawable.
+std::vector<std::string> write_page(const std::filesystem::path& path, Gaussians gaussians,
+                                    const SaveOptions& options);
+
 }  // namespace ewa::io

@@ -7,6 +7,7 @@
 #include <glm/glm.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "core/folders.h"
 #include "core/json.h"
@@ -70,9 +71,12 @@ bool is_tile(const std::filesystem::path& file) {
 
 class TilesetWriter {
   public:
-    TilesetWriter(const std::filesystem::path& path, const TilesetOptions& options)
+    /// earth: as SaveOptions::earth.
+    TilesetWriter(const std::filesystem::path& path, const SaveOptions& options,
+                  const std::optional<glm::dmat4>& earth)
         : path_(path),
           options_(options),
+          earth_(earth),
           folders_(path, {tile_files, names_tile_folder, is_tile}),
           folder_(folders_.add(kFolder)) {}
 
@@ -95,8 +99,8 @@ class TilesetWriter {
         for (size_t level = 0; level < levels; ++level)
             text.append(level == 0 ? "" : ", ").append(std::to_string(sizes[level]));
         std::vector<std::string> remarks(1, text + " splats");
-        if (size_t(options_.save.levels) > levels)
-            remarks.push_back(std::to_string(levels) + " of " + std::to_string(options_.save.levels) +
+        if (size_t(options_.levels) > levels)
+            remarks.push_back(std::to_string(levels) + " of " + std::to_string(options_.levels) +
                               " levels: more would have tiles of fewer than " +
                               std::to_string(kFewestOfATile) + " splats");
         const std::vector<std::string> lost = loss_.remarks();
@@ -106,7 +110,7 @@ class TilesetWriter {
 
   private:
     void plan(const Gaussians& g) {
-        const int levels = options_.save.levels;
+        const int levels = options_.levels;
         // A half of a node with more has at least as many as a tile should.
         nodes_ = build_tree(g, {.most = levels > 0 ? 2 * kFewestOfATile - 1 : kMostOfATile,
                                 .longest = 0,
@@ -150,7 +154,7 @@ class TilesetWriter {
         tile.splats = part.size();
         tile.error = tile.level == 0 ? 0 : kErrorPerWidth * usual_width(part);
         tile.file = folder_ + "/" + std::to_string(tile.level) + "_" + std::to_string(written_++) + ".glb";
-        SaveOptions options = options_.save;
+        SaveOptions options = options_;
         options.progress = {};
         write_cesium_tile(path_.parent_path() / tile.file, part, options, loss_);
     }
@@ -198,13 +202,14 @@ class TilesetWriter {
         const Bound& all = tiles_[0].bound;
         // What a viewer misses that shows nothing at all.
         value["geometricError"] = std::max(glm::length(all.high - all.low), tiles_[0].error);
-        value["root"] = tile_of(0, glm::translate(options_.earth.value_or(kUp), origin), glm::dvec3(0));
+        value["root"] = tile_of(0, glm::translate(earth_.value_or(kUp), origin), glm::dvec3(0));
         value["root"]["refine"] = "REPLACE";
         return value;
     }
 
     std::filesystem::path path_;
-    const TilesetOptions& options_;
+    const SaveOptions& options_;
+    const std::optional<glm::dmat4> earth_;
     std::vector<TreeNode> nodes_;
     std::vector<Tile> tiles_;
     PartFolders folders_;
@@ -264,9 +269,19 @@ std::vector<std::filesystem::path> tile_files(const std::filesystem::path& tiles
 }
 
 std::vector<std::string> write_tileset(const std::filesystem::path& path, Gaussians gaussians,
-                                       const TilesetOptions& options) {
+                                       const SaveOptions& options) {
     if (gaussians.size() == 0) throw InputError(path.string() + ": a tileset without splats has no box");
-    return TilesetWriter(path, options).write(std::move(gaussians));
+    std::vector<std::string> remarks;
+    std::optional<glm::dmat4> earth = options.earth;
+    if (const auto place = earth ? std::nullopt : place_in(options.comments)) {
+        earth = earth_of_place(*place);
+        remarks.push_back("on the globe at latitude " + std::to_string(place->latitude) + ", longitude " +
+                          std::to_string(place->longitude) + " and height " +
+                          std::to_string(int(std::lround(place->height))) + " m, by the GPS of the photos");
+    }
+    for (std::string& remark : TilesetWriter(path, options, earth).write(std::move(gaussians)))
+        remarks.push_back(std::move(remark));
+    return remarks;
 }
 
 }  // namespace ewa::io

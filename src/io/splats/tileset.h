@@ -12,7 +12,6 @@
 #pragma once
 #include <filesystem>
 #include <glm/mat4x4.hpp>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -28,18 +27,13 @@ inline constexpr const char* kTilesetName = "tileset.json";
 /// From an INRIA PLY's frame at the place to earth-centred, earth-fixed coordinates (EPSG 4978), metres: x east, z north, y down.
 glm::dmat4 earth_of_place(const Place& place);
 
-struct TilesetOptions {
-    /// levels: 0 for tiles of at most 100,000 splats; else the most levels whose tiles have 1,000 splats.
-    SaveOptions save;
-    /// From the scene's world to earth-centred, earth-fixed coordinates. Empty: the scene is at no place.
-    std::optional<glm::dmat4> earth;
-};
-
 /// Writes the tiles, then the tileset.json. Removes the tiles of the one that it replaced, and those that killed processes left beside it.
 /// Returns a line for each thing that the format does not store. Throws InputError for a scene without splats, RunError.
-/// The same scene gives the same bytes. Splats must be drawable, with opacities of 3DGS's kernel.
+/// The same scene gives the same bytes. Splats must be drawable, with opacities of 3DGS's kernel. options.levels: 0 for tiles of at most
+/// 100,000 splats; else the most levels whose tiles have 1,000 splats. The scene is on the globe where options.earth says, else where its
+/// comments do.
 std::vector<std::string> write_tileset(const std::filesystem::path& path, Gaussians gaussians,
-                                       const TilesetOptions& options);
+                                       const SaveOptions& options);
 
 /// Whether this is the name of a folder that write_tileset makes.
 bool names_tile_folder(std::string_view name);

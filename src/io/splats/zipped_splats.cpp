@@ -7,6 +7,7 @@
 #include "core/folders.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "io/splats/format_table.h"
 #include "io/splats/gltf_splats.h"
 #include "io/splats/levels.h"
 #include "io/splats/sog.h"
@@ -29,9 +30,8 @@ bool is_splats(const ZipFiles& zip, const ZipFiles::Entry& entry) {
     if (name.ends_with(".glb") || name.ends_with(".gltf"))
         return mentions(kGltfHead, {kSplatExtension, kSpzExtensions[2], kSpzExtensions[3]});
     if (name == kSogMeta) return mentions(kPlyHead, {"\"means\""});
-    return std::ranges::any_of(std::initializer_list<const char*>{".splat", ".ksplat", ".spz", ".sog",
-                                                                  ".usda", ".usdz", kLevelsName},
-                               [&](const char* end) { return name.ends_with(end); });
+    const FormatRow* row = row_of_name(entry.name);
+    return row && row->read;
 }
 
 std::vector<ZipFiles::Entry> all_splats(const ZipFiles& zip) {

@@ -3,15 +3,15 @@
 // Its program is in web/.
 #pragma once
 #include <array>
+#include <filesystem>
+#include <glm/vec3.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include <glm/vec3.hpp>
-
 #include "ewa/camera.h"
 
-namespace ewa::report {
+namespace ewa::io {
 
 struct PageView {
     std::string name;
@@ -32,4 +32,7 @@ struct ScenePage {
 /// The text of the file.
 std::string scene_page_html(const ScenePage& page);
 
-}  // namespace ewa::report
+/// The levels of an unbundled NAME.html: NAME-levels/lod-meta.json beside it.
+std::filesystem::path levels_of_page(const std::filesystem::path& page);
+
+}  // namespace ewa::io

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// What becomes of a scene in a file of a format (format_table.h). All functions return lines on what the format does not keep.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "io/splats/format_table.h"
+
+namespace ewa::io {
+
+/// Makes the scene one that the format can hold: with float32 positions, opacities of 3DGS's kernel and drawable splats alone, but
+/// for what the format keeps.
+std::vector<std::string> prepare(Gaussians& gaussians, const FormatRow& row);
+
+/// Whether prepare would leave the scene as it is.
+bool is_prepared(const Gaussians& gaussians, const FormatRow& row);
+
+/// Leaves the splats that the file will have, in its order, so that a file that is read back can be compared splat by splat. Their
+/// positions and opacities stay as they are. morton: put them in morton_order whatever the format.
+std::vector<std::string> match_file(Gaussians& gaussians, const FormatRow& row, bool morton = false);
+
+/// The comments and the mark that the format drops.
+std::vector<std::string> dropped_remarks(const SaveOptions& options, const FormatRow& row);
+
+}  // namespace ewa::io
