@@ -13,6 +13,7 @@
 #include "cli/film.h"
 #include "core/pixel_size.h"
 #include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "io/datasets/view_list.h"
 #include "scene/camera.h"
@@ -31,17 +32,12 @@ constexpr int kMostFrames = 100000;
 
 /// Eye and target.
 std::array<glm::dvec3, 2> parse_look_at(const std::string& text) {
-    std::vector<std::optional<double>> values;
-    for (size_t begin = 0, end = 0; begin <= text.size(); begin = end + 1) {
-        end = std::min(text.find(',', begin), text.size());
-        values.push_back(core::parse_number(core::trim(std::string_view(text).substr(begin, end - begin))));
-    }
-    const auto number = [](const std::optional<double>& value) { return value && std::isfinite(*value); };
-    if (values.size() != 6 || !std::all_of(values.begin(), values.end(), number))
+    const std::vector<double> values = core::parse_list(text).value_or(std::vector<double>());
+    if (values.size() != 6)
         throw InputError(
             "--look-at: '" + text +
             "' is not six numbers, the eye and the point that it looks at, such as 0,0,-4,0,0,0");
-    const glm::dvec3 eye(*values[0], *values[1], *values[2]), target(*values[3], *values[4], *values[5]);
+    const glm::dvec3 eye(values[0], values[1], values[2]), target(values[3], values[4], values[5]);
     if (!(glm::length(target - eye) > 0))
         throw InputError("--look-at: the eye is at the point that it looks at");
     return {eye, target};

@@ -164,36 +164,48 @@ std::optional<std::array<float, 3>> parse_colour(std::string_view text) {
     for (const NamedColour& colour : kColours)
         if (name == colour.name) return of_bytes(colour.rgb);
     if (text.starts_with('#')) return of_digits(text.substr(1));
-    const bool commas = text.find(',') != std::string_view::npos;
+    std::vector<std::string_view> words;
+    if (text.find(',') != std::string_view::npos)
+        words = split_list(text);
+    else
+        while (!trim(text).empty()) words.push_back(next_word(text));
     std::array<float, 3> colour{};
-    for (size_t c = 0; c < 3; ++c) {
-        std::string_view word;
-        if (commas) {
-            const size_t end = std::min(text.find(','), text.size());
-            word = trim(text.substr(0, end));
-            if (c < 2 && end == text.size()) return std::nullopt;
-            text.remove_prefix(std::min(end + (c < 2), text.size()));
-        } else {
-            word = next_word(text);
-        }
-        const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), colour[c]);
-        if (error != std::errc() || end != word.data() + word.size() || !(colour[c] >= 0 && colour[c] <= 1))
-            return std::nullopt;
+    if (words.size() != colour.size()) return std::nullopt;
+    for (size_t c = 0; c < colour.size(); ++c) {
+        const char* last = words[c].data() + words[c].size();
+        const auto [end, error] = std::from_chars(words[c].data(), last, colour[c]);
+        if (error != std::errc() || end != last || !(colour[c] >= 0 && colour[c] <= 1)) return std::nullopt;
     }
-    return trim(text).empty() ? std::optional(colour) : std::nullopt;
+    return colour;
 }
 
 std::optional<std::array<double, 6>> parse_box(std::string_view text) {
+    const auto numbers = parse_list(text);
     std::array<double, 6> box{};
-    for (size_t k = 0; k < box.size(); ++k) {
-        const size_t end = std::min(text.find(','), text.size());
-        const std::optional<double> number = parse_number(trim(text.substr(0, end)));
-        if (!number || !std::isfinite(*number) || (k < 5) != (end < text.size())) return std::nullopt;
-        if (k >= 3 && *number < box[k - 3]) return std::nullopt;
-        box[k] = *number;
-        text.remove_prefix(std::min(end + 1, text.size()));
-    }
+    if (!numbers || numbers->size() != box.size()) return std::nullopt;
+    std::ranges::copy(*numbers, box.begin());
+    for (size_t k = 3; k < box.size(); ++k)
+        if (box[k] < box[k - 3]) return std::nullopt;
     return box;
+}
+
+std::vector<std::string_view> split_list(std::string_view text) {
+    std::vector<std::string_view> parts;
+    for (size_t begin = 0, end = 0; begin <= text.size(); begin = end + 1) {
+        end = std::min(text.find(',', begin), text.size());
+        parts.push_back(trim(text.substr(begin, end - begin)));
+    }
+    return parts;
+}
+
+std::optional<std::vector<double>> parse_list(std::string_view text) {
+    std::vector<double> numbers;
+    for (const std::string_view part : split_list(text)) {
+        const std::optional<double> number = parse_number(part);
+        if (!number || !std::isfinite(*number)) return std::nullopt;
+        numbers.push_back(*number);
+    }
+    return numbers;
 }
 
 std::string not_a_box(std::string_view text) {

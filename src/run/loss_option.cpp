@@ -35,11 +35,9 @@ LossWeights parse_loss(const std::string& text) {
     LossWeights weights;
     bool colors = false;
     std::vector<std::string> named;
-    for (size_t begin = 0, end = 0; end != std::string::npos; begin = end + 1) {
-        end = text.find(',', begin);
-        const std::string part = text.substr(begin, end - begin);
+    for (const std::string_view part : core::split_list(text)) {
         const size_t equals = part.find('=');
-        const std::string name = core::lower(core::trim(std::string_view(part).substr(0, equals)));
+        const std::string name = core::lower(core::trim(part.substr(0, equals)));
         const auto term = std::ranges::find_if(kTerms, [&](const auto& each) { return name == each.first; });
         if (term == kTerms.end())
             throw InputError("'" + name +
@@ -49,7 +47,7 @@ LossWeights parse_loss(const std::string& text) {
             throw InputError("'" + name + "' has no weight; " + name + "=0.5 has one");
         if (std::ranges::find(named, name) != named.end()) throw InputError("'" + name + "' is named twice");
         named.push_back(name);
-        std::string weight(core::trim(std::string_view(part).substr(equals + 1)));
+        std::string weight(core::trim(part.substr(equals + 1)));
         const std::string problem = core::settle_number(weight, 0.0, kMostWeight);
         if (!problem.empty()) throw InputError(name + ": " + problem);
         const bool color = name != "alpha" && name != "depth" && name != "sfm-depth";

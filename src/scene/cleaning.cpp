@@ -89,20 +89,11 @@ Range parse_range(const std::string& text) {
 }
 
 std::array<double, 4> parse_sphere(const std::string& text) {
-    std::array<double, 4> numbers{};
-    size_t begin = 0;
-    for (size_t i = 0; i < 4; ++i) {
-        const size_t end = i < 3 ? text.find(',', begin) : text.size();
-        const auto number = end == std::string::npos || begin > text.size()
-                                ? std::nullopt
-                                : core::parse_number(core::trim(text.substr(begin, end - begin)));
-        if (!number || !std::isfinite(*number) || (i == 3 && *number <= 0))
-            throw InputError("--crop-sphere: '" + text +
-                             "' is not x,y,z,radius: three finite numbers and one above 0");
-        numbers[i] = *number;
-        begin = end + 1;
-    }
-    return numbers;
+    const auto numbers = core::parse_list(text);
+    if (!numbers || numbers->size() != 4 || numbers->back() <= 0)
+        throw InputError("--crop-sphere: '" + text +
+                         "' is not x,y,z,radius: three finite numbers and one above 0");
+    return {numbers->at(0), numbers->at(1), numbers->at(2), numbers->at(3)};
 }
 
 std::array<double, 6> parse_crop(const std::string& text) {

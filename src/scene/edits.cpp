@@ -25,18 +25,9 @@ namespace {
 
 /// Numbers separated by commas, all finite. Throws InputError that names the option.
 std::vector<double> parse_numbers(const std::string& option, const std::string& text) {
-    std::vector<double> numbers;
-    size_t begin = 0;
-    while (true) {
-        const size_t end = std::min(text.find(',', begin), text.size());
-        const std::optional<double> number =
-            core::parse_number(core::trim(std::string_view(text).substr(begin, end - begin)));
-        if (!number || !std::isfinite(*number))
-            throw InputError(option + ": '" + text + "' is not a list of numbers separated by commas");
-        numbers.push_back(*number);
-        if (end == text.size()) return numbers;
-        begin = end + 1;
-    }
+    const auto numbers = core::parse_list(text);
+    if (!numbers) throw InputError(option + ": '" + text + "' is not a list of numbers separated by commas");
+    return *numbers;
 }
 
 glm::dmat4 parse_matrix(const std::string& what, const std::string& step) {

@@ -123,6 +123,17 @@ TEST(Typing, Boxes) {
     EXPECT_EQ(not_a_box("1,2"), "'1,2' is not x,y,z,X,Y,Z with the lower corner first");
 }
 
+TEST(Typing, ListsHaveCommasBetweenTheirParts) {
+    using Parts = std::vector<std::string_view>;
+    EXPECT_EQ(split_list("a, b c ,d"), (Parts{"a", "b c", "d"}));
+    EXPECT_EQ(split_list("a,"), (Parts{"a", ""}));
+    EXPECT_EQ(split_list(""), Parts{""});
+    EXPECT_EQ(parse_list(" -1, 2e0,-.5"), (std::vector<double>{-1, 2, -0.5}));
+    EXPECT_EQ(parse_list("7"), std::vector<double>{7});
+    for (const char* text : {"", "1,", ",1", "1,,2", "1,x", "1 2", "inf", "1,nan"})
+        EXPECT_EQ(parse_list(text), std::nullopt) << text;
+}
+
 TEST(Typing, WordsHaveValues) {
     const Words<int> words{{"gray", 1}, {"black", 2}, {"dark", 2}};
     EXPECT_EQ(value_of(words, "dark"), 2);

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "io/splats/format_table.h"
 #include "io/splats/tileset.h"
@@ -16,16 +16,8 @@ namespace {
 std::optional<glm::dmat4> parse_geo(const std::string& text) {
     if (text.empty()) return std::nullopt;
     if (text == "ecef") return glm::dmat4(1);
-    std::vector<double> values;
-    bool numbers = true;
-    for (size_t begin = 0, end = 0; begin <= text.size(); begin = end + 1) {
-        end = std::min(text.find(',', begin), text.size());
-        const auto value = core::parse_number(core::trim(std::string_view(text).substr(begin, end - begin)));
-        numbers = numbers && value && std::isfinite(*value);
-        values.push_back(value.value_or(0));
-    }
-    if (!numbers || values.size() < 3 || values.size() > 4 || std::abs(values[0]) > 90 ||
-        std::abs(values[1]) > 360)
+    std::vector<double> values = core::parse_list(text).value_or(std::vector<double>());
+    if (values.size() < 3 || values.size() > 4 || std::abs(values[0]) > 90 || std::abs(values[1]) > 360)
         throw InputError(
             "--geo: '" + core::one_line(text.substr(0, 100)) +
             "' is neither ecef nor latitude,longitude,height[,heading] in degrees and metres, such as "
