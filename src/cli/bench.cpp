@@ -11,7 +11,6 @@
 #include "bench/accuracy.h"
 #include "bench/bench.h"
 #include "cli/arguments.h"
-#include "cli/bench_ranks.h"
 #include "cli/command.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
@@ -33,7 +32,6 @@ constexpr int kEvaluations = 6;
 struct BenchArguments {
     bench::Options options;
     bool accuracy = false;
-    bool ranks = false;
     // Used only with --accuracy.
     fs::path splats, svg;  // splats empty: the result of the training. svg empty: not written
     int steps = 600;       // of each training; 0: no training
@@ -235,13 +233,10 @@ Action add_bench(CLI::App& app) {
                    "With --accuracy: write the diagram of rendering to FILE, and that of training to "
                    "NAME_training.svg beside it")
         ->type_name("FILE");
-    app.add_flag("--ranks", arguments->ranks,
-                 "Under mpirun or srun: measure the network between the processes");
     arguments->options.read_splats = [](const fs::path& path) { return load_splats(splat_input(path).file); };
     const CLI::Option* steps = app.get_option("--training-steps");
     return [&app, arguments, steps] {
         check_modes(app);
-        if (arguments->ranks) return run_rank_bench(arguments->options.json);
         if (!arguments->accuracy) {
             check_command_outputs({{"--json", arguments->options.json}}, {});
             return bench::run(arguments->options, {"/proc/self/exe", "bench"});

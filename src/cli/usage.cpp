@@ -29,11 +29,11 @@ const std::map<std::string, std::string>& subjects() {
              "view-time", "aperture", "focus", "shutter",   "scene-splats", "geo",           "scale-to"});
         add("Quality", {"quality", "integrator", "samples", "runs", "training-steps", "blur-samples"});
         add("Output",
-            {"output",      "format",    "mode",        "json",      "svg",       "heat-map",    "heat-scale",
-             "serve",       "accuracy",  "spz-version", "levels",    "check",     "ranks",       "quiet",
-             "verbose",     "results",   "compare",     "threshold", "max-error", "resume",      "force",
-             "allow-empty", "protocol",  "voxel",       "triangles", "distance",  "transparent", "codec",
-             "gltf-spz",    "unbundled", "unbounded",   "collision", "title"});
+            {"output",    "format",    "mode",        "json",      "svg",         "heat-map", "heat-scale",
+             "serve",     "accuracy",  "spz-version", "levels",    "check",       "quiet",    "verbose",
+             "results",   "compare",   "threshold",   "max-error", "resume",      "force",    "allow-empty",
+             "protocol",  "voxel",     "triangles",   "distance",  "transparent", "codec",    "gltf-spz",
+             "unbundled", "unbounded", "collision",   "title"});
         for (const train::RunOption& option : train::run_options())
             if (!option.subject.empty()) made[option.name] = option.subject;
         return made;

@@ -28,14 +28,10 @@ Outcome run(const std::string& command) {
 }
 
 /// Ranks on this machine, which may have more of them than cores, and whose other networks may not lead back to it.
-Outcome start(int ranks, const std::string& command, const std::string& options = "") {
+Outcome mpirun(int ranks, const std::string& what, const std::string& options = "") {
     return run("OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 " EWA_MPIRUN
                " --oversubscribe --bind-to none --mca btl_tcp_if_include lo " +
-               options + " -n " + std::to_string(ranks) + " " + command);
-}
-
-Outcome mpirun(int ranks, const std::string& what, const std::string& options = "") {
-    return start(ranks, EWA_RANKS_WORKER " " + what, options);
+               options + " -n " + std::to_string(ranks) + " " EWA_RANKS_WORKER " " + what);
 }
 
 void expect_success(const Outcome& outcome) {
@@ -91,23 +87,6 @@ TEST(Mpi, NamesARankThatFallsSilent) {
         EXPECT_EQ(outcome.err.find("RunError", outcome.err.find("RunError") + 1), std::string::npos)
             << outcome.err;
     }
-}
-
-TEST(RankBench, MeasuresTheNetwork) {
-    const ewa::test::TempFolder folder;
-    const std::string json = folder / "figures.json";
-    const Outcome outcome = start(2, EWA_PROGRAM " bench --ranks --json " + json);
-    expect_success(outcome);
-    for (const char* text : {"2 ranks: rank 0 (", "\n      67108864 "})
-        EXPECT_NE(outcome.out.find(text), std::string::npos) << text << " not in:\n" << outcome.out;
-    EXPECT_EQ(outcome.out.find(" ranks: ", outcome.out.find(" ranks: ") + 1), std::string::npos)
-        << outcome.out;
-    for (const char* text : {"\"gather_ms\"", "\"transfers\""})
-        EXPECT_NE(ewa::test::file_bytes(json).find(text), std::string::npos) << text;
-}
-
-TEST(RankBench, SaysHowToStartIt) {
-    expect_end(run(EWA_PROGRAM " bench --ranks"), 2, "mpirun -n 2 ewa bench --ranks\n");
 }
 
 /// The worker in a folder of its own, where it looks for its module.

@@ -6,7 +6,6 @@
 #include <map>
 
 #include "ranks/launcher.h"
-#include "ranks/network.h"
 #include "ranks/node.h"
 #include "ranks/open.h"
 
@@ -99,14 +98,6 @@ TEST(Places, LimitLavapipeUnlessTheUserDoes) {
     limit_lavapipe(5);
     EXPECT_STREQ(getenv("LP_NUM_THREADS"), "3");
     unsetenv("LP_NUM_THREADS");
-}
-
-TEST(Network, OfOneRankIsMeasuredToo) {
-    const Network network = measure_network(*alone(), {1000, 100000});
-    EXPECT_EQ(network.ranks, 1);
-    ASSERT_EQ(network.transfers.size(), 2u);
-    EXPECT_EQ(network.transfers[0].bytes, 1000u);
-    EXPECT_GE(network.transfers[1].milliseconds, 0);
 }
 
 }  // namespace

@@ -10,7 +10,6 @@
 #include <thread>
 
 #include "ewa/error.h"
-#include "ranks/network.h"
 #include "ranks/open.h"
 #include "ranks/plugin.h"
 
@@ -96,19 +95,9 @@ void fall_silent(Ranks& ranks, int signal) {
     meet(ranks);
 }
 
-void measure(Ranks& ranks) {
-    const auto network = ranks::measure_network(ranks, {4096, 65536, 1 << 20, 16 << 20, 64 << 20});
-    if (ranks.rank() > 0) return;
-    std::printf("gather %.4f ms\n", network.gather_ms);
-    for (const auto& t : network.transfers)
-        std::printf("%10lu bytes %9.4f ms %8.1f MB/s\n", t.bytes, t.milliseconds,
-                    double(t.bytes) / t.milliseconds / 1e3);
-}
-
 void run(const std::string& what, Ranks& ranks) {
     if (what == "talk") return gather(ranks), exchange(ranks);
     if (what == "uneven") return uneven(ranks);
-    if (what == "measure") return measure(ranks);
     if (what == "kill") return fall_silent(ranks, SIGKILL);
     if (what == "stop") return fall_silent(ranks, SIGSTOP);
     if (what == "throw") {
