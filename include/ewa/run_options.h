@@ -2,7 +2,6 @@
 // What a whole training run is asked for. ewa/run.h carries it out.
 #pragma once
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,14 +14,6 @@
 #include "ewa/train_options.h"
 
 namespace ewa {
-
-/// The result of a training, for RunOptions::report_section.
-struct RunScene {
-    std::shared_ptr<gpu::Device> device;
-    const Gaussians& gaussians;
-    const Camera& camera;  // of the first test view, or of the first training view without a test set
-    const RenderOptions& options;
-};
 
 /// Whether splats start between neighbouring points, too.
 enum class DenseStart {
@@ -79,8 +70,6 @@ struct RunOptions {
     int rank_timeout = 300;     // s; of several ranks, one that does not answer for so long ends the run
     std::string command;        // how the run was started, for the report; may be empty
     double seconds_before = 0;  // wall time spent before the run, counted in Summary::wall_seconds
-    /// Returns HTML that the report contains as it is. Called at the end of a run that was not stopped.
-    std::function<std::string(const RunScene&)> report_section;
 };
 
 /// The run's name in the report: the stem of `scene`, else the name of the dataset's folder.

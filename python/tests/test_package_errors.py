@@ -169,7 +169,6 @@ def test_options_are_spelled_as_arguments(text, expected):
 
 # Options in errors that only runs of the command line meet.
 COMMAND_LINE = {
-    "accuracy",
     "depth",
     "force",
     "frames",

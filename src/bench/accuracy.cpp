@@ -39,8 +39,8 @@ using Colors = std::vector<glm::dvec3>;
 /// Rays of the host, with progress over several passes of all pixels.
 class HostRays {
   public:
-    HostRays(const std::vector<Pixel>& pixels, const char* what, size_t passes, bool quiet)
-        : pixels_(pixels), progress_(what, int(passes * pixels.size()), "rays", quiet) {}
+    HostRays(const std::vector<Pixel>& pixels, const char* what, size_t passes)
+        : pixels_(pixels), progress_(what, int(passes * pixels.size()), "rays", false) {}
 
     /// Computes all pixels on all host threads. Returns seconds. quick: so fast that progress does not count it.
     template <class Evaluate>
@@ -119,7 +119,7 @@ bool applies(const NamedApproximation& one, Footprint kernel) {
 
 /// The error of each approximation, at a part of the pixels: that tells their sizes.
 AccuracyReference causes_of(const Exact& exact, const Camera& camera, const RenderOptions& options,
-                            const std::vector<Pixel>& all, bool quiet) {
+                            const std::vector<Pixel>& all) {
     std::vector<Pixel> pixels;
     Colors right, colors;
     for (size_t i = 0; i < all.size(); i += kCauseStride) {
@@ -130,7 +130,7 @@ AccuracyReference causes_of(const Exact& exact, const Camera& camera, const Rend
     for (const NamedApproximation& one : kApproximations)
         if (applies(one, exact.kernel)) causes.push_back(one);
     // Each is switched on alone. Splatting without one of them is quick, unless splats then overlap.
-    HostRays rays(pixels, "switched approximations on", causes.size(), quiet);
+    HostRays rays(pixels, "switched approximations on", causes.size());
     const auto error_with = [&](const Approximations& approximations) {
         const Volume volume(exact.gaussians, camera, options, approximations);
         rays.evaluate(
@@ -220,12 +220,12 @@ std::vector<Way> ways_of(const std::vector<Exact>& exact, const RenderOptions& o
 
 /// The host's marcher in float64, with few numbers of samples: it is slow.
 report::WorkSeries march_on_host(const Camera& camera, const RenderOptions& options,
-                                 const std::vector<Pixel>& pixels, const Exact& exact, bool quiet) {
+                                 const std::vector<Pixel>& pixels, const Exact& exact) {
     const Volume volume(exact.gaussians, camera, options);
     report::WorkSeries marcher{std::string("march on the host, ") + exact.name, true, {}, false, 6};
     const double share = double(camera.width) * camera.height / double(pixels.size());
     constexpr int kSamples[] = {16, 64, 256};
-    HostRays rays(pixels, "marched on the host", std::size(kSamples), quiet);
+    HostRays rays(pixels, "marched on the host", std::size(kSamples));
     Colors actual;
     for (const int samples : kSamples) {
         report::WorkPoint point;
@@ -277,7 +277,7 @@ void set_verdicts(std::vector<report::WorkSeries>& all) {
 }
 
 Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
-                          const Camera& camera, const RenderOptions& options, bool quiet) {
+                          const Camera& camera, const RenderOptions& options) {
     Accuracy result;
     result.threads = host_threads();
     const std::vector<Pixel> pixels = spread_pixels(camera);
@@ -286,7 +286,7 @@ Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaus
     whole.sh_degree = kMaxShDegree;
     std::vector<Exact> exact = meanings_of(gaussians);
     {
-        HostRays rays(pixels, "integrated in float64", exact.size(), quiet);
+        HostRays rays(pixels, "integrated in float64", exact.size());
         for (Exact& one : exact) {
             whole.kernel = one.kernel;
             const Volume volume(one.gaussians, camera, whole);
@@ -296,11 +296,11 @@ Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaus
     }
     for (const Exact& one : exact) {
         whole.kernel = one.kernel;
-        result.references.push_back(causes_of(one, camera, whole, pixels, quiet));
+        result.references.push_back(causes_of(one, camera, whole, pixels));
     }
     {
         const std::vector<Way> ways = ways_of(exact, options, sh_degree_present(gaussians));
-        core::Progress progress("rendered", int(ways.size()), "ways", quiet);
+        core::Progress progress("rendered", int(ways.size()), "ways", false);
         for (size_t i = 0; i < ways.size(); ++i) {
             const Way& way = ways[i];
             if (result.series.empty() || result.series.back().name != way.series)
@@ -312,7 +312,7 @@ Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaus
         }
     }
     whole.kernel = exact.front().kernel;
-    result.series.push_back(march_on_host(camera, whole, pixels, exact.front(), quiet));
+    result.series.push_back(march_on_host(camera, whole, pixels, exact.front()));
     set_verdicts(result.series);
     return result;
 }

@@ -38,9 +38,9 @@ struct Accuracy {
     unsigned threads = 0;      // of the host
 };
 
-/// Opacities are fitted to each exact image, as --kernel of ewa render does. Prints progress, unless it is quiet.
+/// Opacities are fitted to each exact image, as --kernel of ewa render does. Prints progress.
 Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
-                          const Camera& camera, const RenderOptions& options, bool quiet);
+                          const Camera& camera, const RenderOptions& options);
 
 /// What the points of all series are worth. "on the front": no other point of the same exact image is faster and less
 /// wrong. Otherwise the name of one that is.

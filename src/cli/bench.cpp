@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa bench: time per pass, error against the CPU reference, and error against run time.
-#include "cli/bench.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -19,6 +17,7 @@
 #include "ewa/evaluation.h"
 #include "ewa/splat_files.h"
 #include "ewa/trainer.h"
+#include "report/chart.h"
 #include "scene/readout.h"
 
 namespace ewa::cli {
@@ -123,14 +122,12 @@ void check_files(const BenchArguments& arguments) {
         {{"--splats", arguments.splats}});
 }
 
-}  // namespace
-
+/// Error against run time of rendering a scene through one camera. Prints progress.
 report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& device,
-                                        const Gaussians& gaussians, const Camera& camera,
-                                        const RenderOptions& options, bool quiet) {
+                                        const Gaussians& gaussians, const Camera& camera) {
     if (!camera.distortion.none() || scene::moves(camera))
         throw InputError("--accuracy measures pinholes at rest only; take --lens undistort");
-    const bench::Accuracy accuracy = bench::measure_accuracy(device, gaussians, camera, options, quiet);
+    const bench::Accuracy accuracy = bench::measure_accuracy(device, gaussians, camera, {});
     report::WorkPrecision diagram;
     diagram.title = "Rendering: error against run time";
     diagram.series = accuracy.series;
@@ -153,8 +150,6 @@ report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& devi
         diagram.tables.push_back(cause_table(reference));
     return diagram;
 }
-
-namespace {
 
 /// Error against run time of training and of rendering its result, or of rendering a given scene.
 int run_accuracy(const BenchArguments& arguments) {
@@ -193,7 +188,7 @@ int run_accuracy(const BenchArguments& arguments) {
                     arguments.steps, kMaxSplats, device_info(*device).name));
     if (!arguments.splats.empty()) gaussians = std::move(given);
     const report::WorkPrecision rendering =
-        rendering_diagram(device, gaussians, dataset.frames[size_t(split.test.front())].camera, {}, false);
+        rendering_diagram(device, gaussians, dataset.frames[size_t(split.test.front())].camera);
     print_tables(rendering);
     if (!arguments.options.json.empty())
         write_json(arguments.options.json, {{"rendering", report::work_precision_json(rendering)},

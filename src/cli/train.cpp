@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "cli/arguments.h"
-#include "cli/bench.h"
 #include "cli/cameras.h"
 #include "cli/command.h"
 #include "cli/config.h"
@@ -25,12 +24,10 @@
 #include "io/datasets/dataset_folders.h"
 #include "live/run_folder.h"
 #include "ranks/open.h"
-#include "report/chart.h"
 #include "run/earlier_run.h"
 #include "run/option_table.h"
 #include "run/run_input.h"
 #include "run/share_machine.h"
-#include "scene/readout.h"
 
 namespace ewa::cli {
 namespace {
@@ -42,7 +39,7 @@ struct TrainArguments {
     RunOptions run;
     TrainOutput output;
     fs::path config;
-    bool accuracy = false, check_only = false;
+    bool check_only = false;
     bool makes_dataset = false;  // of RunOptions::scene
     std::string quality;         // empty: not given
 };
@@ -183,13 +180,6 @@ std::unique_ptr<Progress> place_photos(TrainArguments& arguments) {
     return progress;
 }
 
-std::string accuracy_section(const RunScene& scene, bool quiet) {
-    if (!scene.camera.distortion.none() || scene::moves(scene.camera))
-        return "<p>Error against run time is measured for pinholes at rest only.</p>";
-    return report::work_precision_html(
-        rendering_diagram(scene.device, scene.gaussians, scene.camera, scene.options, quiet));
-}
-
 /// What the process of another rank than 0 does: it trains and says nothing.
 int run_follower(const RunOptions& options) {
     const InterruptWatch watch;  // rank 0 ends all
@@ -205,10 +195,6 @@ int run(CLI::App& app, TrainArguments& arguments) {
     take_options_of_run(app, options, app.count("--steps") > 0 || !arguments.quality.empty());
     if (options.dataset.empty()) throw InputError("DATASET is required (see ewa train --help)");
     if (fs::is_directory(options.init)) options.init = splat_input(options.init).file.string();
-    if (arguments.accuracy)
-        options.report_section = [quiet = arguments.output.quiet](const RunScene& scene) {
-            return accuracy_section(scene, quiet);
-        };
     check_options(options);
     if (options.ranks->size() > 1 && arguments.makes_dataset)
         throw InputError(
@@ -256,8 +242,6 @@ Action add_train(CLI::App& app, const std::string& command_line) {
     app.add_option("--quality", arguments->quality,
                    "low: 2000 steps. medium: 7000. high: 30000, the default. --steps goes before it")
         ->transform(one_of(core::words_of(train::kQualities)));
-    app.add_flag("--accuracy", arguments->accuracy,
-                 "At the end, measure error against run time for the report, as ewa bench --accuracy does");
     app.add_option(
            "--serve", arguments->output.serve,
            "Let ewa-view and HTTP clients watch by this port (0: any free port). Only this machine can "

@@ -329,19 +329,6 @@ std::string work_precision_svg(const WorkPrecision& diagram) {
 
 namespace {
 
-std::string table_html(const WorkTable& table) {
-    std::string html = "<h3>" + escape_html(table.title) + "</h3>\n<table><tr>";
-    for (size_t i = 0; i < table.columns.size(); ++i)
-        html += (i == 0 ? "<th>" : "<th class=\"number\">") + escape_html(table.columns[i]) + "</th>";
-    html += "</tr>\n";
-    for (const auto& [name, values] : table.rows) {
-        html += "<tr><td>" + escape_html(name) + "</td>";
-        for (const double value : values) html += fmt::format("<td class=\"number\">{:.2e}</td>", value);
-        html += "</tr>\n";
-    }
-    return html + "</table>\n<p class=\"soft\">" + escape_html(table.note) + "</p>\n";
-}
-
 nlohmann::ordered_json table_json(const WorkTable& table) {
     nlohmann::ordered_json rows = nlohmann::ordered_json::array();
     for (const auto& [name, values] : table.rows) {
@@ -353,27 +340,6 @@ nlohmann::ordered_json table_json(const WorkTable& table) {
 }
 
 }  // namespace
-
-std::string work_precision_html(const WorkPrecision& diagram) {
-    const std::string svg = work_precision_svg(diagram);
-    if (svg.empty()) return "";
-    std::string html = "<h2>Error against run time</h2>\n" + svg;
-    for (const std::string& note : diagram.notes) html += "<p class=\"soft\">" + escape_html(note) + "</p>\n";
-    html += fmt::format(
-        "<table><tr><th>method</th><th></th><th class=\"number\">{}</th><th class=\"number\">{}</th>"
-        "<th class=\"number\">worst</th><th></th></tr>\n",
-        escape_html(diagram.x_label), escape_html(diagram.y_label));
-    for (const WorkSeries& series : diagram.series)
-        for (const WorkPoint& p : series.points)
-            html += fmt::format(
-                "<tr><td>{}</td><td>{}</td><td class=\"number\">{:.3g}</td><td class=\"number\">{:.2e}</td>"
-                "<td class=\"number\">{:.2e}</td><td>{}</td></tr>\n",
-                escape_html(series.name), escape_html(p.name), p.time, p.error, p.worst,
-                escape_html(p.verdict));
-    html += "</table>\n";
-    for (const WorkTable& table : diagram.tables) html += table_html(table);
-    return html;
-}
 
 nlohmann::ordered_json work_precision_json(const WorkPrecision& diagram) {
     nlohmann::ordered_json json{

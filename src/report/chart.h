@@ -70,9 +70,6 @@ struct WorkPrecision {
 /// whose time or error is not positive and finite are skipped. Empty if fewer than two points remain.
 std::string work_precision_svg(const WorkPrecision& diagram);
 
-/// The diagram with its notes and a table of its points, for the report.
-std::string work_precision_html(const WorkPrecision& diagram);
-
 nlohmann::ordered_json work_precision_json(const WorkPrecision& diagram);
 
 }  // namespace ewa::report

@@ -153,7 +153,7 @@ std::string html_report(const ReportData& data) {
                                      left_out_html(data.left_out) + charts(data.metrics) +
                                      step_time_html(data.times, data.earlier_steps) +
                                      ranks_html(data.summary.ranks) + chunks_html(data.summary.chunks) +
-                                     data.section + cameras(data.cameras) + plan(data.plan) + settings(data));
+                                     cameras(data.cameras) + plan(data.plan) + settings(data));
 }
 
 }  // namespace ewa::report

@@ -33,11 +33,10 @@ struct ReportData {
     std::vector<ReportView> views;                              // sorted
     std::vector<LeftOutView> left_out;                          // training images, the most first
     std::vector<CameraRow> cameras;                             // the largest error first
-    std::string section;                                        // HTML that the report contains as it is
     bool held_out = true;                                       // the views were not trained on
 };
 
-/// Escapes every string but `section`. A part without data is skipped.
+/// Escapes every string. A part without data is skipped.
 std::string html_report(const ReportData& data);
 
 }  // namespace ewa::report

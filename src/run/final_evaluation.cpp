@@ -248,15 +248,4 @@ size_t FinalEvaluation::add_full_size(report::ReportView& view) {
     return report::add_full_size(view, rendered.photo, rendered.rendering);
 }
 
-bool FinalEvaluation::add_section() {
-    if (!input_.options.report_section) return true;
-    return done_unless_stopped([&] {
-        const int first = saved_frames(input_.split).front();
-        RenderOptions look = input_.options.train.render;
-        look.sky = scene_.sky;
-        report_.section = input_.options.report_section(
-            {scene_.device, scene_.gaussians, input_.dataset.frames[size_t(first)].camera, look});
-    });
-}
-
 }  // namespace ewa::train

@@ -55,8 +55,6 @@ class FinalEvaluation {
     bool evaluate(RunCameras& cameras, const RunFolder& folder);
     /// The images at full size, as many as the report may hold.
     bool add_full_size();
-    /// RunOptions::report_section.
-    bool add_section();
 
     /// The figures of the test views, once they are evaluated.
     const std::optional<Evaluation>& of_test_views() const { return of_test_views_; }

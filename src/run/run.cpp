@@ -422,7 +422,7 @@ void Run::finish(std::unique_ptr<Trainer> trainer) {
     observer_.on_evaluated(progress_.last, scene.gaussians);
     const bool shown = evaluated && evaluation.add_full_size();
     trainer.reset();  // ends the other ranks
-    report_.summary.interrupted = !shown || !evaluation.add_section();
+    report_.summary.interrupted = !shown;
     first_render_ = evaluation.first_render();
     fill_summary();
     if (options().robust) report_.left_out = train::left_out_views(input_);

@@ -63,7 +63,7 @@ TEST(Accuracy, OpacitiesAreFittedToEachExactImage) {
     ASSERT_NE(opacities.opacity_logits, densities.opacity_logits);
     const Camera camera{16, 16, 16, 16, 8, 8, glm::dmat3(1), glm::dvec3(0)};
     const auto device = open_device({});
-    const Accuracy accuracy = measure_accuracy(device, densities, camera, {}, true);
+    const Accuracy accuracy = measure_accuracy(device, densities, camera, {});
     ASSERT_EQ(accuracy.references.size(), 2u);
     EXPECT_NEAR(accuracy.references[0].splatting, splatting_error(opacities, camera), 1e-6);
     EXPECT_NEAR(accuracy.references[1].splatting, splatting_error(densities, camera), 1e-6);

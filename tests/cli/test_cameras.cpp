@@ -337,7 +337,6 @@ TEST_F(Cameras, OptionsAreCheckedBeforeTheSearch) {
     refused({"--frames", "5"}, "--frames 5: " + folder_ / "photos" + " has photos, of which all are used");
     refused({"--frames", "2"}, "--frames: '2' is not a number of frames", "film.mp4");
     refused({"--init", "random", "--dense-start", "on"}, "--dense-start on");
-    refused({"--accuracy", "--device-memory", "1"}, "--device-memory and --accuracy exclude each other");
     refused({"--absgrad", "--strategy", "mcmc"}, "--absgrad");
     refused({"--config", "nothere.json"}, "nothere.json");
     expect_failure(run({"cameras", folder_ / "photos", "-o", folder_ / "run", "--frames", "5"}), 2,

@@ -71,10 +71,6 @@ TEST_F(DeviceMemory, GoesOnAfterCtrlCWithAnotherLimit) {
 }
 
 TEST_F(DeviceMemory, RefusesWhatItCannotDo) {
-    const Outcome accuracy = train("o", {"--device-memory", "0.003", "--accuracy"});
-    EXPECT_EQ(accuracy.status, 2);
-    EXPECT_NE(accuracy.err.find("--device-memory and --accuracy exclude each other"), std::string::npos)
-        << accuracy.err;
     const Outcome tiny = train("o", {"--device-memory", "1e-9"});
     EXPECT_EQ(tiny.status, 2);
     EXPECT_NE(tiny.err.find("0.001 GiB"), std::string::npos) << tiny.err;

@@ -323,12 +323,6 @@ TEST_F(RunFolders, InriasLayoutSaysWhatItCannotSayOfLenses) {
     EXPECT_EQ(around["fx"], 6);
 }
 
-TEST_F(RunFolders, QuietIsQuietAboutAccuracyToo) {
-    const Outcome outcome = train({"-o", "o", "--steps", "1", "--accuracy"});
-    expect_success(outcome);
-    EXPECT_EQ(outcome.out, "");
-}
-
 TEST_F(RunFolders, ATildeIsTheHomeFolder) {
     Circumstances at_home;
     at_home.environment = {{"HOME", folder / "home"}};
