@@ -50,13 +50,12 @@ struct RunOptions {
     /// Photos without transparency have TrainOptions::background_noise of 0.4 around their mean colour (docs/training_options.md#background).
     /// Only where RenderOptions::background is black, and not with a sky, a random background, points or refined poses.
     bool automatic_background = true;
-    int test_every = 8;          // every K-th image in name order is held out; 0: none
-    bool skip_blurred = false;   // training images are skipped that are blurred far more than the others
-    bool weigh_blurred = false;  // they count less
-    bool robust = false;         // masks what single images show and the others do not
-    int eval_every = 0;          // evaluates the held-out views every N steps; 0: only at the end
-    std::string metrics;         // that evaluations measure beside PSNR and SSIM: see metrics_named
-    bool tensorboard = false;    // also writes the figures of metrics.jsonl as TensorBoard's events
+    int test_every = 8;         // every K-th image in name order is held out; 0: none
+    bool skip_blurred = false;  // training images are skipped that are blurred far more than the others
+    bool robust = false;        // masks what single images show and the others do not
+    int eval_every = 0;         // evaluates the held-out views every N steps; 0: only at the end
+    std::string metrics;        // that evaluations measure beside PSNR and SSIM: see metrics_named
+    bool tensorboard = false;   // also writes the figures of metrics.jsonl as TensorBoard's events
     int save_every = 0;  // saves splats and checkpoint every N steps; 0: the checkpoint every 30 s or more
     int keep = 0;        // of the splats of save_every, the last N stay as splats_007000.ply and the like
     bool inria = false;  // also writes the folder inria/, for viewers of INRIA's runs

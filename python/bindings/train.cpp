@@ -287,9 +287,6 @@ void read_settings(const Json& settings, TrainerStart& start) {
     if (run.skip_blurred)
         throw InputError(
             "was written with --skip-blurred, which Python does not have; ewa train --resume continues it");
-    if (run.weigh_blurred)
-        throw InputError(
-            "was written with --weigh-blurred, which Python does not have; ewa train --resume continues it");
     if (run.rolling_shutter)
         throw InputError(
             "was written with --rolling-shutter, which Python does not have; ewa train --resume continues "

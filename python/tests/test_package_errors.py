@@ -186,7 +186,6 @@ COMMAND_LINE = {
     "stereo",
     "test-every",
     "transform",
-    "weigh-blurred",
 }
 
 

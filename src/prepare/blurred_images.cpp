@@ -4,9 +4,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <memory>
 #include <string>
-#include <utility>
 
 #include "core/parallel.h"
 #include "core/typing.h"
@@ -20,7 +18,6 @@ namespace {
 // How far above the median a blur effect is no accident: in standard deviations, and at least a value that motion over 3 px
 // exceeds.
 constexpr double kDeviations = 4, kLeastBlur = 0.05;
-constexpr float kBlurredWeight = 0.3f;  // in the loss
 
 }  // namespace
 
@@ -40,12 +37,7 @@ std::vector<int> blurred_frames(const Dataset& dataset, const std::vector<int>& 
     return blurred;
 }
 
-void weigh_pixels(Frame& frame, Image weights, const TrainOptions& options) {
-    frame.left_out = std::make_shared<const Image>(std::move(weights));
-    if (!options.random_background && !options.sky) frame.behind = options.render.background;
-}
-
-std::string handle_blurred(Dataset& dataset, Split& split, const RunOptions& options) {
+std::string skip_blurred(const Dataset& dataset, Split& split) {
     constexpr size_t kNamed = 8;
     const std::vector<int> blurred = blurred_frames(dataset, split.train);
     if (blurred.empty()) return {};
@@ -53,17 +45,9 @@ std::string handle_blurred(Dataset& dataset, Split& split, const RunOptions& opt
     for (size_t k = 0; k < std::min(kNamed, blurred.size()); ++k)
         names += (k == 0 ? ": " : ", ") + dataset.frames[size_t(blurred[k])].name;
     if (blurred.size() > kNamed) names += fmt::format(" and {} more", blurred.size() - kNamed);
-    std::string done = "skipped";
-    if (options.skip_blurred) {
-        std::erase_if(split.train, [&](int i) { return std::ranges::find(blurred, i) != blurred.end(); });
-    } else {
-        done = blurred.size() == 1 ? "counts less" : "count less";
-        Image weight(1, 1, 1);
-        weight.pixels[0] = kBlurredWeight;
-        for (const int i : blurred) weigh_pixels(dataset.frames[size_t(i)], weight, options.train);
-    }
-    return fmt::format("{} {} blurred and {}{}", core::counted(blurred.size(), "training image"),
-                       core::is_or_are(blurred.size()), done, names);
+    std::erase_if(split.train, [&](int i) { return std::ranges::find(blurred, i) != blurred.end(); });
+    return fmt::format("{} {} blurred and skipped{}", core::counted(blurred.size(), "training image"),
+                       core::is_or_are(blurred.size()), names);
 }
 
 }  // namespace ewa::train

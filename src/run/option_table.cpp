@@ -380,9 +380,6 @@ std::vector<Row> rows() {
         {"Data", "",
          later_flag("skip-blurred", "Do not train on images that are blurred far more than the others",
                     [](RunOptions& o) -> bool& { return o.skip_blurred; })},
-        {"Data", "",
-         later_flag("weigh-blurred", "Images that are blurred far more than the others count less",
-                    [](RunOptions& o) -> bool& { return o.weigh_blurred; })},
         {"Data", "robust",
          later_flag("robust",
                     "Mask what single images show and the others do not, such as people who pass by. A short "

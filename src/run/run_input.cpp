@@ -450,8 +450,8 @@ RunInput load_run(const RunOptions& options) {
                             "the image " + frame.name);
     }
     add_findings(check_images(input.dataset, input.split, true), input);
-    if (options.skip_blurred || options.weigh_blurred) {
-        const std::string remark = handle_blurred(input.dataset, input.split, options);
+    if (options.skip_blurred) {
+        const std::string remark = skip_blurred(input.dataset, input.split);
         if (!remark.empty()) input.remarks.push_back(remark);
     }
     TrainOptions& train = input.options.train;
@@ -523,12 +523,6 @@ constexpr std::array kRunExclusions{
     RunExclusion{"--init-opacity",
                  [](const RunOptions& o) { return o.init_opacity != RunOptions().init_opacity; },
                  Relation::excludes, "--points", draws_points, "a sphere has no opacity"},
-    RunExclusion{"--weigh-blurred", [](const RunOptions& o) { return o.weigh_blurred; }, Relation::excludes,
-                 "--skip-blurred", [](const RunOptions& o) { return o.skip_blurred; },
-                 "an image that is skipped has no weight"},
-    RunExclusion{"--weigh-blurred", [](const RunOptions& o) { return o.weigh_blurred; }, Relation::excludes,
-                 "--robust", [](const RunOptions& o) { return o.robust; },
-                 "its scout finds passers-by where all images count alike"},
     RunExclusion{"--robust", [](const RunOptions& o) { return o.robust; }, Relation::excludes, "--points",
                  draws_points, "spheres show no passer-by faintly"},
     RunExclusion{"--nearest",

@@ -7,6 +7,7 @@
 #include <climits>
 #include <cstdint>
 #include <cstring>
+#include <memory>
 #include <numeric>
 #include <optional>
 #include <span>
@@ -19,7 +20,6 @@
 #include "ewa/trainer.h"
 #include "gpu/device.h"
 #include "portions/collect.h"
-#include "prepare/blurred_images.h"
 #include "prepare/passers_by.h"
 #include "report/pictures.h"
 #include "report/run_file_names.h"
@@ -167,7 +167,8 @@ void leave_out(RunInput& input, const Masks& masks) {
     for (size_t i = 0; i < masks.size(); ++i) {
         if (masks[i].pixels.empty()) continue;
         Frame& frame = input.dataset.frames[size_t(input.split.train[i])];
-        weigh_pixels(frame, masks[i], train);
+        frame.left_out = std::make_shared<const Image>(masks[i]);
+        if (!train.random_background && !train.sky) frame.behind = train.render.background;
     }
 }
 

@@ -328,9 +328,8 @@ TEST(Run, SkipsBlurredTrainingImages) {
     RunOptions options = small_run(folder / "o");
     options.dataset = made.folder.path();
     options.train.steps = 2;
-    const auto views = [&](bool skip, bool weigh = false) {
+    const auto views = [&](bool skip) {
         options.skip_blurred = skip;
-        options.weigh_blurred = weigh;
         options.force = true;
         Recorder recorder;
         run_training(options, recorder);
@@ -346,34 +345,6 @@ TEST(Run, SkipsBlurredTrainingImages) {
                                                             made.dataset.frames[2].name;
                                    }),
               remarks.end());
-    const auto [all, weighed] = views(false, true);
-    EXPECT_EQ(all, 6u);
-    EXPECT_EQ(std::ranges::count(
-                  weighed, "1 training image is blurred and counts less: " + made.dataset.frames[2].name),
-              1);
-
-    // As with a grey mask of that image.
-    options.train.steps = 8;
-    const auto trained = [&](bool weigh) {
-        views(false, weigh);
-        return load_splats(folder / "o/splats.ply");
-    };
-    const Gaussians plain = trained(false), less = trained(true);
-    Image mask(48, 36, 1);
-    std::ranges::fill(mask.pixels, 0.3f);
-    const auto file =
-        made.folder / "masks" / (made.dataset.frames[2].image_path.filename().string() + ".png");
-    std::filesystem::create_directories(file.parent_path());
-    save_image(file, mask);
-    options.masks = MaskUse::ignore;
-    const Gaussians masked = trained(false);
-    const auto distance = [&](const Gaussians& other) {
-        double sum = 0;
-        for (size_t i = 0; i < less.sh.size(); ++i) sum += std::abs(double(less.sh[i]) - double(other.sh[i]));
-        return sum;
-    };
-    EXPECT_GT(distance(plain), 0);
-    EXPECT_LT(distance(masked), 0.1 * distance(plain));
 }
 
 TEST(Run, AnExceptionOfTheObserverEndsIt) {
@@ -427,7 +398,6 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                              {"test-every", "5"},
                                              {"level", "off"},
                                              {"skip-blurred", "true"},
-                                             {"weigh-blurred", "true"},
                                              {"robust", "true"},
                                              {"seed", "18446744073709551615"},
                                              {"moments", "32"},
