@@ -23,7 +23,7 @@ struct KeptDataset {
     std::shared_ptr<const void> files = {};
 };
 
-DatasetOptions options_of(const AskedDataset& asked, const std::optional<live::Run>& run) {
+DatasetOptions options_of(const AskedDataset& asked, const std::optional<folders::Run>& run) {
     DatasetOptions options = run ? live::dataset_options_of(*run) : DatasetOptions();
     options.downscale = asked.downscale.value_or(options.downscale);
     options.max_width = asked.max_width.value_or(options.max_width);
@@ -33,7 +33,7 @@ DatasetOptions options_of(const AskedDataset& asked, const std::optional<live::R
     return options;
 }
 
-int test_every_of(const std::optional<live::Run>& run) {
+int test_every_of(const std::optional<folders::Run>& run) {
     const nlohmann::json none;
     const nlohmann::json& value =
         run && run->config.contains("test-every") ? run->config["test-every"] : none;
@@ -46,7 +46,7 @@ namespace {
 
 LoadedDataset read_dataset(const fs::path& path, const AskedDataset& asked) {
     return with_files([&] {
-        const std::optional<live::Run> run = live::run_named(path);
+        const std::optional<folders::Run> run = live::run_named(path);
         LoadedDataset opened{nullptr, fs::absolute(path), options_of(asked, run), test_every_of(run)};
         if (run) opened.background = core::parse_colour(run->text("background")).value_or(opened.background);
         const fs::path named = run ? live::dataset_of(*run) : path;

@@ -68,17 +68,17 @@ nb::ndarray<nb::numpy, T> threes(const Rows& rows) {
 }
 
 /// The run of splats that a path names.
-std::optional<live::Run> run_of(const ObjectOrPath<Splats>& splats) {
+std::optional<folders::Run> run_of(const ObjectOrPath<Splats>& splats) {
     const auto* const path = std::get_if<fs::path>(&splats);
     if (!path) return std::nullopt;
-    std::optional<live::Run> run = live::run_named(*path);
-    return run ? run : live::run_of_splats(*path);
+    std::optional<folders::Run> run = live::run_named(*path);
+    return run ? run : folders::run_of_splats(*path);
 }
 
 using Cameras = std::optional<ObjectOrPath<LoadedDataset>>;
 
 /// Those that are given, or the cameras of the run; empty: neither. Frames without an image are skipped, as in training.
-std::optional<Dataset> cameras_of(const Cameras& cameras, const std::optional<live::Run>& run) {
+std::optional<Dataset> cameras_of(const Cameras& cameras, const std::optional<folders::Run>& run) {
     if (!cameras && !run) return std::nullopt;
     const Opened<LoadedDataset> opened(
         cameras ? *cameras : ObjectOrPath<LoadedDataset>(run->folder),
@@ -112,7 +112,7 @@ Mesh make_mesh(const ObjectOrPath<Splats>& given, const std::optional<fs::path>&
                const std::string& up) {
     static const core::Words<int> kDepths{{"auto", 0}, {"median", 1}, {"mean", 2}};
     const int which = of_argument("depth", [&] { return core::value_of(kDepths, depth); });
-    const std::optional<live::Run> run = run_of(given);
+    const std::optional<folders::Run> run = run_of(given);
     if (run && run->flag("points"))
         throw InputError("the run " + core::one_line(run->folder.string()) +
                          " has spheres, which have no surfaces");

@@ -23,13 +23,13 @@
 #include "ewa/run_observer.h"
 #include "ewa/splat_edit.h"
 #include "ewa/trainer.h"
+#include "folders/former_options.h"
+#include "folders/run_folder.h"
 #include "inputs.h"
 #include "live/run_inputs.h"
 #include "metrics.h"
 #include "options.h"
 #include "prepare/photo_background.h"
-#include "report/former_options.h"
-#include "report/run_file_names.h"
 #include "run/evaluation.h"
 #include "run/first_checks.h"
 #include "run/option_table.h"
@@ -278,7 +278,7 @@ void read_settings(const Json& settings, TrainerStart& start) {
         return;
     }
     RunOptions run = usual_options();
-    const Json stored = report::with_present_names(settings.value("options", Json::object()));
+    const Json stored = folders::with_present_names(settings.value("options", Json::object()));
     for (const train::RunOption& option : train::run_options()) {
         if (!option.decides_result || !stored.contains(option.name)) continue;
         const Json& value = stored[option.name];
@@ -317,7 +317,7 @@ std::optional<train::Masks> known_masks(const std::filesystem::path& checkpoint,
     if (fingerprint == train::fingerprint_of(none)) return none;
     train::RunInput input;
     input.options.output = checkpoint.parent_path();
-    if (!core::is_folder(input.options.output / report::kPassersByFolder)) return std::nullopt;
+    if (!core::is_folder(input.options.output / folders::kPassersByFolder)) return std::nullopt;
     input.dataset = *start.dataset;
     input.split = start.split();
     return train::saved_masks(input);
@@ -325,7 +325,7 @@ std::optional<train::Masks> known_masks(const std::filesystem::path& checkpoint,
 
 Training resume(const std::filesystem::path& named, const ObjectOrPath<LoadedDataset>& given, nb::handle init,
                 std::optional<int> steps) {
-    const auto path = core::is_folder(named) ? named / report::kCheckpointFile : named;
+    const auto path = core::is_folder(named) ? named / folders::kCheckpointFile : named;
     const train::Checkpoint checkpoint = with_files([&] { return train::read_checkpoint(path); });
     const Opened<LoadedDataset> dataset(given, open_dataset);
     TrainerStart start = start_of(*dataset);

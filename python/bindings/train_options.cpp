@@ -15,8 +15,8 @@
 #include "core/typing.h"
 #include "core/words.h"
 #include "ewa/error.h"
+#include "folders/former_options.h"
 #include "options.h"
-#include "report/former_options.h"
 #include "run/loss_option.h"
 #include "run/option_table.h"
 #include "scene/looks.h"
@@ -265,7 +265,7 @@ Json options_json(const RunOptions& options) {
 }
 
 void read_options(const Json& stored, RunOptions& options) {
-    const auto json = report::with_present_names(stored);
+    const auto json = folders::with_present_names(stored);
     for (const auto& [name, value] : options_dict(options)) {
         const auto key = nb::cast<std::string>(name);
         try {

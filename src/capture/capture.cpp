@@ -22,6 +22,7 @@
 #include "ewa/dataset.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "folders/run_folder.h"
 #include "image/image_files.h"
 #include "io/datasets/dataset_folders.h"
 #include "io/datasets/image_records.h"
@@ -95,17 +96,18 @@ void refuse_made(const fs::path& input) {
     const fs::path path = (fs::absolute(input).lexically_normal() / "").parent_path();
     const std::string name = core::one_line(input.string());
     const auto cameras_of = [](const fs::path& run) {
-        const fs::path dataset = run / "dataset";
+        const fs::path dataset = run / folders::kMadeDataset;
         return io::is_dataset_folder(dataset)
                    ? "its cameras are in " + core::one_line(fs::proximate(dataset).string())
                    : "its config.json names the dataset with its cameras";
     };
-    if (io::is_run_folder(path) && !io::is_dataset_folder(path))
+    if (folders::is_run(path) && !io::is_dataset_folder(path))
         throw InputError(name + " is a run: " + cameras_of(path));
     const fs::path folder = path.filename();
-    if (io::is_run_folder(path.parent_path()) && (folder == "test" || folder == "passers_by"))
+    if (folders::is_run(path.parent_path()) &&
+        (folder == folders::kTestFolder || folder == folders::kPassersByFolder))
         throw InputError(name + " has pictures that a run has made: " + cameras_of(path.parent_path()));
-    if (is_file(path / "capture.json") && !io::is_dataset_folder(path))
+    if (is_file(path / folders::kCaptureFile) && !io::is_dataset_folder(path))
         throw InputError(
             name + " is a dataset that is not finished; the command that began it, repeated, continues");
 }
@@ -118,7 +120,8 @@ const char* name_of(Matching matching) {
 
 /// The photos of the input. Those that a training in a folder of the photos has rendered do not count.
 std::vector<fs::path> photos_of(const fs::path& photos, const fs::path& folder) {
-    const bool of_run = folder.filename() == "dataset" && is_file(folder.parent_path() / "config.json");
+    const bool of_run =
+        folder.filename() == folders::kMadeDataset && is_file(folder.parent_path() / folders::kConfigFile);
     const fs::path results = fs::weakly_canonical(fs::absolute(of_run ? folder.parent_path() : folder));
     const std::string below = results.lexically_relative(fs::canonical(photos)).string() + "/";
     std::vector<fs::path> names = capture::photos_in(photos);
@@ -144,7 +147,7 @@ bool is_begun(const fs::path& folder, bool video) {
 /// Makes sure that the folder is new, or was begun with the same input and options. Returns the record of what was begun;
 /// null if nothing was.
 Json check_claim(const fs::path& folder, Json record, bool video) {
-    const fs::path file = folder / "capture.json";
+    const fs::path file = folder / folders::kCaptureFile;
     const std::string name = core::one_line(folder.string()),
                       ways_out = "; -o DIR takes another folder, or remove " + name;
     if (!is_file(file)) {
@@ -264,7 +267,7 @@ struct Making {
             core::make_folder(folder);
             lock = std::make_unique<core::FolderLock>(folder);
         }
-        if (before.is_null()) core::write_json(folder / "capture.json", record);
+        if (before.is_null()) core::write_json(folder / folders::kCaptureFile, record);
     }
 };
 
@@ -370,9 +373,9 @@ Capture make_of_archive(Making& now) {
     now.record["archive"] = Json::array({capture::line_of(now.input.parent_path(), now.input.filename())});
     const bool cameras = archive_has_cameras(now.input);
     if (!cameras) require_programs(now.folder, false);
-    if (is_file(now.folder / "capture.json"))
-        check_same_file(now.folder, core::read_json_file<Json>(now.folder / "capture.json"), now.record,
-                        "archive");
+    if (is_file(now.folder / folders::kCaptureFile))
+        check_same_file(now.folder, core::read_json_file<Json>(now.folder / folders::kCaptureFile),
+                        now.record, "archive");
     if (!is_folder(unpacked) && !io::is_dataset_folder(now.folder)) {
         now.begin();
         fs::remove_all(partial);

@@ -17,6 +17,7 @@
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/image.h"
+#include "folders/run_folder.h"
 #include "image/image_files.h"
 #include "io/datasets/importers/image_finder.h"
 
@@ -33,7 +34,7 @@ bool below_made(const fs::path& folder, const fs::path& name, std::map<fs::path,
     if (parent.empty()) return false;
     const auto found = known.find(parent);
     if (found != known.end()) return found->second;
-    return known[parent] = io::is_made_by_ewa(folder / parent) || below_made(folder, parent, known);
+    return known[parent] = folders::is_made_by_ewa(folder / parent) || below_made(folder, parent, known);
 }
 
 /// The words of a name, in lower case.

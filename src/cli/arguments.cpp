@@ -17,8 +17,8 @@
 #include "ewa/sky_map.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
+#include "folders/run_folder.h"
 #include "io/splats/format_table.h"
-#include "report/run_file_names.h"
 #include "scene/camera.h"
 #include "scene/looks.h"
 #include "scene/names.h"
@@ -122,7 +122,7 @@ Gaussians DrawArguments::load(const fs::path& splats, RenderOptions& options) co
         if (scene.antialiased && options.integrator != Integrator::march)
             options.kernel = Footprint::antialias;
     }
-    const fs::path sky = splats.parent_path() / report::kSkyFile;
+    const fs::path sky = splats.parent_path() / folders::kSkyFile;
     if (!names_background() && core::is_file(sky))
         options.sky = std::make_shared<const SkyMap>(load_sky(sky));
     fit_opacities(scene.gaussians, options.kernel == Footprint::density);
@@ -321,7 +321,7 @@ Views load_views(const ViewArguments& arguments, const std::string& which, int t
     std::unique_ptr<core::TemporaryFolder> rendered;
     if (names_mesh_scene(arguments.dataset)) {
         select_frames(scene_cameras(arguments.dataset, {}), which, test_every);
-        folder = arguments.splats.parent_path() / "dataset";
+        folder = arguments.splats.parent_path() / folders::kMadeDataset;
         if (!is_rendered(arguments.dataset, folder, {})) {
             rendered = std::make_unique<core::TemporaryFolder>("ewa-images-");
             folder = rendered->path();

@@ -161,7 +161,7 @@ ImagePairs pair_one(const ComparedSide& a, const ComparedSide& b) {
 }  // namespace
 
 void resolve_runs(CLI::App& app, CompareInputs& inputs) {
-    std::optional<live::Run> first;
+    std::optional<folders::Run> first;
     std::array<std::optional<fs::path>, 2> refined;
     for (const size_t i : {size_t(0), size_t(1)}) {
         fs::path& side = i == 0 ? inputs.a : inputs.b;

@@ -14,7 +14,7 @@
 #include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "report/former_options.h"
+#include "folders/former_options.h"
 #include "report/summary.h"
 #include "run/option_table.h"
 
@@ -92,7 +92,7 @@ bool given(CLI::App& app, const std::string& name) {
 }  // namespace
 
 void apply_config(CLI::App& app, const std::filesystem::path& file) {
-    const auto json = report::with_present_names(core::read_json_file<Json>(file));
+    const auto json = folders::with_present_names(core::read_json_file<Json>(file));
     if (!json.is_object()) throw InputError(file.string() + ": not a JSON object of options");
     std::vector<std::pair<CLI::Option*, std::string>> values;
     for (const auto& [name, value] : json.items()) {

@@ -27,11 +27,11 @@
 #include "ewa/render_options.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
+#include "folders/run_folder.h"
 #include "io/splats/format_table.h"
 #include "io/splats/place.h"
 #include "io/splats/prepare.h"
 #include "io/splats/scene_page.h"
-#include "report/run_file_names.h"
 #include "scene/edits.h"
 
 namespace ewa::cli {
@@ -54,7 +54,7 @@ struct ConvertArguments {
     int level = 0;  // of the inputs
     fs::path json;
     bool bake_sky = false, check = false, allow_empty = false, quiet = false;
-    std::optional<live::Run> run;  // that the only input is of
+    std::optional<folders::Run> run;  // that the only input is of
 };
 
 struct PlacedInput {
@@ -104,7 +104,7 @@ std::string described(const fs::path& path, std::string_view format, const std::
 
 /// Adds splats in place of the sky of the file's run.
 void bake_sky(const fs::path& file, Gaussians& gaussians) {
-    const fs::path sky = file.parent_path() / report::kSkyFile;
+    const fs::path sky = file.parent_path() / folders::kSkyFile;
     if (!core::is_file(sky))
         throw InputError("--bake-sky: " + core::one_line(sky.string()) +
                          " is missing; ewa train --background sky writes it");
@@ -248,7 +248,7 @@ Json output_json(const ConvertArguments& arguments, const SceneSize& size) {
 /// Removes what the options name and says how much. Whether that was all, for --dry-run. in_place: the splats are where the run has
 /// them.
 bool clean_scene(const ConvertArguments& arguments, Work& work, bool in_place) {
-    const std::optional<live::Run> run = in_place ? arguments.run : std::nullopt;
+    const std::optional<folders::Run> run = in_place ? arguments.run : std::nullopt;
     const bool dry = !arguments.cleaning.picture.empty();
     const Gaussians before = dry ? work.gaussians : Gaussians();
     const size_t all = work.gaussians.size();
@@ -404,7 +404,7 @@ Action add_convert(CLI::App& app) {
             const PlacedInput input = parse_input(arguments->files[i].string());
             SplatInput splats = splat_input(input.file);
             if (arguments->files.size() == 2 && input.transform == glm::dmat4(1))
-                arguments->run = splats.run ? std::move(splats.run) : live::run_of_splats(splats.file);
+                arguments->run = splats.run ? std::move(splats.run) : folders::run_of_splats(splats.file);
             arguments->files[i] = splats.file;
             arguments->placements.push_back(input.transform);
         }

@@ -12,7 +12,7 @@
 namespace ewa::cli {
 namespace {
 
-std::vector<Camera> cameras_that_see(const std::optional<live::Run>& run) {
+std::vector<Camera> cameras_that_see(const std::optional<folders::Run>& run) {
     if (!run)
         throw InputError(
             "--min-views: cameras are needed; give the folder of a training run as the only input");
@@ -60,13 +60,13 @@ void add_cleaning_options(CLI::App& app, Cleaning& cleaning) {
 }
 
 std::vector<scene::Removed> clean(Gaussians& gaussians, const Cleaning& cleaning,
-                                  const std::optional<live::Run>& run) {
+                                  const std::optional<folders::Run>& run) {
     return scene::clean(gaussians, cleaning,
                         cleaning.min_views > 0 ? cameras_that_see(run) : std::vector<Camera>());
 }
 
 void draw_removed(const std::filesystem::path& picture, const Gaussians& all, const Gaussians& left,
-                  const std::optional<live::Run>& run) {
+                  const std::optional<folders::Run>& run) {
     constexpr int kWidth = 1280, kHeight = 720;
     Camera camera = scene::frame_scene(all, kWidth, kHeight).camera;
     if (run)

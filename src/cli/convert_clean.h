@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "ewa/gaussians.h"
-#include "live/run_folder.h"
+#include "folders/run.h"
 #include "scene/cleaning.h"
 
 namespace CLI {
@@ -23,10 +23,10 @@ void add_cleaning_options(CLI::App& app, Cleaning& cleaning);
 
 /// scene::clean with the cameras of a run. run: of the splats, for --min-views. Throws InputError that names the option.
 std::vector<scene::Removed> clean(Gaussians& gaussians, const Cleaning& cleaning,
-                                  const std::optional<live::Run>& run);
+                                  const std::optional<folders::Run>& run);
 
 /// Draws `all` in grey with what `left` lacks in red, and writes the picture. left: splats of `all`, in order. Throws RunError.
 void draw_removed(const std::filesystem::path& picture, const Gaussians& all, const Gaussians& left,
-                  const std::optional<live::Run>& run);
+                  const std::optional<folders::Run>& run);
 
 }  // namespace ewa::cli

@@ -36,7 +36,8 @@ void add_output_options(CLI::App& app, io::OutputOptions& options) {
         ->type_name("LAT,LON,HEIGHT[,HEADING]|ecef");
 }
 
-void show_run(const live::Run& run, Dataset& cameras, PageOptions& page, std::vector<std::string>& remarks) {
+void show_run(const folders::Run& run, Dataset& cameras, PageOptions& page,
+              std::vector<std::string>& remarks) {
     page.background = core::parse_colour(run.text("background")).value_or(page.background);
     try {
         cameras = cameras_of_run(run);

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "ewa/dataset.h"
+#include "folders/run.h"
 #include "io/splats/output_options.h"
-#include "live/run_folder.h"
 
 namespace CLI {
 class App;
@@ -18,6 +18,7 @@ namespace ewa::cli {
 void add_output_options(CLI::App& app, io::OutputOptions& options);
 
 /// Lets the page of a run show its dataset's cameras, which `cameras` holds, and its background. Adds a remark where they cannot be read.
-void show_run(const live::Run& run, Dataset& cameras, PageOptions& page, std::vector<std::string>& remarks);
+void show_run(const folders::Run& run, Dataset& cameras, PageOptions& page,
+              std::vector<std::string>& remarks);
 
 }  // namespace ewa::cli

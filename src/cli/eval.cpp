@@ -30,7 +30,7 @@ struct EvalArguments {
     std::filesystem::path json;
     std::string split = "test";
     AppearanceArguments appearance;
-    std::optional<live::Run> run;  // that of SPLATS, if its dataset is used
+    std::optional<folders::Run> run;  // that of SPLATS, if its dataset is used
     int test_every = 8;
     bool depth = false;
 };
@@ -138,7 +138,7 @@ Action add_eval(CLI::App& app) {
     add_view_options(app, arguments->views);
     return [&app, arguments] {
         arguments->run = resolve_views(app, arguments->views);
-        arguments->appearance.run = live::run_of_splats(arguments->views.splats);
+        arguments->appearance.run = folders::run_of_splats(arguments->views.splats);
         return run(*arguments);
     };
 }

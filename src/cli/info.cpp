@@ -27,6 +27,7 @@
 #include "ewa/splat_files.h"
 #include "ewa/synthetic_dataset.h"
 #include "ewa/trainer.h"
+#include "folders/run_folder.h"
 #include "image/image_files.h"
 #include "io/datasets/importers/importer.h"
 #include "io/gltf/mesh.h"
@@ -89,9 +90,9 @@ void print_file(const fs::path& path, const SplatScene& scene) {
 }
 
 /// The members of summary.json; empty if the run has not ended.
-Json summary_of(const live::Run& run) {
+Json summary_of(const folders::Run& run) {
     try {
-        Json summary = core::read_json_file<Json>(run.folder / "summary.json", {.bytes = 1u << 20});
+        Json summary = core::read_json_file<Json>(run.folder / folders::kSummaryFile, {.bytes = 1u << 20});
         if (summary.is_object()) return summary;
     } catch (const InputError&) {
         // It is written at the end.
@@ -99,7 +100,7 @@ Json summary_of(const live::Run& run) {
     return Json::object();
 }
 
-void add_run(Json& json, const live::Run& run) {
+void add_run(Json& json, const folders::Run& run) {
     json["kind"] = "run";
     json["run"] = {{"folder", run.folder.string()},
                    {"dataset", run.named_dataset},
@@ -108,7 +109,7 @@ void add_run(Json& json, const live::Run& run) {
                    {"summary", summary_of(run)}};
 }
 
-void print_run(const live::Run& run) {
+void print_run(const folders::Run& run) {
     fmt::print("{}\nkind            training run\n", core::one_line(run.folder.string()));
     if (!run.named_dataset.empty())
         fmt::print("dataset         {}{}\n", core::one_line(run.named_dataset),
@@ -123,7 +124,7 @@ void print_run(const live::Run& run) {
 }
 
 /// run: the training run that the file is of; null: unknown.
-void info_splats(const fs::path& path, const live::Run* run, const InfoArguments& arguments) {
+void info_splats(const fs::path& path, const folders::Run* run, const InfoArguments& arguments) {
     const SplatScene scene = read_splats(path);
     const Gaussians& gaussians = scene.gaussians;
     const SplatStatistics statistics = splat_statistics(gaussians);

@@ -47,7 +47,8 @@ struct MeshArguments {
 };
 
 /// The cameras of --cameras or of the run, refined as the run refined them. Empty without both.
-std::optional<Dataset> dataset_of_mesh(const MeshArguments& arguments, const std::optional<live::Run>& run) {
+std::optional<Dataset> dataset_of_mesh(const MeshArguments& arguments,
+                                       const std::optional<folders::Run>& run) {
     fs::path path = arguments.cameras;
     if (path.empty() && run) path = dataset_of(*run);
     if (path.empty()) return std::nullopt;
@@ -73,7 +74,7 @@ void check_output(const MeshArguments& arguments, const std::optional<Dataset>& 
 }
 
 /// Whether the surfaces are at the mean depth of the splats, which --loss depth brings onto them; else at the median depth.
-bool at_mean_depth(const MeshArguments& arguments, const std::optional<live::Run>& run) {
+bool at_mean_depth(const MeshArguments& arguments, const std::optional<folders::Run>& run) {
     if (arguments.depth != "auto") return arguments.depth == "mean";
     const std::string loss = run ? run->text("loss") : "";
     return !loss.empty() && train::parse_loss(loss).depth > 0;
@@ -101,7 +102,7 @@ void print(const mesh::Fused& fused, const MeshArguments& arguments, size_t most
                                   triangles));
 }
 
-int make_mesh(const MeshArguments& arguments, const std::optional<live::Run>& run) {
+int make_mesh(const MeshArguments& arguments, const std::optional<folders::Run>& run) {
     RenderOptions options;
     const DrawArguments draw;
     const glm::dmat4 placement = placement_of(arguments);
@@ -137,7 +138,7 @@ int make_mesh(const MeshArguments& arguments, const std::optional<live::Run>& ru
 int run(CLI::App& app, MeshArguments& arguments) {
     SplatInput input = splat_input(arguments.splats);
     arguments.splats = input.file;
-    if (!input.run) input.run = live::run_of_splats(arguments.splats);
+    if (!input.run) input.run = folders::run_of_splats(arguments.splats);
     if (input.run && input.run->flag("points"))
         throw InputError(core::one_line(arguments.splats.string()) +
                          " holds the spheres of --points, which have no surfaces");

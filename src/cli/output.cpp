@@ -8,8 +8,8 @@
 
 #include "core/text.h"
 #include "ewa/error.h"
-#include "live/run_folder.h"
-#include "report/run_file_names.h"
+#include "folders/run.h"
+#include "folders/run_folder.h"
 
 namespace ewa::cli {
 
@@ -18,9 +18,9 @@ namespace {
 /// Adds the files of each run whose splats are read.
 void add_run_files(std::vector<NamedFile>& read) {
     for (size_t i = 0, count = read.size(); i < count; ++i) {
-        const auto run = live::run_of_splats(read[i].path);
+        const auto run = folders::run_of_splats(read[i].path);
         if (!run) continue;
-        for (const char* name : report::kRunFiles) read.push_back({"a file of the run", run->folder / name});
+        for (const char* name : folders::kRunFiles) read.push_back({"a file of the run", run->folder / name});
     }
 }
 
@@ -28,7 +28,7 @@ void add_run_files(std::vector<NamedFile>& read) {
 
 void check_command_outputs(const std::vector<NamedFile>& written, std::vector<NamedFile> read) {
     for (const NamedFile& file : written)
-        if (const auto run = live::run_of_file(file.path))
+        if (const auto run = folders::run_of_file(file.path))
             throw InputError(core::one_line(file.name + " " + file.path.string() +
                                             " is a file of the training run in " + run->string() +
                                             "; it would be overwritten; name another file"));

@@ -52,7 +52,7 @@ struct RenderArguments {
     DeviceOptions device;
     bool quiet = false;
     // The run that SPLATS names; empty: none.
-    std::optional<live::Run> run;
+    std::optional<folders::Run> run;
     bool cameras_of_run = false, run_is_folder = false;
 };
 
@@ -362,7 +362,7 @@ int run(CLI::App& app, RenderArguments& arguments) {
         throw InputError("--codec: only a film has one, such as -o film.mp4");
     SplatInput input = splat_input(arguments.splats);
     arguments.splats = input.file;
-    arguments.appearance.run = input.run ? input.run : live::run_of_splats(arguments.splats);
+    arguments.appearance.run = input.run ? input.run : folders::run_of_splats(arguments.splats);
     if (!arguments.cameras.empty()) arguments.cameras = dataset_input(arguments.cameras);
     if (input.run) use_options_of(*input.run, app, arguments.cameras);
     if (const auto use = core::find_value(scene::kLensWords, arguments.lens))

@@ -11,7 +11,7 @@
 #include "cli/run_inputs.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "live/run_folder.h"
+#include "folders/run.h"
 
 namespace ewa::cli {
 namespace {
@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A run that made its dataset keeps the name of what it made it of, which need not exist any more.
-void use_dataset_of(const live::Run& run, RunOptions& options) {
+void use_dataset_of(const folders::Run& run, RunOptions& options) {
     options.dataset = dataset_of(run);
     if (run.made_dataset()) options.scene = run.named_dataset;
 }
@@ -32,7 +32,7 @@ bool same_folder(const fs::path& a, const fs::path& b) {
 }  // namespace
 
 void settle_dataset(RunOptions& options) {
-    const std::optional<live::Run> run = run_named(options.dataset);
+    const std::optional<folders::Run> run = run_named(options.dataset);
     if (!run) return;
     if (options.output.empty()) options.output = run->folder;
     const bool own_folder = same_folder(options.output, run->folder);
@@ -52,7 +52,8 @@ void take_options_of_run(CLI::App& app, RunOptions& options, bool keep_steps) {
     if (options.dataset.empty() && options.output.empty())
         throw InputError("--resume needs the folder of a run: ewa train RUN --resume");
     const fs::path folder = output_folder(options);
-    const std::optional<live::Run> run = live::is_run(folder) ? live::find_run(folder) : std::nullopt;
+    const std::optional<folders::Run> run =
+        folders::is_run(folder) ? folders::find_run(folder) : std::nullopt;
     if (!run) {
         if (options.dataset.empty())
             throw InputError(core::one_line(folder.string()) +
@@ -65,8 +66,8 @@ void take_options_of_run(CLI::App& app, RunOptions& options, bool keep_steps) {
     if (keep_steps) values.erase("steps");
     if (app.count("--kernel") > 0) values.erase("nearest");  // of --points
     const bool own_init = app.count("--init") == 0;
-    apply_run_config(app, values, folder / "config.json");
-    if (own_init) options.init_folder = live::base_of(folder, options.init).value_or(fs::path());
+    apply_run_config(app, values, folder / folders::kConfigFile);
+    if (own_init) options.init_folder = folders::base_of(folder, options.init).value_or(fs::path());
 }
 
 }  // namespace ewa::cli

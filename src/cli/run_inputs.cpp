@@ -10,7 +10,7 @@
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
-#include "report/run_file_names.h"
+#include "folders/run_folder.h"
 #include "scene/names.h"
 
 namespace ewa::cli {
@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 namespace {
 
 /// px of the widest image that the run was trained on; 0 where its dataset is not found.
-int trained_width(const live::Run& run, int downscale) try {
+int trained_width(const folders::Run& run, int downscale) try {
     int width = 0;
     for (const Frame& frame : load_cameras_as_trained(dataset_of(run), {}).frames)
         width = std::max(width, std::max(frame.source.width, frame.camera.width) / downscale);
@@ -30,8 +30,8 @@ int trained_width(const live::Run& run, int downscale) try {
 
 }  // namespace
 
-void use_options_of(const live::Run& run, CLI::App& app, const fs::path& other) {
-    const fs::path config = run.folder / "config.json";
+void use_options_of(const folders::Run& run, CLI::App& app, const fs::path& other) {
+    const fs::path config = run.folder / folders::kConfigFile;
     std::error_code none;
     const bool elsewhere = !other.empty() && !fs::equivalent(dataset_input(other), run.dataset, none);
     for (const char* name : {"points", "nearest", "integrator", "kernel", "background", "loss", "downscale",
@@ -40,7 +40,7 @@ void use_options_of(const live::Run& run, CLI::App& app, const fs::path& other) 
         if (value == run.config.end() || *value == false) continue;
         if (*value == "random") continue;  // evaluated over black
         if (*value == "sky" && std::string_view(name) == "background") {
-            if (!core::is_file(run.folder / report::kSkyFile))
+            if (!core::is_file(run.folder / folders::kSkyFile))
                 core::warn(core::one_line(run.folder.string()) +
                            ": sky.json is missing; the splats are drawn over black");
             continue;  // DrawArguments::load finds it
@@ -72,10 +72,10 @@ void add_appearance_options(CLI::App& app, AppearanceArguments& arguments) {
 namespace {
 
 /// Empty: none.
-fs::path appearance_file(const std::string& which, const std::optional<live::Run>& run) {
+fs::path appearance_file(const std::string& which, const std::optional<folders::Run>& run) {
     if (which != "auto") return which == "none" ? fs::path() : fs::path(which);
     if (!run) return {};
-    for (const char* name : {report::kAppearanceFile, report::kOldExposuresFile})
+    for (const char* name : {folders::kAppearanceFile, folders::kOldExposuresFile})
         if (core::is_file(run->folder / name)) return run->folder / name;
     return {};
 }
@@ -101,8 +101,8 @@ std::vector<glm::dvec3> centers_of(const std::vector<std::string>& names, const 
     return centers;
 }
 
-KnownAppearances known_appearances(const AppearanceArguments& arguments, const std::optional<live::Run>& run,
-                                   const Dataset* dataset) {
+KnownAppearances known_appearances(const AppearanceArguments& arguments,
+                                   const std::optional<folders::Run>& run, const Dataset* dataset) {
     KnownAppearances known{
         appearance_file(arguments.file, run || arguments.of.empty() ? run : arguments.run)};
     if (known.file.empty() && !arguments.of.empty())
@@ -131,7 +131,7 @@ KnownAppearances known_appearances(const AppearanceArguments& arguments, const s
 }  // namespace
 
 std::vector<Appearance> appearances_of(const AppearanceArguments& arguments,
-                                       const std::optional<live::Run>& run, const Dataset& dataset,
+                                       const std::optional<folders::Run>& run, const Dataset& dataset,
                                        const std::vector<int>& frames) {
     const KnownAppearances known = known_appearances(arguments, run, &dataset);
     const auto has_appearance = [&](const Frame& frame) { return known.images.contains(frame.name); };
@@ -152,18 +152,18 @@ std::vector<Appearance> appearances_of(const AppearanceArguments& arguments,
 }
 
 NewViewAppearance appearance_of_new_views(const AppearanceArguments& arguments,
-                                          const std::optional<live::Run>& run, const Dataset* dataset) {
+                                          const std::optional<folders::Run>& run, const Dataset* dataset) {
     return known_appearances(arguments, run, dataset).others;
 }
 
-std::optional<live::Run> resolve_views(CLI::App& app, ViewArguments& arguments) {
+std::optional<folders::Run> resolve_views(CLI::App& app, ViewArguments& arguments) {
     SplatInput input = splat_input(arguments.splats);
     arguments.splats = input.file;
     const bool own_dataset = arguments.dataset.empty();
     if (!arguments.dataset.empty()) {
         arguments.dataset = dataset_input(arguments.dataset);
     } else {
-        if (!input.run) input.run = live::run_of_splats(arguments.splats);
+        if (!input.run) input.run = folders::run_of_splats(arguments.splats);
         if (!input.run)
             throw InputError("DATASET is required: " + core::one_line(arguments.splats.string()) +
                              " is not of a training run, whose config.json would name it");
@@ -179,7 +179,7 @@ std::optional<live::Run> resolve_views(CLI::App& app, ViewArguments& arguments) 
     return std::move(input.run);
 }
 
-Dataset cameras_of_run(const live::Run& run) {
+Dataset cameras_of_run(const folders::Run& run) {
     Dataset dataset = load_cameras_as_trained(dataset_of(run), {});
     const std::filesystem::path refined = refined_cameras_of(run);
     if (!refined.empty()) io::use_refined_cameras(dataset, refined);

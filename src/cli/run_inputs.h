@@ -23,16 +23,16 @@ using live::SplatInput;
 /// Gives --kernel, --background, --downscale, --max-width, --masks, --lens and --test-every the run's values, where `app` has the option
 /// and the command line does not. other: a dataset in place of the run's; its images become as wide as those that the run was trained on,
 /// where they are wider. Empty: none. Throws InputError for a value that the option refuses.
-void use_options_of(const live::Run& run, CLI::App& app, const std::filesystem::path& other = {});
+void use_options_of(const folders::Run& run, CLI::App& app, const std::filesystem::path& other = {});
 
 /// The cameras of the run's dataset as it was trained, refined ones if it has them. Throws InputError.
-Dataset cameras_of_run(const live::Run& run);
+Dataset cameras_of_run(const folders::Run& run);
 
 /// Which appearance images get.
 struct AppearanceArguments {
     std::string file = "auto";  // or "none", or "auto": the file beside the splats of a run, if it is there
     std::string of;  // the training image whose appearance all others get; empty: see NewViewAppearance
-    std::optional<live::Run> run = {};  // of the splats, where `of` is searched; empty: none
+    std::optional<folders::Run> run = {};  // of the splats, where `of` is searched; empty: none
 };
 
 /// --exposures and --appearance-of of ewa eval and ewa render.
@@ -43,16 +43,16 @@ void add_appearance_options(CLI::App& app, AppearanceArguments& arguments);
 /// run: that of the splats, with its own dataset; empty: none.
 /// Empty where there are none. Throws InputError, also if the file has none of the dataset's frames.
 std::vector<Appearance> appearances_of(const AppearanceArguments& arguments,
-                                       const std::optional<live::Run>& run, const Dataset& dataset,
+                                       const std::optional<folders::Run>& run, const Dataset& dataset,
                                        const std::vector<int>& frames);
 
 /// The appearance of views that no image has. run: as above. dataset: with the run's cameras; null: unknown. Throws InputError.
 NewViewAppearance appearance_of_new_views(const AppearanceArguments& arguments,
-                                          const std::optional<live::Run>& run, const Dataset* dataset);
+                                          const std::optional<folders::Run>& run, const Dataset* dataset);
 
 /// Replaces a run's folder among SPLATS and DATASET. Without DATASET, it is that of the run, also of a run that SPLATS
 /// is a file of. The run's options are used as in use_options_of, unless both arguments are files. Throws InputError,
 /// also if nothing names the dataset. Returns the run that SPLATS is of, if its dataset is used.
-std::optional<live::Run> resolve_views(CLI::App& app, ViewArguments& arguments);
+std::optional<folders::Run> resolve_views(CLI::App& app, ViewArguments& arguments);
 
 }  // namespace ewa::cli

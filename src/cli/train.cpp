@@ -21,8 +21,8 @@
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/run.h"
+#include "folders/run.h"
 #include "io/datasets/dataset_folders.h"
-#include "live/run_folder.h"
 #include "ranks/open.h"
 #include "run/earlier_run.h"
 #include "run/option_table.h"
@@ -88,7 +88,7 @@ bool is_mesh_scene(const fs::path& path) {
 /// A folder of runs is no dataset, and a run in it may be meant.
 void refuse_runs(const fs::path& path) {
     if (!core::is_folder(path) || is_capture(path) || io::is_dataset_folder(path)) return;
-    if (const std::string runs = live::runs_in(path); !runs.empty())
+    if (const std::string runs = folders::runs_in(path); !runs.empty())
         throw InputError(core::one_line(path.string()) + ": not a dataset, but it has the training runs " +
                          runs + "; ewa train RUN --resume continues one");
 }
@@ -114,7 +114,7 @@ void render_scene(TrainArguments& arguments) {
     RunOptions& run = arguments.run;
     if (!arguments.makes_dataset || !is_mesh_scene(run.scene)) return;
     run.output = output_folder(run);
-    run.dataset = run.output / live::kMadeDataset;
+    run.dataset = run.output / folders::kMadeDataset;
     train::check_free(run.output, run);
     // Another training may be reading the images that are there.
     std::unique_ptr<core::FolderLock> lock;
@@ -165,7 +165,7 @@ std::unique_ptr<Progress> place_photos(TrainArguments& arguments) {
     RunOptions& run = arguments.run;
     if (!arguments.makes_dataset || is_mesh_scene(run.scene)) return nullptr;
     run.output = output_folder(run);
-    run.dataset = run.output / live::kMadeDataset;
+    run.dataset = run.output / folders::kMadeDataset;
     train::check_free(run.output, run);
     CaptureOptions capture{.level = run.level};
     if (has_videos(run.scene)) {

@@ -14,6 +14,7 @@
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
+#include "folders/run_folder.h"
 #include "live/server.h"
 #include "live/watcher.h"
 #include "report/summary.h"
@@ -64,7 +65,7 @@ class TrainObserver::Served {
     }
     ~Served() {
         std::error_code absent;
-        std::filesystem::remove(folder_ / live::kLiveFile, absent);
+        std::filesystem::remove(folder_ / folders::kLiveFile, absent);
     }
 
     /// One line that says how to watch.
@@ -261,8 +262,8 @@ void TrainObserver::print(const RunResult& result) {
     if (report::shortens_many(s))
         on_note("shortened " + core::counted(s.limited_steps, "update") +
                 " that were too long for their splat");
-    on_note("splats:  " + (result.folder / "splats.ply").string());
-    on_note("report:  " + (result.folder / "report.html").string());
+    on_note("splats:  " + (result.folder / folders::kSplatsFile).string());
+    on_note("report:  " + (result.folder / folders::kReportFile).string());
     if (!result.first_render.empty()) on_note("render:  " + result.first_render.string());
     if (s.interrupted)
         on_note(fmt::format("{}: ewa train {} --resume",

@@ -14,17 +14,17 @@
 namespace ewa::live {
 namespace fs = std::filesystem;
 
-std::optional<Run> run_named(const fs::path& path) {
+std::optional<folders::Run> run_named(const fs::path& path) {
     if (!core::is_folder(path) || io::is_dataset_folder(path)) return std::nullopt;
-    return find_run(path);
+    return folders::find_run(path);
 }
 
 SplatInput splat_input(const fs::path& path) {
     if (!core::is_folder(path)) return {path, {}};
     const std::string name = core::one_line(path.string());
-    std::optional<Run> run = find_run(path);
+    std::optional<folders::Run> run = folders::find_run(path);
     if (!run) {
-        const std::string runs = runs_in(path);
+        const std::string runs = folders::runs_in(path);
         throw InputError(name +
                          ": a folder without splats; expected a splat file, or the folder of a training run "
                          "with splats.ply in it" +
@@ -41,13 +41,13 @@ SplatInput splat_input(const fs::path& path) {
 
 bool names_run_with_splats(const fs::path& path) {
     if (!core::is_folder(path)) return false;
-    const std::optional<Run> run = find_run(path);
+    const std::optional<folders::Run> run = folders::find_run(path);
     return run && !run->splats.empty();
 }
 
-fs::path dataset_of(const Run& run) {
+fs::path dataset_of(const folders::Run& run) {
     if (!run.dataset.empty()) return run.dataset;
-    const std::string config = core::one_line((run.folder / "config.json").string());
+    const std::string config = core::one_line((run.folder / folders::kConfigFile).string());
     if (run.named_dataset.empty()) throw InputError(config + ": names no dataset; name the dataset itself");
     throw InputError(
         config + ": the dataset " + core::one_line(run.named_dataset) +
@@ -56,11 +56,11 @@ fs::path dataset_of(const Run& run) {
 }
 
 fs::path dataset_input(const fs::path& path) {
-    const std::optional<Run> run = run_named(path);
+    const std::optional<folders::Run> run = run_named(path);
     return run ? dataset_of(*run) : path;
 }
 
-fs::path refined_cameras_of(const Run& run) {
+fs::path refined_cameras_of(const folders::Run& run) {
     fs::path file = run.refined_cameras();
     if (file.empty() && run.flag("refine-poses"))
         core::warn(core::one_line(run.folder.string()) +
@@ -68,7 +68,7 @@ fs::path refined_cameras_of(const Run& run) {
     return file;
 }
 
-DatasetOptions dataset_options_of(const Run& run) {
+DatasetOptions dataset_options_of(const folders::Run& run) {
     DatasetOptions options;
     const auto downscale = run.config.find("downscale");
     if (downscale != run.config.end() && downscale->is_number_integer())

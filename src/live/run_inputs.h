@@ -5,17 +5,17 @@
 #include <optional>
 
 #include "ewa/dataset.h"
-#include "live/run_folder.h"
+#include "folders/run.h"
 
 namespace ewa::live {
 
 /// The run whose folder this is. Empty for other paths, and for a folder that is also a dataset.
-std::optional<Run> run_named(const std::filesystem::path& path);
+std::optional<folders::Run> run_named(const std::filesystem::path& path);
 
 /// A path that names splats.
 struct SplatInput {
-    std::filesystem::path file;  // the path itself, or splats.ply of the run's folder
-    std::optional<Run> run;      // if the path is a run's folder
+    std::filesystem::path file;       // the path itself, or splats.ply of the run's folder
+    std::optional<folders::Run> run;  // if the path is a run's folder
 };
 /// Any path but a folder stays as it is: the reader of splats says what is wrong with it. Throws InputError for a
 /// folder that is not a run's, or whose run has no splats yet.
@@ -29,13 +29,13 @@ bool names_run_with_splats(const std::filesystem::path& path);
 std::filesystem::path dataset_input(const std::filesystem::path& path);
 
 /// The dataset of a run. Throws InputError that says where it was searched.
-std::filesystem::path dataset_of(const Run& run);
+std::filesystem::path dataset_of(const folders::Run& run);
 
 /// cameras.json of the run. Empty if its cameras are those of the dataset. Warns if they should be refined, and the file
 /// is missing.
-std::filesystem::path refined_cameras_of(const Run& run);
+std::filesystem::path refined_cameras_of(const folders::Run& run);
 
 /// How the run reads its images. What its config.json does not have is as usual.
-DatasetOptions dataset_options_of(const Run& run);
+DatasetOptions dataset_options_of(const folders::Run& run);
 
 }  // namespace ewa::live

@@ -17,6 +17,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "folders/run_folder.h"
 #include "io/splats/formats.h"
 #include "live/wire.h"
 
@@ -55,8 +56,8 @@ std::string start_of(const fs::path& path, size_t most) {
 /// How many steps the run's settings ask for. 0 if they cannot be read.
 int steps_of(const fs::path& folder) {
     try {
-        const Json json =
-            core::parse_json<Json>(start_of(folder / "config.json", kLargestConfig), "config.json");
+        const Json json = core::parse_json<Json>(start_of(folder / folders::kConfigFile, kLargestConfig),
+                                                 folders::kConfigFile);
         return int(report::whole_number(json, "steps", INT32_MAX));
     } catch (const InputError&) {
         return 0;
@@ -66,8 +67,8 @@ int steps_of(const fs::path& folder) {
 /// A run that continues a finished one leaves that one's summary until it ends itself.
 bool is_done(const fs::path& folder) {
     std::error_code absent, none;
-    const auto summary = fs::last_write_time(folder / "summary.json", absent);
-    const auto config = fs::last_write_time(folder / "config.json", none);
+    const auto summary = fs::last_write_time(folder / folders::kSummaryFile, absent);
+    const auto config = fs::last_write_time(folder / folders::kConfigFile, none);
     return !absent && (none || summary >= config);
 }
 
@@ -191,7 +192,8 @@ Address parse_address(const std::string& text) {
 }
 
 std::optional<LiveFile> read_live_file(const fs::path& folder) try {
-    const Json json = core::parse_json<Json>(start_of(folder / kLiveFile, kLargestLiveFile), kLiveFile);
+    const Json json =
+        core::parse_json<Json>(start_of(folder / folders::kLiveFile, kLargestLiveFile), folders::kLiveFile);
     const uint64_t port = report::whole_number(json, "port", UINT16_MAX);
     if (port == 0 || !json.contains("token") || !json["token"].is_string()) return std::nullopt;
     return LiveFile{uint16_t(port), json["token"].get<std::string>()};
@@ -219,7 +221,7 @@ std::string find_token(const std::string& given, const fs::path& file) {
 
 void write_live_file(const fs::path& folder, const LiveFile& live) {
     const std::string text = Json{{"port", live.port}, {"token", live.token}}.dump() + "\n";
-    core::write_text_file(folder / kLiveFile, text, core::AtomicFile::Readers::owner);
+    core::write_text_file(folder / folders::kLiveFile, text, core::AtomicFile::Readers::owner);
 }
 
 Watcher::Watcher(WhatToWatch what, std::function<void()> on_news)
@@ -342,7 +344,7 @@ void Watcher::look_by_connection() {
 }
 
 void Watcher::read_metrics() {
-    const fs::path path = what_.folder / "metrics.jsonl";
+    const fs::path path = what_.folder / folders::kMetricsFile;
     std::error_code error;
     const std::uintmax_t bytes = fs::file_size(path, error);
     if (error || bytes == metrics_read_ || fs::last_write_time(path, error) <= what_.metrics_after) return;
@@ -372,7 +374,7 @@ void Watcher::read_metrics() {
 
 void Watcher::look_at_files() {
     read_metrics();
-    const fs::path path = what_.folder / "splats.ply";
+    const fs::path path = what_.folder / folders::kSplatsFile;
     std::error_code error;
     const auto time = fs::last_write_time(path, error);
     if (error || time <= splats_time_) return;

@@ -59,8 +59,7 @@ class Client {
     std::unique_ptr<Http> http_;
 };
 
-/// In the folder of a run that is served: {"port", "token"}, readable only by its owner.
-inline constexpr const char* kLiveFile = "live.json";
+/// folders::kLiveFile of a run that is served: {"port", "token"}, readable only by its owner.
 struct LiveFile {
     uint16_t port = 0;
     std::string token;

@@ -9,8 +9,8 @@
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
+#include "folders/run_folder.h"
 #include "pipeline/model.h"
-#include "report/run_file_names.h"
 
 namespace ewa::train {
 namespace {
@@ -34,7 +34,7 @@ RunBytes bytes_of_run(uint64_t splats, const TrainOptions& options) {
 
 uint64_t replaced_bytes(const fs::path& folder) {
     uint64_t bytes = 0;
-    for (const char* file : report::kRunFiles) {
+    for (const char* file : folders::kRunFiles) {
         std::error_code absent;
         const uintmax_t size = fs::file_size(folder / file, absent);
         if (!absent) bytes += size;

@@ -13,11 +13,10 @@
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
+#include "folders/run_folder.h"
 #include "io/datasets/dataset_folders.h"
-#include "report/run_file_names.h"
 #include "report/summary.h"
 #include "run/option_table.h"
-#include "run/run_files.h"
 #include "train/checkpoint.h"
 
 namespace ewa::train {
@@ -35,8 +34,8 @@ struct EarlierRun {
 };
 
 /// Empty if the file is missing or damaged.
-std::optional<EarlierRun> from_checkpoint(const fs::path& folder) try {
-    const Checkpoint head = read_checkpoint_head(folder / "checkpoint.ewa");
+std::optional<EarlierRun> from_checkpoint(const folders::RunFolder& folder) try {
+    const Checkpoint head = read_checkpoint_head(folder / folders::kCheckpointFile);
     const Json settings = core::parse_json<Json>(head.settings, "settings");
     const Json options = settings.is_object() ? settings.value("options", Json()) : Json();
     return EarlierRun{
@@ -45,8 +44,8 @@ std::optional<EarlierRun> from_checkpoint(const fs::path& folder) try {
     return std::nullopt;
 }
 
-std::optional<EarlierRun> from_summary(const fs::path& folder) try {
-    const Json summary = core::read_json_file<Json>(folder / "summary.json");
+std::optional<EarlierRun> from_summary(const folders::RunFolder& folder) try {
+    const Json summary = core::read_json_file<Json>(folder / folders::kSummaryFile);
     EarlierRun run;
     run.step = run.steps = report::whole_number(summary, "steps", INT32_MAX);
     const Json interrupted = summary.value("interrupted", Json());
@@ -70,20 +69,13 @@ std::string described(const EarlierRun& run) {
 
 /// Throws InputError if the run would lie among photos. A run that is already there may continue.
 void check_no_dataset(const fs::path& folder, const RunOptions& options) {
-    if (options.resume && core::is_file(folder / "checkpoint.ewa")) return;
+    if (options.resume && folders::RunFolder(folder).has(folders::kCheckpointFile)) return;
     io::check_output_folder("-o", folder);
     std::error_code missing;
     for (const fs::path& photos : {options.scene, options.scene / "images"})
         if (!options.scene.empty() && fs::equivalent(folder, photos, missing))
             throw InputError("-o " + core::one_line(folder.string()) +
                              " holds the photos, where no outputs belong; name another folder");
-}
-
-/// Whether a run of ewa's has begun in the folder, finished or not.
-bool holds_run(const fs::path& folder) {
-    const auto has = [&](const char* name) { return core::is_file(folder / name); };
-    return has(report::kConfigFile) &&
-           (has(report::kMetricsFile) || has(report::kSplatsFile) || has(report::kCheckpointFile));
 }
 
 /// Whether the file has options of a run alone.
@@ -100,27 +92,28 @@ bool is_config(const fs::path& file) try {
 }
 
 /// Throws InputError if a folder without a run has something with a name that a run writes or removes. Links are replaced.
-void check_no_names_of_others(const fs::path& folder) {
-    if (holds_run(folder)) return;
+void check_no_names_of_others(const folders::RunFolder& folder) {
+    if (folder.is_run()) return;
     const auto refuse = [&](const fs::path& name) {
-        throw InputError(core::one_line(folder.string()) + ": holds " + core::one_line(name.string()) +
+        throw InputError(core::one_line(folder.path().string()) + ": holds " + core::one_line(name.string()) +
                          ", which a run writes and no run of this folder has written; " + kReplace);
     };
     std::error_code absent;
-    const auto is = [&](const fs::path& name, fs::file_type type) {
+    const auto is = [&](const char* name, fs::file_type type) {
         return fs::symlink_status(folder / name, absent).type() == type;
     };
-    for (const std::string_view name : report::kRunFiles)
+    for (const char* name : folders::kRunFiles)
         if (is(name, fs::file_type::regular) &&
-            (name != report::kConfigFile || !is_config(folder / report::kConfigFile)))
+            (name != std::string_view(folders::kConfigFile) || !is_config(folder / folders::kConfigFile)))
             refuse(name);
-    for (const char* name : report::kCameraModelFiles)
+    for (const char* name : folders::kCameraModelFiles)
         if (is(name, fs::file_type::regular)) refuse(name);
     // What a killed command left is no user's.
     const auto is_of_user = [](const fs::directory_entry& entry) {
         return !entry.path().filename().string().starts_with(".ewa-");
     };
-    for (const char* name : {"test", "train", "inria", report::kPassersByFolder})
+    for (const char* name :
+         {folders::kTestFolder, folders::kTrainFolder, folders::kInriaFolder, folders::kPassersByFolder})
         if (is(name, fs::file_type::directory) &&
             std::ranges::any_of(fs::directory_iterator(folder / name, absent), is_of_user))
             refuse(name);
@@ -128,12 +121,13 @@ void check_no_names_of_others(const fs::path& folder) {
 
 }  // namespace
 
-void check_free(const fs::path& folder, const RunOptions& options) {
-    check_no_dataset(folder, options);
+void check_free(const fs::path& path, const RunOptions& options) {
+    check_no_dataset(path, options);
     if (options.force) return;
-    const auto has = [&](const char* file) { return core::is_file(folder / file); };
-    const std::string where = core::one_line(folder.string()) + ": ";
-    if (has("checkpoint.ewa")) {
+    const folders::RunFolder folder(path);
+    const std::string where = core::one_line(path.string()) + ": ";
+    const bool has_summary = folder.has(folders::kSummaryFile);
+    if (folder.has(folders::kCheckpointFile)) {
         if (options.resume) return;
         std::optional<EarlierRun> run = from_checkpoint(folder);
         if (!run) throw InputError(where + "holds a checkpoint.ewa that cannot be read; " + kReplace);
@@ -141,10 +135,10 @@ void check_free(const fs::path& folder, const RunOptions& options) {
             run->psnr = summary->psnr;
         throw InputError(where + described(*run));
     }
-    if (!has("splats.ply") && !has("summary.json") && kept_splats(folder).empty())
+    if (!folder.has(folders::kSplatsFile) && !has_summary && folder.kept_splats().empty())
         return check_no_names_of_others(folder);
     // Splats are saved just before the checkpoint. A kill between the two leaves no summary.
-    if (options.resume && has("metrics.jsonl") && !has("summary.json")) return;
+    if (options.resume && folder.has(folders::kMetricsFile) && !has_summary) return;
     const auto run = from_summary(folder);
     throw InputError(where + (run ? fmt::format("holds a run of {} steps", run->step) : "holds splats.ply") +
                      " without the checkpoint.ewa from which --resume continues; " + kReplace);

@@ -13,6 +13,6 @@ namespace ewa::train {
 /// first checkpoint count as free. With options.force, no run is refused.
 /// Also throws InputError if the folder is a dataset, or a folder of images, or if no run has begun in it and it has files with the
 /// names of a run's.
-void check_free(const std::filesystem::path& folder, const RunOptions& options);
+void check_free(const std::filesystem::path& path, const RunOptions& options);
 
 }  // namespace ewa::train

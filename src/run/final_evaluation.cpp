@@ -9,6 +9,7 @@
 
 #include "core/folders.h"
 #include "ewa/error.h"
+#include "folders/run_folder.h"
 #include "image/metric.h"
 #include "report/pictures.h"
 #include "report/views.h"
@@ -53,7 +54,8 @@ size_t evaluated_views(const Split& split) {
 
 std::map<int, std::filesystem::path> saved_renders(const RunInput& input) {
     const auto names = report::picture_names(input.dataset.frames);
-    const auto folder = input.options.output / (input.split.test.empty() ? "train" : "test");
+    const auto folder =
+        input.options.output / (input.split.test.empty() ? folders::kTrainFolder : folders::kTestFolder);
     std::map<int, std::filesystem::path> files;
     for (const int index : saved_frames(input.split))
         files[index] = folder / (names[size_t(index)].string() + ".png");
@@ -70,7 +72,7 @@ bool FinalEvaluation::done_unless_stopped(const std::function<void()>& work) con
     }
 }
 
-bool FinalEvaluation::evaluate(RunCameras& cameras, const RunFolder& folder) {
+bool FinalEvaluation::evaluate(RunCameras& cameras, const RunWriter& folder) {
     const bool held_out = !input_.split.test.empty();
     const auto align = [&] {
         cameras.align_test(scene_.device, scene_.gaussians, [&] {

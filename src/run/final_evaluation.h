@@ -52,7 +52,7 @@ class FinalEvaluation {
 
     /// The figures and the small views. cameras: refined ones are in use. They are saved again in `folder` after an
     /// alignment of the test cameras.
-    bool evaluate(RunCameras& cameras, const RunFolder& folder);
+    bool evaluate(RunCameras& cameras, const RunWriter& folder);
     /// The images at full size, as many as the report may hold.
     bool add_full_size();
 

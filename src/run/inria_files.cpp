@@ -12,6 +12,7 @@
 #include "core/atomic_file.h"
 #include "core/folders.h"
 #include "core/json.h"
+#include "folders/run_folder.h"
 #include "io/datasets/image_records.h"
 #include "run/run_files.h"
 #include "scene/lens.h"
@@ -22,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr const char *kFolder = "inria", *kArguments = "cfg_args", *kSplats = "point_cloud";
+constexpr const char *kArguments = "cfg_args", *kSplats = "point_cloud";
 
 /// The text as a literal of Python: INRIA's scripts evaluate cfg_args.
 std::string python_text(std::string_view text) {
@@ -85,7 +86,7 @@ fs::path made_without_links(const fs::path& folder) {
 }  // namespace
 
 void save_inria(const fs::path& folder, const RunInput& input, const Gaussians& gaussians, int step) {
-    const fs::path model = made_without_links(folder / kFolder);
+    const fs::path model = made_without_links(folder / folders::kInriaFolder);
     Json cameras = Json::array();
     for (const auto* frames : {&input.split.test, &input.split.train})
         for (const int index : *frames)
@@ -101,7 +102,7 @@ void save_inria(const fs::path& folder, const RunInput& input, const Gaussians& 
 }
 
 void remove_inria_splats(const fs::path& folder) {
-    const fs::path model = folder / kFolder;
+    const fs::path model = folder / folders::kInriaFolder;
     std::error_code absent;
     if (fs::is_symlink(model, absent) || !core::is_file(model / kArguments)) return;
     fs::remove_all(model / kSplats, absent);

@@ -8,8 +8,8 @@
 #include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "report/former_options.h"
-#include "report/run_file_names.h"
+#include "folders/former_options.h"
+#include "folders/run_folder.h"
 #include "run/option_table.h"
 #include "train/schedule.h"
 
@@ -34,7 +34,7 @@ Json parse_settings(const std::filesystem::path& path, const std::string& stored
     }
     if (!json.is_object() || !json.contains("options") || !json["options"].is_object())
         throw InputError(path.string() + ": its settings cannot be read" + kWaysOut);
-    json["options"] = report::with_present_names(std::move(json["options"]));
+    json["options"] = folders::with_present_names(std::move(json["options"]));
     return json;
 }
 
@@ -199,7 +199,8 @@ void check_resumable(const std::filesystem::path& path, const std::string& store
                              value.dump().substr(0, kLongestValue) + ", which this version of ewa lacks" +
                              kWaysOut);
     if (now.contains(kMasksSetting) && then.value(kMasksSetting, Json()) != now[kMasksSetting])
-        throw InputError(path.string() + ": the masks of --robust beside it, in " + report::kPassersByFolder +
+        throw InputError(path.string() + ": the masks of --robust beside it, in " +
+                         folders::kPassersByFolder +
                          "/, have changed; with the former ones it continues, -o DIR starts another run");
     // Options such as --downscale change the dataset too, and say more.
     if (then.value("dataset", Json()) != now["dataset"])

@@ -15,9 +15,9 @@
 #include "core/atomic_file.h"
 #include "core/typing.h"
 #include "ewa/error.h"
+#include "folders/run_folder.h"
 #include "gpu/device.h"
 #include "pipeline/model.h"
-#include "report/run_file_names.h"
 #include "report/step_time.h"
 #include "report/tensorboard.h"
 #include "run/agreement.h"
@@ -112,7 +112,7 @@ class Run {
     train::RunProgress progress_;
     train::RunInput input_;
     Measures measures_;
-    train::RunFolder folder_;
+    train::RunWriter folder_;
     train::RunCameras cameras_;
     train::RunSaves saves_;
     std::optional<EarlierRun> earlier_;
@@ -151,7 +151,7 @@ void Run::begin_files() {
     files_.emplace(MetricsFiles{report::MetricsLog(folder_.metrics(), progress_.metrics), {}});
     if (options().tensorboard)
         files_->events.emplace(
-            folder_.path() / report::kEventsFile, progress_.metrics,
+            folder_.path() / folders::kEventsFile, progress_.metrics,
             std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count() -
                 progress_.wall_seconds());
 }

@@ -37,7 +37,7 @@ CameraMoves RunCameras::moves() const {
     return moves_of(input_.dataset, input_.split.train, given_, extent_);
 }
 
-void RunCameras::save(const RunFolder& folder, bool aligned) const {
+void RunCameras::save(const RunWriter& folder, bool aligned) const {
     folder.save_cameras(input_.dataset, input_.split, given_, world_, extent_, aligned);
 }
 

@@ -27,7 +27,7 @@ class RunCameras {
     // While the refined cameras are in use:
     CameraMoves moves() const;
     /// aligned: align_test has moved the test cameras. Throws RunError.
-    void save(const RunFolder& folder, bool aligned) const;
+    void save(const RunWriter& folder, bool aligned) const;
 
   private:
     RunInput& input_;

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
@@ -13,24 +14,15 @@
 #include "core/json.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "folders/run_folder.h"
 #include "io/datasets/image_records.h"
 #include "io/datasets/refined_cameras.h"
-#include "report/run_file_names.h"
 #include "report/summary.h"
 #include "report/tensorboard.h"
 #include "scene/lens.h"
 
 namespace ewa::train {
 namespace fs = std::filesystem;
-
-namespace {
-
-const fs::path& made(const fs::path& folder) {
-    core::make_folder(folder);
-    return folder;
-}
-
-}  // namespace
 
 std::optional<io::Place> place_of(const RunInput& input) {
     return input.options.level ? io::read_place(input.dataset.root) : std::nullopt;
@@ -45,45 +37,16 @@ void write_splats(const fs::path& file, const Gaussians& gaussians, int step, co
     ewa::save_splats(file, gaussians, comments);
 }
 
-const fs::path& without_link(const fs::path& path) {
-    std::error_code absent;
-    if (fs::is_symlink(path, absent)) fs::remove(path, absent);
-    return path;
-}
+RunWriter::RunWriter(const fs::path& path) : folder_(path), lock_(folder_.lock()) {}
 
-std::map<int, fs::path> kept_splats(const fs::path& folder) {
-    std::map<int, fs::path> kept;
-    std::error_code absent;
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder, absent))
-        if (const auto step = report::step_of_kept_splats(entry.path().filename().string()))
-            kept[*step] = entry.path();
-    return kept;
-}
-
-RunFolder::RunFolder(const fs::path& path) : path_(path), lock_(made(path)) {}
-
-void RunFolder::begin(const nlohmann::ordered_json& config, bool continues) const {
-    remove_links();
-    core::write_json(path_ / report::kConfigFile, config);
-    if (continues) return;
-    std::error_code absent;
+void RunWriter::begin(const nlohmann::ordered_json& config, bool continues) const {
+    folder_.remove_links();
+    core::write_json(folder_ / folders::kConfigFile, config);
     // The splats and the log stay until the run saves its own.
-    for (const std::string_view result : report::kRunFiles)
-        if (result != report::kConfigFile && result != report::kMetricsFile && result != report::kSplatsFile)
-            fs::remove(path_ / result, absent);
-    for (const char* result : report::kCameraModelFiles) fs::remove(path_ / result, absent);
-    for (const auto& [step, file] : kept_splats(path_)) fs::remove(file, absent);
+    if (!continues) folder_.remove_results();
 }
 
-void RunFolder::remove_links() const {
-    for (const char* folder :
-         {"test", "train", report::kPassersByFolder, "cameras", "cameras/sparse", "cameras/sparse/0"})
-        without_link(path_ / folder);
-    for (const char* file : report::kRunFiles) without_link(path_ / file);
-    for (const char* file : report::kCameraModelFiles) without_link(path_ / file);
-}
-
-std::optional<MetricsLine> RunFolder::logged(int step) const {
+std::optional<MetricsLine> RunWriter::logged(int step) const {
     std::ifstream file(metrics());
     std::optional<MetricsLine> found;
     for (std::string text; std::getline(file, text);) try {
@@ -95,29 +58,29 @@ std::optional<MetricsLine> RunFolder::logged(int step) const {
     return found;
 }
 
-void RunFolder::save_splats(const Gaussians& gaussians, int step, const RenderOptions& render) const {
-    write_splats(path_ / report::kSplatsFile, gaussians, step, render, place_);
+void RunWriter::save_splats(const Gaussians& gaussians, int step, const RenderOptions& render) const {
+    write_splats(folder_ / folders::kSplatsFile, gaussians, step, render, place_);
 }
 
-void RunFolder::keep_splats(const Gaussians& gaussians, int step, const RenderOptions& render,
+void RunWriter::keep_splats(const Gaussians& gaussians, int step, const RenderOptions& render,
                             int count) const {
-    write_splats(without_link(path_ / report::name_of_kept_splats(step)), gaussians, step, render, place_);
-    std::map<int, fs::path> kept = kept_splats(path_);
+    write_splats(without_link(folder_ / folders::name_of_kept_splats(step)), gaussians, step, render, place_);
+    std::map<int, fs::path> kept = folder_.kept_splats();
     kept.erase(kept.upper_bound(step), kept.end());
     std::error_code absent;
     for (; kept.size() > size_t(count); kept.erase(kept.begin())) fs::remove(kept.begin()->second, absent);
 }
 
-void RunFolder::save_appearances(const Dataset& dataset, const std::vector<int>& frames,
+void RunWriter::save_appearances(const Dataset& dataset, const std::vector<int>& frames,
                                  const std::vector<Appearance>& appearances) const {
     if (appearances.empty()) return;
     std::vector<std::string> names;
     for (const int frame : frames) names.push_back(dataset.frames[size_t(frame)].name);
-    ewa::save_appearances(path_ / report::kAppearanceFile, names, appearances);
+    ewa::save_appearances(folder_ / folders::kAppearanceFile, names, appearances);
 }
 
-void RunFolder::save_sky(const std::shared_ptr<const SkyMap>& sky) const {
-    if (sky) ewa::save_sky(path_ / report::kSkyFile, *sky);
+void RunWriter::save_sky(const std::shared_ptr<const SkyMap>& sky) const {
+    if (sky) ewa::save_sky(folder_ / folders::kSkyFile, *sky);
 }
 
 namespace {
@@ -146,7 +109,7 @@ fs::path folder_of_images(const Frame& frame) {
 
 }  // namespace
 
-void RunFolder::save_cameras(const Dataset& dataset, const Split& split, const std::vector<Camera>& given,
+void RunWriter::save_cameras(const Dataset& dataset, const Split& split, const std::vector<Camera>& given,
                              const Similarity& world, double extent, bool aligned) const {
     std::vector<io::RefinedCamera> cameras;
     std::vector<io::ImageRecord> images;
@@ -160,22 +123,23 @@ void RunFolder::save_cameras(const Dataset& dataset, const Split& split, const s
             {frame.name, name, frame.camera, distance_between(given[i], frame.camera), aligned});
         images.push_back(refined_record(frame, given[i]));
     }
-    io::write_refined_cameras(path_ / report::kCamerasFile, cameras, extent);
+    io::write_refined_cameras(folder_ / folders::kCamerasFile, cameras, extent);
     const auto rolls = [](const Frame& frame) { return frame.camera.readout.has_value(); };
     if (!std::ranges::all_of(images, io::fits_colmap) || std::ranges::any_of(dataset.frames, rolls)) return;
     PointCloud points = dataset.points;
     for (glm::dvec3& point : points.positions) point = world(point);
-    io::write_colmap(path_ / "cameras/sparse/0", images, points);
+    io::write_colmap(folder_ / folders::kCameraModel, images, points);
     // With a link to the images, the model is a dataset. It is one without images where links are not possible.
     std::error_code ignored;
-    const fs::path folder = folder_of_images(dataset.frames.front()), link = path_ / "cameras/images";
+    const fs::path folder = folder_of_images(dataset.frames.front()),
+                   link = folder_ / folders::kCamerasFolder / "images";
     if (fs::is_symlink(link, ignored)) fs::remove(link, ignored);
     if (!folder.empty()) fs::create_directory_symlink(folder, link, ignored);
 }
 
-void RunFolder::save_report(const report::ReportData& report) const {
-    core::write_json(path_ / report::kSummaryFile, report::to_json(report.summary));
-    core::write_text_file(path_ / report::kReportFile, report::html_report(report));
+void RunWriter::save_report(const report::ReportData& report) const {
+    core::write_json(folder_ / folders::kSummaryFile, report::to_json(report.summary));
+    core::write_text_file(folder_ / folders::kReportFile, report::html_report(report));
 }
 
 uint64_t peak_host_bytes(const gpu::Device& device) {

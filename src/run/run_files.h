@@ -2,7 +2,6 @@
 // The files in a run's folder.
 #pragma once
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -14,9 +13,9 @@
 #include "ewa/run_options.h"
 #include "ewa/sky_map.h"
 #include "ewa/summary.h"
+#include "folders/run_folder.h"
 #include "io/splats/place.h"
 #include "report/html.h"
-#include "report/run_file_names.h"
 #include "run/refined_cameras.h"
 
 namespace ewa::train {
@@ -30,29 +29,24 @@ std::optional<io::Place> place_of(const RunInput& input);
 void write_splats(const std::filesystem::path& file, const Gaussians& gaussians, int step,
                   const RenderOptions& render, const std::optional<io::Place>& place);
 
-/// Removes a symbolic link at the path, through which nothing is to be written. Returns the path.
-const std::filesystem::path& without_link(const std::filesystem::path& path);
+using folders::without_link;
 
-/// The splats that --keep kept in a run's folder, by their steps.
-std::map<int, std::filesystem::path> kept_splats(const std::filesystem::path& folder);
-
-/// A run's folder. No other process can train in it while this lives.
-class RunFolder {
+/// Writes the files of a run into its folder. No other process can train in it while this lives.
+class RunWriter {
   public:
     /// Creates the folder. Throws RunError if it cannot be created or another process uses it.
-    explicit RunFolder(const std::filesystem::path& path);
+    explicit RunWriter(const std::filesystem::path& path);
 
     /// The place of the splats that are saved from here on.
     void set_place(const std::optional<io::Place>& place) { place_ = place; }
 
-    const std::filesystem::path& path() const { return path_; }
-    std::filesystem::path checkpoint() const { return path_ / report::kCheckpointFile; }
-    std::filesystem::path times() const { return path_ / report::kTimesFile; }
-    std::filesystem::path metrics() const { return path_ / report::kMetricsFile; }
+    const std::filesystem::path& path() const { return folder_.path(); }
+    std::filesystem::path checkpoint() const { return folder_ / folders::kCheckpointFile; }
+    std::filesystem::path times() const { return folder_ / folders::kTimesFile; }
+    std::filesystem::path metrics() const { return folder_ / folders::kMetricsFile; }
 
     // All of these throw RunError.
-    /// Writes config.json, after the removal of symbolic links in the places of the run's files: a folder from an archive
-    /// may have some, which lead out of it. If the run does not continue an earlier one, removes that run's checkpoint and results,
+    /// Writes config.json, after the removal of symbolic links in the places of the run's files. If the run does not continue an earlier one, removes that run's checkpoint and results,
     /// but splats.ply: they must not stay beside this run's metrics if it fails.
     void begin(const nlohmann::ordered_json& config, bool continues) const;
     /// The last line of metrics.jsonl for this step, if there is one.
@@ -73,9 +67,7 @@ class RunFolder {
     void save_report(const report::ReportData& report) const;
 
   private:
-    void remove_links() const;
-
-    std::filesystem::path path_;
+    folders::RunFolder folder_;
     core::FolderLock lock_;
     std::optional<io::Place> place_;
 };

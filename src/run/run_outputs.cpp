@@ -5,8 +5,8 @@
 
 #include "core/folders.h"
 #include "core/outputs.h"
+#include "folders/run_folder.h"
 #include "io/datasets/dataset_folders.h"
-#include "report/run_file_names.h"
 #include "run/final_evaluation.h"
 #include "run/scout.h"
 #include "scene/dataset_files.h"
@@ -15,11 +15,11 @@ namespace ewa::train {
 
 const std::filesystem::path& checked_folder(const RunInput& input) {
     const std::filesystem::path& folder = input.options.output;
-    if (!input.options.resume || !core::is_file(folder / report::kCheckpointFile))
+    if (!input.options.resume || !core::is_file(folder / folders::kCheckpointFile))
         io::check_output_folder("-o", folder, input.dataset);
     std::vector<core::NamedFile> written, read = scene::files_of(input.dataset, "DATASET");
-    for (const char* name : report::kRunFiles) written.push_back({"the run's file", folder / name});
-    for (const char* name : report::kCameraModelFiles) written.push_back({"the run's file", folder / name});
+    for (const char* name : folders::kRunFiles) written.push_back({"the run's file", folder / name});
+    for (const char* name : folders::kCameraModelFiles) written.push_back({"the run's file", folder / name});
     for (const auto& [frame, file] : saved_renders(input)) written.push_back({"the run's render", file});
     if (input.options.robust)
         for (const std::filesystem::path& file : mask_files(input))

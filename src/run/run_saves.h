@@ -30,7 +30,7 @@ struct RunProgress {
 class RunSaves {
   public:
     /// What is passed must outlive this.
-    RunSaves(const RunFolder& folder, const RunOptions& options, RunCameras& cameras,
+    RunSaves(const RunWriter& folder, const RunOptions& options, RunCameras& cameras,
              const RunProgress& progress)
         : folder_(folder), options_(options), cameras_(cameras), progress_(progress) {}
 
@@ -55,7 +55,7 @@ class RunSaves {
     std::string after_full_disk() const;
 
   private:
-    const RunFolder& folder_;
+    const RunWriter& folder_;
     const RunOptions& options_;
     RunCameras& cameras_;
     const RunProgress& progress_;

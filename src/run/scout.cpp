@@ -18,11 +18,11 @@
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/trainer.h"
+#include "folders/run_folder.h"
 #include "gpu/device.h"
 #include "portions/collect.h"
 #include "prepare/passers_by.h"
 #include "report/pictures.h"
-#include "report/run_file_names.h"
 #include "run/run_files.h"
 
 namespace ewa::train {
@@ -179,7 +179,7 @@ std::string left_out_note(const RunInput& input, const Masks& masks) {
     if (masked == 0) return "robust: the images agree, and nothing is masked";
     return fmt::format("robust: {:.1f} % of the training images' pixels are masked, in {} of {}; see {}",
                        100 * share, masked, core::counted(masks.size(), "image"),
-                       (input.options.output / report::kPassersByFolder).string());
+                       (input.options.output / folders::kPassersByFolder).string());
 }
 
 }  // namespace
@@ -223,7 +223,7 @@ std::vector<fs::path> mask_files(const RunInput& input) {
     const auto names = report::picture_names(input.dataset.frames);
     std::vector<fs::path> files;
     for (const int i : input.split.train)
-        files.push_back(input.options.output / report::kPassersByFolder /
+        files.push_back(input.options.output / folders::kPassersByFolder /
                         (names[size_t(i)].string() + ".png"));
     return files;
 }

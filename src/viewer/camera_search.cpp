@@ -8,6 +8,7 @@
 #include "core/json.h"
 #include "ewa/error.h"
 #include "ewa/run_options.h"
+#include "folders/run_folder.h"
 
 namespace ewa::viewer {
 namespace {
@@ -17,7 +18,7 @@ namespace fs = std::filesystem;
 /// Whether the folder is a dataset that was made, or begun, of these photos.
 bool made_of_photos(const fs::path& dataset, const fs::path& photos) {
     try {
-        const auto capture = core::read_json_file<nlohmann::json>(dataset / "capture.json");
+        const auto capture = core::read_json_file<nlohmann::json>(dataset / folders::kCaptureFile);
         std::error_code error;
         return capture.is_object() &&
                capture.value("input", nlohmann::json()) == fs::canonical(photos, error).string();
@@ -37,7 +38,7 @@ fs::path free_run_folder(const fs::path& input, bool or_own_photos) {
         if (i > 1) folder += "-" + std::to_string(i);
         std::error_code error;
         if (!fs::exists(folder, error)) return folder;
-        if (or_own_photos && made_of_photos(folder / "dataset", input)) return folder;
+        if (or_own_photos && made_of_photos(folder / folders::kMadeDataset, input)) return folder;
     }
 }
 

@@ -23,8 +23,8 @@
 #include "core/typing.h"
 #include "core/words.h"
 #include "ewa/error.h"
+#include "folders/run.h"
 #include "io/splats/format_table.h"
-#include "live/run_folder.h"
 #include "run/earlier_run.h"
 #include "scene/dataset_files.h"
 #include "scene/looks.h"
@@ -176,7 +176,7 @@ void prepare_outputs(const Arguments& arguments, const Startup& startup) {
     if (startup.scene.dataset) read = scene::files_of(*startup.scene.dataset, "the dataset");
     read.insert(read.end(),
                 {{"PATH", arguments.path}, {"--cameras", arguments.cameras}, {"--views", arguments.views}});
-    for (const char* name : live::kRunFiles)
+    for (const char* name : folders::kRunFiles)
         if (!startup.scene.run.empty()) read.push_back({"a file of the run", startup.scene.run / name});
     core::check_outputs(written, read);
     core::make_folder(startup.film ? *startup.film : startup.picture->parent_path());

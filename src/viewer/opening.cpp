@@ -12,10 +12,10 @@
 #include "ewa/sky_map.h"
 #include "ewa/splat_files.h"
 #include "ewa/synthetic_dataset.h"
+#include "folders/run_folder.h"
 #include "io/datasets/importers/importer.h"
 #include "io/datasets/refined_cameras.h"
 #include "live/run_inputs.h"
-#include "report/run_file_names.h"
 #include "scene/looks.h"
 
 namespace ewa::viewer {
@@ -54,9 +54,9 @@ std::shared_ptr<const Dataset> load_cameras(const fs::path& path, DatasetOptions
     return std::make_shared<const Dataset>(std::move(dataset));
 }
 
-Look look_of(const live::Run& run) {
+Look look_of(const folders::Run& run) {
     Look look;
-    const fs::path sky = run.folder / report::kSkyFile;
+    const fs::path sky = run.folder / folders::kSkyFile;
     try {
         if (run.text("background") == "sky" && core::is_file(sky))
             look.sky = std::make_shared<const SkyMap>(load_sky(sky));
@@ -72,8 +72,8 @@ Look look_of(const live::Run& run) {
     return look;
 }
 
-void add_appearances(OpenedScene& scene, const live::Run& run) {
-    for (const char* name : {report::kAppearanceFile, report::kOldExposuresFile}) {
+void add_appearances(OpenedScene& scene, const folders::Run& run) {
+    for (const char* name : {folders::kAppearanceFile, folders::kOldExposuresFile}) {
         if (!core::is_file(run.folder / name)) continue;
         try {
             scene.appearances = load_appearances(run.folder / name);
@@ -93,7 +93,7 @@ void add_appearances(OpenedScene& scene, const live::Run& run) {
 }
 
 /// cameras: the dataset to use instead of the run's; empty: none.
-void add_cameras(OpenedScene& scene, const live::Run& run, const fs::path& cameras, bool points) {
+void add_cameras(OpenedScene& scene, const folders::Run& run, const fs::path& cameras, bool points) {
     const fs::path dataset = cameras.empty() ? run.dataset : cameras;
     try {
         if (!dataset.empty())
@@ -108,7 +108,7 @@ void add_cameras(OpenedScene& scene, const live::Run& run, const fs::path& camer
     }
 }
 
-OpenedScene open_run(const live::Run& run, const fs::path& cameras) {
+OpenedScene open_run(const folders::Run& run, const fs::path& cameras) {
     OpenedScene scene;
     scene.run = run.folder;
     scene.look = look_of(run);
@@ -156,7 +156,7 @@ OpenedScene open_splats(const fs::path& path, const fs::path& cameras, size_t bu
     scene.gaussians = std::make_shared<const Gaussians>(std::move(splats.gaussians));
     if (scene.gaussians->size() == 0) scene.remark = scene_title(path) + " is empty: it has no splats";
     if (!cameras.empty()) scene.dataset = load_cameras(cameras, {}, false);
-    if (const auto run = live::run_of_splats(path); run && cameras.empty() && !run->dataset.empty()) {
+    if (const auto run = folders::run_of_splats(path); run && cameras.empty() && !run->dataset.empty()) {
         scene.look = look_of(*run);
         add_cameras(scene, *run, {}, false);
     }
@@ -203,11 +203,11 @@ OpenedScene open_scene(const fs::path& path, const fs::path& cameras, size_t bud
     std::error_code error;
     OpenedScene scene;
     if (!fs::exists(path, error)) throw InputError(path.string() + ": no such file or folder");
-    const auto run = fs::is_directory(path, error) ? live::find_run(path) : std::nullopt;
+    const auto run = fs::is_directory(path, error) ? folders::find_run(path) : std::nullopt;
     if (run) {
         scene = open_run(*run, cameras);
-    } else if (core::is_file(path / "dataset/capture.json")) {
-        return open_scene(path / "dataset", {});  // of photos on which nothing was trained yet
+    } else if (core::is_file(path / folders::kMadeDataset / folders::kCaptureFile)) {
+        return open_scene(path / folders::kMadeDataset, {});  // of photos on which nothing was trained yet
     } else if (const fs::path dataset = dataset_of_images(path); !dataset.empty()) {
         return open_scene(dataset, cameras);
     } else if (is_capture(path)) {
@@ -225,7 +225,7 @@ OpenedScene open_scene(const fs::path& path, const fs::path& cameras, size_t bud
 
 bool is_dataset(const fs::path& path) {
     std::error_code error;
-    if (fs::is_directory(path, error)) return !live::find_run(path);
+    if (fs::is_directory(path, error)) return !folders::find_run(path);
     return fs::exists(path, error) && (is_dataset_file(path) || is_mesh_scene(path));
 }
 

@@ -6,7 +6,7 @@
 #include "core/process.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "live/run_folder.h"
+#include "folders/run.h"
 #include "run/earlier_run.h"
 #include "scene/names.h"
 
@@ -94,7 +94,7 @@ void ViewSession::find_cameras(const std::filesystem::path& photos) {
     state_.message.note.clear();
     const auto& later = state_.startup.later;
     const bool train = later && photos == state_.startup.scene.photos;
-    search.start(photos, (train ? later->folder : free_run_folder(photos, true)) / "dataset",
+    search.start(photos, (train ? later->folder : free_run_folder(photos, true)) / folders::kMadeDataset,
                  train ? later->capture : CaptureOptions());
     state_.redraw(Loop::kRedraws);
 }
@@ -171,7 +171,7 @@ void ViewSession::train() {
     // Photos have their dataset in the folder of the run.
     const std::filesystem::path made_in = scene.path.parent_path();
     const std::filesystem::path& named = scene.photos.empty() ? scene.path : scene.photos;
-    const bool first = !scene.photos.empty() && !live::find_run(made_in);
+    const bool first = !scene.photos.empty() && !folders::find_run(made_in);
     std::vector<std::string> options{(first ? named : scene.path).string(), "--steps",
                                      std::to_string(state_.settings.train_steps), "--quiet"};
     if (!device.empty()) options.insert(options.end(), {"--device", device});

@@ -7,6 +7,7 @@
 
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "folders/run_folder.h"
 #include "live/raw_socket.h"
 #include "live_test.h"
 #include "support/temp_folder.h"
@@ -21,13 +22,13 @@ TEST(LiveFiles, TheTokenIsTheOwnersAlone) {
     EXPECT_FALSE(read_live_file(folder.path()));
     // What is there of others' is not written to, nor does it make the token another's to read.
     const auto others = folder.write("others.txt", "theirs");
-    std::filesystem::create_symlink(others, folder.path() / kLiveFile);
+    std::filesystem::create_symlink(others, folder.path() / folders::kLiveFile);
     write_live_file(folder.path(), {7001, "abc"});
     EXPECT_EQ(test::file_bytes(others), "theirs");
-    chmod((folder.path() / kLiveFile).c_str(), 0644);
+    chmod((folder.path() / folders::kLiveFile).c_str(), 0644);
     write_live_file(folder.path(), {7001, "abc"});
     struct stat facts {};
-    ASSERT_EQ(stat((folder.path() / kLiveFile).c_str(), &facts), 0);
+    ASSERT_EQ(stat((folder.path() / folders::kLiveFile).c_str(), &facts), 0);
     EXPECT_EQ(facts.st_mode & 0777, 0600u);
     const auto live = read_live_file(folder.path());
     ASSERT_TRUE(live);
@@ -36,7 +37,7 @@ TEST(LiveFiles, TheTokenIsTheOwnersAlone) {
     const std::string deep(5000, '[');
     for (const char* text :
          {"", "{", "{\"port\": 70000, \"token\": \"\"}", "{\"port\": 1}", "[]", deep.c_str()}) {
-        folder.write(kLiveFile, text);
+        folder.write(folders::kLiveFile, text);
         EXPECT_FALSE(read_live_file(folder.path())) << text;
     }
 }
@@ -47,7 +48,7 @@ TEST(LiveFiles, ATokenNeedsNoCommandLine) {
     setenv("EWA_TOKEN", "from the environment", 1);
     EXPECT_EQ(find_token("", {}), "from the environment");
     write_live_file(folder.path(), {7001, "abc"});
-    EXPECT_EQ(find_token("", folder.path() / kLiveFile), "abc");
+    EXPECT_EQ(find_token("", folder.path() / folders::kLiveFile), "abc");
     EXPECT_EQ(find_token("", folder.write("token", "def\n")), "def");
     EXPECT_EQ(find_token("given", folder.path() / "none"), "given");
     unsetenv("EWA_TOKEN");

@@ -91,9 +91,9 @@ const std::vector<std::pair<std::string, Modules>> kLibraries = {
     {"zstd", {"src/io/splats"}},
     {"zlib", {"src/image", "src/io/splats", "src/portions", "src/train"}},
     {"nlohmann/",
-     {"src/core", "src/image", "src/capture", "src/io/splats", "src/io/datasets", "src/io/gltf",
-      "src/pathtracer", "src/run", "src/report", "src/live", "src/bench", "src/cli", "src/viewer",
-      "python/bindings"}},
+     {"src/core", "src/folders", "src/image", "src/capture", "src/io/splats", "src/io/datasets",
+      "src/io/gltf", "src/pathtracer", "src/run", "src/report", "src/live", "src/bench", "src/cli",
+      "src/viewer", "python/bindings"}},
     {"CLI/", {"src/cli", "src/viewer", "src/bench"}}};
 
 Modules reached_from(const std::string& module) {

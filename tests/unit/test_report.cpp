@@ -16,11 +16,11 @@
 
 #include "core/html.h"
 #include "ewa/error.h"
+#include "folders/run_folder.h"
 #include "image/image_files.h"
 #include "report/chart.h"
 #include "report/html.h"
 #include "report/pictures.h"
-#include "report/run_file_names.h"
 #include "report/summary.h"
 #include "report/tensorboard.h"
 #include "support/temp_folder.h"
@@ -101,12 +101,12 @@ TEST(Report, EventsForTensorBoardHaveTheEarlierLinesToo) {
     line.step = 10;
     line.seconds = 2;
     line.train_psnr = std::numeric_limits<double>::infinity();
-    EventsLog log(folder / kEventsFile, {line}, 1e9);
+    EventsLog log(folder / folders::kEventsFile, {line}, 1e9);
     line.step = 20;
     line.seconds = 4;
     line.test_figures = {{"flip", 0.25}};
     log.append(line);
-    const std::vector<std::string> events = events_in(folder / kEventsFile);
+    const std::vector<std::string> events = events_in(folder / folders::kEventsFile);
     ASSERT_EQ(events.size(), 3u);
     EXPECT_NE(events[0].find("brain.Event:2"), std::string::npos);
     EXPECT_EQ(events[1].find("test/flip"), std::string::npos);
@@ -116,7 +116,7 @@ TEST(Report, EventsForTensorBoardHaveTheEarlierLinesToo) {
     const std::string rate("train/steps_per_second\x15\x00\x00\xa0\x40", 27);
     EXPECT_NE(events[2].find(rate), std::string::npos);
     // The checksums of the first length, 24 bytes, as TensorFlow writes them.
-    EXPECT_EQ(test::file_bytes(folder / kEventsFile).substr(0, 12),
+    EXPECT_EQ(test::file_bytes(folder / folders::kEventsFile).substr(0, 12),
               std::string("\x18\0\0\0\0\0\0\0\xa3\x7f\x4b\x22", 12));
 }
 

@@ -11,6 +11,7 @@
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
+#include "folders/run_folder.h"
 #include "image/image_files.h"
 #include "io/datasets/companions.h"
 #include "io/datasets/image_records.h"
@@ -485,7 +486,7 @@ Dataset load_dataset(const std::filesystem::path& given, const DatasetOptions& o
         throw InputError(name + ": is a path of cameras without images; ewa render --cameras takes it");
     CameraCache cameras(path_of_cameras && options.lens == LensUse::automatic ? LensUse::native
                                                                               : options.lens);
-    const bool captured = is_file(dataset.root / "capture.json");
+    const bool captured = is_file(dataset.root / folders::kCaptureFile);
     std::vector<const io::ImageRecord*> records;
     for (const io::ImageRecord& image : model.images) {
         ImageFile file = find_image(image, model.folder, options.downscale);

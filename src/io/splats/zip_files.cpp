@@ -18,6 +18,7 @@
 #include "core/sandboxed_path.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "folders/run_folder.h"
 
 namespace ewa::io {
 namespace {
@@ -34,7 +35,7 @@ constexpr uint64_t kEncryptedFlag = 1, kDeflated = 8;
 
 /// Files that desktops add, and the record by which ewa knows its own datasets.
 bool is_left_out(const fs::path& name) {
-    return core::is_of_desktop(name) || name.filename() == "capture.json";
+    return core::is_of_desktop(name) || name.filename() == folders::kCaptureFile;
 }
 
 /// Why the name cannot be written; empty if it can.

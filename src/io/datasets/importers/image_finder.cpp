@@ -10,6 +10,7 @@
 #include "core/sandboxed_path.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "folders/run_folder.h"
 
 namespace ewa::io {
 
@@ -27,7 +28,7 @@ bool is_of_others(const fs::path& folder) {
     if (name.starts_with(kCopies) && core::parse_integer<int>(std::string_view(name).substr(kCopies.size())))
         return true;
     return std::ranges::any_of(kOthers, [&](std::string_view other) { return name.starts_with(other); }) ||
-           name == "dense" || name == "undistorted" || is_made_by_ewa(folder);
+           name == "dense" || name == "undistorted" || folders::is_made_by_ewa(folder);
 }
 
 std::vector<std::string> keys_of(const fs::path& folders) {
@@ -67,19 +68,9 @@ fs::path entry_in(const fs::path& folder, const std::string& name) {
     return folder / found;
 }
 
-bool is_run_folder(const fs::path& folder) {
-    return core::is_file(folder / "config.json") &&
-           (core::is_file(folder / "metrics.jsonl") || core::is_file(folder / "checkpoint.ewa") ||
-            core::is_file(folder / "splats.ply"));
-}
-
-bool is_made_by_ewa(const fs::path& folder) {
-    return core::is_file(folder / "capture.json") || is_run_folder(folder);
-}
-
 bool has_outside(const fs::path& folder) {
     std::error_code error;
-    return !is_made_by_ewa(folder) &&
+    return !folders::is_made_by_ewa(folder) &&
            !fs::equivalent(folder.parent_path(), fs::temp_directory_path(error), error);
 }
 
@@ -94,10 +85,11 @@ void visit_folders_below(const fs::path& root, const std::function<bool(const fs
     const auto is_searched = [&](const fs::directory_entry& entry) {
         const std::string name = core::lower(entry.path().filename().string());
         std::error_code error;
-        return entry.is_directory(error) && !entry.is_symlink(error) && !is_made_by_ewa(entry.path()) &&
+        return entry.is_directory(error) && !entry.is_symlink(error) &&
+               !folders::is_made_by_ewa(entry.path()) &&
                std::ranges::none_of(kPictures, [&](std::string_view word) { return name.starts_with(word); });
     };
-    if (is_made_by_ewa(root)) return;
+    if (folders::is_made_by_ewa(root)) return;
     std::vector<fs::path> level{root};
     size_t folders = 0, entries = 0;
     for (int depth = 0; depth < kLevels; ++depth) {

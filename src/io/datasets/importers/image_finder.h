@@ -81,12 +81,6 @@ class ImageFinder {
 /// The entry of the folder with this name; else one whose name differs in case alone (ASCII). folder / name if there is none.
 std::filesystem::path entry_in(const std::filesystem::path& folder, const std::string& name);
 
-/// Whether the folder is that of a training run.
-bool is_run_folder(const std::filesystem::path& folder);
-
-/// Whether ewa has made the folder: a training run, or a dataset of photos. Its pictures are no photos.
-bool is_made_by_ewa(const std::filesystem::path& folder);
-
 /// Whether files beside the folder may belong to it: neither has ewa made it, nor is it an archive's.
 bool has_outside(const std::filesystem::path& folder);
 

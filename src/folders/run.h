@@ -1,19 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The folder of a training run, for those who read it: its splats, its dataset and the options of the run.
+// A training run, for those who read its folder: its splats, its dataset and its options.
 #pragma once
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
-#include "report/run_file_names.h"
+#include "folders/run_folder.h"
 
-namespace ewa::live {
-
-using report::kRunFiles;
-
-/// The folder in a run's folder for the dataset that the run makes of a mesh scene, photos or a video.
-inline constexpr const char* kMadeDataset = "dataset";
+namespace ewa::folders {
 
 struct Run {
     std::filesystem::path folder;
@@ -33,9 +28,6 @@ struct Run {
     /// Whether the option is a flag that is set.
     bool flag(const char* option) const;
 };
-
-/// Whether the folder has config.json, and beside it what a run has that has begun: other programs also write a config.json.
-bool is_run(const std::filesystem::path& folder);
 
 /// The folder that a path of the run's config.json is relative to: empty for the current one, or any folder above the run.
 /// No value if the path names nothing there.
@@ -57,4 +49,4 @@ std::optional<Run> run_of_splats(const std::filesystem::path& splats);
 /// run's config.json is in its folder. The file itself need not exist. Empty for any other path.
 std::optional<std::filesystem::path> run_of_file(const std::filesystem::path& file);
 
-}  // namespace ewa::live
+}  // namespace ewa::folders

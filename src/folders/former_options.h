@@ -2,7 +2,7 @@
 // The options of a run under the names that earlier versions of ewa gave them.
 #pragma once
 
-namespace ewa::report {
+namespace ewa::folders {
 
 /// The options with their present names. A flag of an earlier version becomes the value that it meant, and goes before a
 /// value of the present name. Whatever is no object of JSON stays.
@@ -22,4 +22,4 @@ Json with_present_names(Json options) {
     return options;
 }
 
-}  // namespace ewa::report
+}  // namespace ewa::folders

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "live/run_folder.h"
+#include "folders/run.h"
 
 #include <algorithm>
 
@@ -7,36 +7,26 @@
 #include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "report/former_options.h"
-#include "report/run_file_names.h"
+#include "folders/run_folder.h"
 
-namespace ewa::live {
+namespace ewa::folders {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint64_t kMostConfigBytes = 1u << 20;  // bytes
-
-/// An empty object if the file is not an object of JSON: the run is then read without what it says.
-nlohmann::json read_object(const fs::path& path) {
-    try {
-        auto json = core::read_json_file<nlohmann::json>(path, {.bytes = kMostConfigBytes});
-        if (json.is_object()) return json;
-    } catch (const InputError&) {
-    }
-    return nlohmann::json::object();
-}
-
 /// Whether the run made the dataset in its folder of these photos or this video.
-bool made_of(const fs::path& dataset, const fs::path& named) {
-    const nlohmann::json capture = read_object(dataset / "capture.json");
-    const auto input = capture.find("input");
+bool made_of(const fs::path& dataset, const fs::path& named) try {
+    const auto capture =
+        core::read_json_file<nlohmann::json>(dataset / kCaptureFile, {.bytes = kMostConfigBytes});
+    const auto input = capture.is_object() ? capture.find("input") : capture.end();
     if (input == capture.end() || !input->is_string()) return false;
     // The folder above may have moved since.
     const auto last = [](const fs::path& path) {
         return (path.lexically_normal() / "").parent_path().filename();
     };
     return last(input->get<std::string>()) == last(named);
+} catch (const InputError&) {
+    return false;
 }
 
 fs::path dataset_of(const fs::path& run, const fs::path& named) {
@@ -61,12 +51,6 @@ std::optional<fs::path> base_of(const fs::path& run, const fs::path& named) {
     return std::nullopt;
 }
 
-bool is_run(const fs::path& folder) {
-    const auto present = [&](const char* name) { return core::is_file(folder / name); };
-    return present("config.json") &&
-           (present("metrics.jsonl") || present("splats.ply") || present("checkpoint.ewa"));
-}
-
 bool Run::made_dataset() const {
     return dataset == folder / kMadeDataset && fs::path(named_dataset) != dataset;
 }
@@ -82,27 +66,28 @@ bool Run::flag(const char* option) const {
 }
 
 fs::path Run::refined_cameras() const {
-    const fs::path file = folder / "cameras.json";
+    const fs::path file = folder / kCamerasFile;
     return core::is_file(file) ? file : fs::path();
 }
 
-std::optional<Run> find_run(const fs::path& folder) {
-    const auto present = [&](const char* name) { return core::is_file(folder / name); };
-    if (!present("config.json") && !present("splats.ply") && !present("metrics.jsonl")) return std::nullopt;
+std::optional<Run> find_run(const fs::path& path) {
+    const RunFolder folder(path);
+    if (!folder.has(kConfigFile) && !folder.has(kSplatsFile) && !folder.has(kMetricsFile))
+        return std::nullopt;
     Run run;
-    run.folder = folder;
-    if (present("splats.ply")) run.splats = folder / "splats.ply";
-    run.config = report::with_present_names(read_object(folder / "config.json"));
+    run.folder = path;
+    if (folder.has(kSplatsFile)) run.splats = folder / kSplatsFile;
+    run.config = folder.options();
     run.named_dataset = run.text("dataset");
-    run.dataset = dataset_of(folder, run.named_dataset);
+    run.dataset = dataset_of(path, run.named_dataset);
     return run;
 }
 
 std::optional<Run> run_of_splats(const fs::path& splats) {
     const std::string name = splats.filename().string();
-    if (name != report::kSplatsFile && !report::step_of_kept_splats(name)) return std::nullopt;
+    if (name != kSplatsFile && !step_of_kept_splats(name)) return std::nullopt;
     const fs::path folder = splats.parent_path();
-    if (!core::is_file(folder / "config.json")) return std::nullopt;
+    if (!RunFolder(folder).has(kConfigFile)) return std::nullopt;
     return find_run(folder);
 }
 
@@ -110,8 +95,7 @@ std::optional<fs::path> run_of_file(const fs::path& file) {
     std::error_code error;
     for (const fs::path& path : {file, fs::weakly_canonical(file, error)}) {
         const fs::path folder = path.parent_path();
-        if (report::is_run_file(path.filename().string()) && is_run(folder))
-            return folder.empty() ? "." : folder;
+        if (is_run_file(path.filename().string()) && is_run(folder)) return folder.empty() ? "." : folder;
     }
     return std::nullopt;
 }
@@ -130,4 +114,4 @@ std::string runs_in(const fs::path& folder) {
     return text;
 }
 
-}  // namespace ewa::live
+}  // namespace ewa::folders
