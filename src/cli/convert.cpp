@@ -163,7 +163,7 @@ void read_all(const ConvertArguments& arguments, Work& work) {
 
 /// Prints how much renders of the file differ from those of the scene that was written to it, unless quiet. Without a Vulkan device it
 /// prints the reason that there are none. Returns "views", "psnr" (mean; null: equal) and "worst_psnr", or "error".
-Json check_renders(const Gaussians& written, const SplatScene& read, bool quiet) {
+Json compare_renders(const Gaussians& written, const SplatScene& read, bool quiet) {
     if (written.size() == 0) return Json::object();
     RenderOptions options;
     if (read.antialiased) options.kernel = Footprint::antialias;
@@ -197,7 +197,7 @@ Json check(const ConvertArguments& arguments, const Work& work) {
         json[d.what] = {{"largest", d.largest}, {"mean", d.mean}, {"unit", d.unit}};
     }
     if (!arguments.quiet || !arguments.json.empty())
-        json["renders"] = check_renders(work.gaussians, back, arguments.quiet);
+        json["renders"] = compare_renders(work.gaussians, back, arguments.quiet);
     return json;
 }
 

@@ -19,6 +19,7 @@
 #include "io/datasets/refined_cameras.h"
 #include "report/summary.h"
 #include "report/tensorboard.h"
+#include "run/run_input.h"
 #include "scene/lens.h"
 
 namespace ewa::train {
