@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "arrays.h"
+#include "capture/what_is.h"
 #include "core/typing.h"
 #include "errors.h"
 #include "ewa/capture.h"
@@ -50,7 +51,7 @@ LoadedDataset read_dataset(const fs::path& path, const AskedDataset& asked) {
         LoadedDataset opened{nullptr, fs::absolute(path), options_of(asked, run), test_every_of(run)};
         if (run) opened.background = core::parse_colour(run->text("background")).value_or(opened.background);
         const fs::path named = run ? live::dataset_of(*run) : path;
-        opened.archived = is_archive(named);
+        opened.archived = what_is(named) == What::archive;
         auto kept = std::make_shared<KeptDataset>();
         const auto read = [&](const fs::path& folder) {
             kept->dataset = load_dataset(folder, opened.options);

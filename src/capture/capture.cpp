@@ -14,6 +14,7 @@
 
 #include "capture/steps.h"
 #include "capture/times.h"
+#include "capture/what_is.h"
 #include "core/folders.h"
 #include "core/hash.h"
 #include "core/json.h"
@@ -28,6 +29,7 @@
 #include "io/datasets/image_records.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/importer.h"
+#include "io/gltf/mesh.h"
 #include "io/splats/place.h"
 #include "io/splats/zip_files.h"
 
@@ -429,7 +431,8 @@ bool is_photo(const fs::path& file) try {
 /// What kind of splat file its name says that it is; empty if none. glTF has meshes, too.
 std::string splat_kind(const fs::path& file) try {
     const SplatFormat format = format_of_name(file);
-    if (format == SplatFormat::glb || format == SplatFormat::gltf) return {};
+    const bool gltf = format == SplatFormat::glb || format == SplatFormat::gltf;
+    if (gltf && !io::has_gltf_splats(file)) return {};
     const char* kind = format == SplatFormat::ply ? "a splat file or a point cloud (" : "a splat file (";
     return kind + std::string(name_of(format)) + ")";
 } catch (const InputError&) {
@@ -568,8 +571,8 @@ void check_training_input(const fs::path& path) {
                          " -o DIR");
     }
     if (is_folder(path)) refuse_made(path);
-    if (is_capture(path) || (is_folder(path) && io::is_dataset_folder(path))) return;
-    if (is_file(path) && (extension_of(path) == ".json" || io::find_importer(path))) return;
+    const What what = what_is(path);
+    if (is_searched(what) || what == What::dataset) return;
     if (const std::string advice = io::export_advice(path); !advice.empty())
         throw InputError(core::one_line(path.string()) + ": not a dataset: " + advice);
     refuse(path,

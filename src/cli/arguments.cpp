@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 
+#include "capture/what_is.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "core/folders.h"
@@ -27,14 +28,6 @@ namespace ewa::cli {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Whether the path names a glTF file of meshes: by its extension, else by its content.
-bool names_mesh_scene(const fs::path& path) {
-    std::error_code error;
-    if (fs::is_directory(path, error)) return false;
-    const std::string extension = core::lower(path.extension().string());
-    return extension == ".gltf" || extension == ".glb" || is_mesh_scene(path);
-}
 
 void print_notes(const SyntheticDataset& made, const fs::path& folder) {
     for (const std::string& remark : made.remarks) fmt::print("note: {}\n", core::one_line(remark));
@@ -239,7 +232,7 @@ std::vector<int> select_frames(const Dataset& dataset, const std::string& which,
 }
 
 Dataset load_cameras_as_trained(const fs::path& path, const CamerasInput& input) {
-    if (names_mesh_scene(path)) {
+    if (what_is(path) == What::mesh) {
         Dataset dataset = scene_cameras(path, {});
         for (Frame& frame : dataset.frames) {
             if (input.max_width > 0)
@@ -319,7 +312,7 @@ void add_view_options(CLI::App& app, ViewArguments& arguments) {
 Views load_views(const ViewArguments& arguments, const std::string& which, int test_every) {
     fs::path folder = arguments.dataset;
     std::unique_ptr<core::TemporaryFolder> rendered;
-    if (names_mesh_scene(arguments.dataset)) {
+    if (what_is(arguments.dataset) == What::mesh) {
         select_frames(scene_cameras(arguments.dataset, {}), which, test_every);
         folder = arguments.splats.parent_path() / folders::kMadeDataset;
         if (!is_rendered(arguments.dataset, folder, {})) {

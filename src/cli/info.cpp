@@ -11,13 +11,13 @@
 #include <optional>
 #include <string_view>
 
+#include "capture/what_is.h"
 #include "cli/arguments.h"
 #include "cli/camera_groups.h"
 #include "cli/command.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
 #include "cli/splat_statistics.h"
-#include "core/file_reader.h"
 #include "core/folders.h"
 #include "core/messages.h"
 #include "core/text.h"
@@ -169,12 +169,6 @@ void info_splats(const fs::path& path, const folders::Run* run, const InfoArgume
     if (!arguments.verbose) return;
     print_plan("rendering", rendering);
     print_plan("training", training);
-}
-
-/// Whether the path names an unpacked SOG: by its name, else by its content.
-bool is_sog(const fs::path& path) {
-    const std::string name = core::lower(path.filename().string());
-    return name == "meta.json" || name == "lod-meta.json" || io::is_sog_meta(path);
 }
 
 void print_rolling(const Dataset& dataset) {
@@ -387,17 +381,6 @@ void info_mesh(const fs::path& path, int test_every, bool json) {
                                            : "every material is diffuse: training skips SH degrees 1 to 3");
 }
 
-/// The image format that the first bytes tell; empty for other files, and for .splat, which may begin with any bytes.
-std::string_view image_format(const fs::path& path) {
-    if (core::lower(path.extension().string()) == ".splat" || !core::is_file(path)) return {};
-    constexpr uint64_t kHeadBytes = 16;
-    core::FileReader reader(path);
-    const size_t size = size_t(std::min(reader.size(), kHeadBytes));
-    const image::Format* format =
-        image::format_of({reinterpret_cast<const char*>(reader.take(size, "the header")), size});
-    return format ? format->name : std::string_view();
-}
-
 void info_image(const fs::path& path, std::string_view format, bool json) {
     const ImageSize size = read_image_size(path);
     const auto bytes = fs::file_size(path);
@@ -432,28 +415,44 @@ void info_capture(const fs::path& path, bool json) {
     if (size.width > 0) fmt::print("smallest image  {}x{}\n", size.width, size.height);
 }
 
+void info_archive(const fs::path& path, const InfoArguments& arguments) {
+    if (!archive_has_cameras(path) && io::has_splats(io::ZipFiles(path)))
+        return info_splats(path, nullptr, arguments);
+    read_archive(path, [&](const fs::path& folder) { info_dataset(folder, path, arguments); });
+}
+
 int run(const InfoArguments& arguments) {
     const fs::path& path = arguments.path;
-    std::error_code error;
-    if (!fs::exists(path, error)) throw InputError(path.string() + ": no such file or folder");
-    if (const auto run = run_named(path))
-        info_splats(splat_input(path).file, &*run, arguments);
-    else if (!is_archive(path) && is_capture(path))
-        info_capture(path, arguments.json);
-    else if (fs::is_directory(path) || (path.extension() == ".json" && !is_sog(path)) ||
-             io::find_importer(path))
-        info_dataset(path, path, arguments);
-    else if (is_archive(path) && (archive_has_cameras(path) || !io::has_splats(io::ZipFiles(path))))
-        read_archive(path, [&](const fs::path& folder) { info_dataset(folder, path, arguments); });
-    else if (const std::string_view format = image_format(path); !format.empty())
-        info_image(path, format, arguments.json);
-    else if (is_mesh_scene(path))
-        info_mesh(path, arguments.test_every, arguments.json);
-    else if (const std::string advice = is_archive(path) ? std::string() : io::export_advice(path);
-             !advice.empty())
-        throw InputError(core::one_line(path.string()) + ": not a dataset: " + advice);
-    else
-        info_splats(path, nullptr, arguments);
+    switch (what_is(path)) {
+        case What::run: {
+            const SplatInput input = splat_input(path);
+            info_splats(input.file, &*input.run, arguments);
+            break;
+        }
+        case What::photos:
+        case What::video:
+            info_capture(path, arguments.json);
+            break;
+        case What::archive:
+            info_archive(path, arguments);
+            break;
+        case What::image:
+            info_image(path, image_format(path), arguments.json);
+            break;
+        case What::mesh:
+            info_mesh(path, arguments.test_every, arguments.json);
+            break;
+        case What::nothing:
+            if (!core::is_folder(path)) throw InputError(path.string() + ": no such file or folder");
+            [[fallthrough]];  // the reader of datasets says what is missing
+        case What::dataset:
+            info_dataset(path, path, arguments);
+            break;
+        case What::splats:
+            if (const std::string advice = io::export_advice(path); !advice.empty())
+                throw InputError(core::one_line(path.string()) + ": not a dataset: " + advice);
+            info_splats(path, nullptr, arguments);
+    }
     return 0;
 }
 

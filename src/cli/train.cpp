@@ -7,6 +7,7 @@
 #include <memory>
 #include <utility>
 
+#include "capture/what_is.h"
 #include "cli/arguments.h"
 #include "cli/cameras.h"
 #include "cli/command.h"
@@ -22,7 +23,6 @@
 #include "ewa/error.h"
 #include "ewa/run.h"
 #include "folders/run.h"
-#include "io/datasets/dataset_folders.h"
 #include "ranks/open.h"
 #include "run/earlier_run.h"
 #include "run/option_table.h"
@@ -40,8 +40,8 @@ struct TrainArguments {
     TrainOutput output;
     fs::path config;
     bool check_only = false;
-    bool makes_dataset = false;  // of RunOptions::scene
-    std::string quality;         // empty: not given
+    What made_of = What::nothing;  // RunOptions::scene, if the run makes its dataset of it
+    std::string quality;           // empty: not given
 };
 
 void add_run_option(CLI::App& app, const train::RunOption& option, RunOptions& options) {
@@ -80,16 +80,10 @@ void apply_config_and_quality(CLI::App& app, TrainArguments& arguments) {
         arguments.run.train.steps = *steps;
 }
 
-bool is_mesh_scene(const fs::path& path) {
-    const std::string extension = core::lower(path.extension().string());
-    return extension == ".gltf" || extension == ".glb";
-}
-
 /// A folder of runs is no dataset, and a run in it may be meant.
-void refuse_runs(const fs::path& path) {
-    if (!core::is_folder(path) || is_capture(path) || io::is_dataset_folder(path)) return;
-    if (const std::string runs = folders::runs_in(path); !runs.empty())
-        throw InputError(core::one_line(path.string()) + ": not a dataset, but it has the training runs " +
+void refuse_runs(const fs::path& folder) {
+    if (const std::string runs = folders::runs_in(folder); !runs.empty())
+        throw InputError(core::one_line(folder.string()) + ": not a dataset, but it has the training runs " +
                          runs + "; ewa train RUN --resume continues one");
 }
 
@@ -97,22 +91,22 @@ void refuse_runs(const fs::path& path) {
 void note_scene(TrainArguments& arguments) {
     RunOptions& run = arguments.run;
     if (run.dataset.empty() || !run.scene.empty()) return;
-    if (is_mesh_scene(run.dataset)) {
+    const What what = what_is(run.dataset);
+    if (what == What::mesh) {
         run.scene = run.dataset;
     } else {
-        refuse_runs(run.dataset);
+        if (what == What::nothing && core::is_folder(run.dataset)) refuse_runs(run.dataset);
         check_training_input(run.dataset);
         // The run's name is the last part of the path, which "photos/" and "." do not have.
-        if (is_capture(run.dataset))
-            run.scene = (fs::absolute(run.dataset).lexically_normal() / "").parent_path();
+        if (is_searched(what)) run.scene = (fs::absolute(run.dataset).lexically_normal() / "").parent_path();
     }
-    arguments.makes_dataset = !run.scene.empty();
+    if (!run.scene.empty()) arguments.made_of = what;
 }
 
 /// Renders a mesh scene into the run's folder, which becomes the dataset. Throws Interrupted if Ctrl-C ended that.
 void render_scene(TrainArguments& arguments) {
     RunOptions& run = arguments.run;
-    if (!arguments.makes_dataset || !is_mesh_scene(run.scene)) return;
+    if (arguments.made_of != What::mesh) return;
     run.output = output_folder(run);
     run.dataset = run.output / folders::kMadeDataset;
     train::check_free(run.output, run);
@@ -139,12 +133,11 @@ int video_frames(const std::string& frames) {
 /// Throws what needs no dataset to be known, before the long work that makes it.
 void check_before_scene(const TrainArguments& arguments) {
     const RunOptions& options = arguments.run;
-    if (!arguments.makes_dataset) return;
+    if (arguments.made_of == What::nothing) return;
     train::check_without_dataset(options);
-    if (!is_mesh_scene(options.scene)) {
-        const bool archive = is_archive(options.scene);
-        const bool searched = !archive || !archive_has_cameras(options.scene);
-        if (has_videos(options.scene))
+    if (arguments.made_of != What::mesh) {
+        const bool searched = arguments.made_of != What::archive || !archive_has_cameras(options.scene);
+        if (arguments.made_of == What::video)
             video_frames(options.frames);
         else if (options.frames != "all" && searched)
             refuse_frames(options.frames, options.scene);
@@ -163,12 +156,12 @@ void check_before_scene(const TrainArguments& arguments) {
 /// that. Returns the progress, which the training continues; null where the dataset has cameras.
 std::unique_ptr<Progress> place_photos(TrainArguments& arguments) {
     RunOptions& run = arguments.run;
-    if (!arguments.makes_dataset || is_mesh_scene(run.scene)) return nullptr;
+    if (!is_searched(arguments.made_of)) return nullptr;
     run.output = output_folder(run);
     run.dataset = run.output / folders::kMadeDataset;
     train::check_free(run.output, run);
     CaptureOptions capture{.level = run.level};
-    if (has_videos(run.scene)) {
+    if (arguments.made_of == What::video) {
         capture.frames = video_frames(run.frames);
         run.frames = "all";
     }
@@ -196,7 +189,7 @@ int run(CLI::App& app, TrainArguments& arguments) {
     if (options.dataset.empty()) throw InputError("DATASET is required (see ewa train --help)");
     if (fs::is_directory(options.init)) options.init = splat_input(options.init).file.string();
     check_options(options);
-    if (options.ranks->size() > 1 && arguments.makes_dataset)
+    if (options.ranks->size() > 1 && arguments.made_of != What::nothing)
         throw InputError(
             options.scene.string() +
             ": several ranks train on a dataset; make it first, with ewa dataset or ewa cameras");

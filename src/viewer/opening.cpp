@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "capture/what_is.h"
 #include "core/folders.h"
 #include "core/typing.h"
 #include "core/words.h"
@@ -13,7 +14,6 @@
 #include "ewa/splat_files.h"
 #include "ewa/synthetic_dataset.h"
 #include "folders/run_folder.h"
-#include "io/datasets/importers/importer.h"
 #include "io/datasets/refined_cameras.h"
 #include "live/run_inputs.h"
 #include "scene/looks.h"
@@ -26,18 +26,12 @@ namespace fs = std::filesystem;
 constexpr float kPointOpacity = 3;    // logit
 constexpr float kPointShrink = 1.2f;  // subtracted from the logarithm of a point's size
 
-bool is_dataset_file(const fs::path& path) {
-    const std::string name = path.filename().string();
-    return (name.starts_with("transforms") && core::lower(path.extension().string()) == ".json") ||
-           (core::is_file(path) && io::find_importer(path));
-}
-
 /// points: also load the points, which are read only together with the images.
 /// refined: cameras.json of the run; empty: none.
 std::shared_ptr<const Dataset> load_cameras(const fs::path& path, DatasetOptions options, bool points,
                                             const fs::path& refined = {}) {
     Dataset dataset;
-    if (is_mesh_scene(path)) dataset = scene_cameras(path, {});
+    if (what_is(path) == What::mesh) dataset = scene_cameras(path, {});
     try {
         if (points && dataset.frames.empty()) dataset = load_dataset(path, options);
     } catch (const InputError&) {
@@ -169,7 +163,7 @@ OpenedScene open_dataset(const fs::path& path) {
     scene.dataset = load_cameras(path, {}, true);
     scene.gaussians = std::make_shared<const Gaussians>(splats_of_points(scene.dataset->points));
     scene.points = true;
-    scene.remark = is_mesh_scene(path)
+    scene.remark = what_is(path) == What::mesh
                        ? "these are the views of a mesh scene; \"Train splats\" renders it and trains splats"
                    : scene.gaussians->size() > 0
                        ? "these are the points of the dataset; \"Train splats\" makes splats of them"
@@ -210,9 +204,9 @@ OpenedScene open_scene(const fs::path& path, const fs::path& cameras, size_t bud
         return open_scene(path / folders::kMadeDataset, {});  // of photos on which nothing was trained yet
     } else if (const fs::path dataset = dataset_of_images(path); !dataset.empty()) {
         return open_scene(dataset, cameras);
-    } else if (is_capture(path)) {
+    } else if (const What what = what_is(path); is_searched(what)) {
         scene.photos = path;
-    } else if (fs::is_directory(path, error) || is_dataset_file(path) || is_mesh_scene(path)) {
+    } else if (fs::is_directory(path, error) || what == What::dataset || what == What::mesh) {
         scene = open_dataset(path);
     } else {
         scene = open_splats(path, cameras, budget);
@@ -226,7 +220,8 @@ OpenedScene open_scene(const fs::path& path, const fs::path& cameras, size_t bud
 bool is_dataset(const fs::path& path) {
     std::error_code error;
     if (fs::is_directory(path, error)) return !folders::find_run(path);
-    return fs::exists(path, error) && (is_dataset_file(path) || is_mesh_scene(path));
+    const What what = what_is(path);
+    return what == What::dataset || what == What::mesh;
 }
 
 OpenedScene with_cameras(const OpenedScene& splats, const OpenedScene& cameras) {

@@ -274,4 +274,15 @@ bool is_gltf_mesh(const std::filesystem::path& path) try {
     return false;
 }
 
+bool has_gltf_splats(const std::filesystem::path& path) try {
+    const GltfDocument document(path, GltfContent::splats);
+    return std::ranges::any_of(document.model().meshes, [](const tinygltf::Mesh& mesh) {
+        return std::ranges::any_of(mesh.primitives, [](const tinygltf::Primitive& primitive) {
+            return primitive.extensions.count(kSplatExtension) > 0;
+        });
+    });
+} catch (const InputError&) {
+    return false;
+}
+
 }  // namespace ewa::io

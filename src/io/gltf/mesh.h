@@ -37,6 +37,9 @@ glm::dmat3 undone_turn(const glm::dquat& turn);
 /// Whether the file is a glTF whose meshes have triangles and no splats. False for anything else.
 bool is_gltf_mesh(const std::filesystem::path& path);
 
+/// Whether the file is a glTF with splats. False for anything else.
+bool has_gltf_splats(const std::filesystem::path& path);
+
 // The parts of read_gltf_mesh that are not triangles.
 
 /// Fills materials, textures and images. The last material is the default of primitives that name none.
