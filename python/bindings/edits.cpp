@@ -4,70 +4,67 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
+
 #include "arrays.h"
+#include "edit/edits.h"
+#include "edit/steps.h"
 #include "inputs.h"
 #include "options.h"
-#include "scene/cleaning.h"
-#include "scene/edits.h"
 
 namespace ewa::python {
 namespace {
 
-/// A copy that `edit` changes. The arrays of the splats themselves stay valid.
-template <class Edit>
-Splats edited(const Splats& splats, const Edit& edit) {
+/// A copy that is edited. The arrays of the splats themselves stay valid.
+Splats edited(const Splats& splats, const std::vector<edit::Edit>& edits, const edit::Cameras& cameras = {}) {
     const nb::gil_scoped_release released;
     Splats copy = splats;
-    edit(copy.gaussians);
+    edit::apply(copy.gaussians, edits, cameras);
     return copy;
 }
 
-Splats with(const Splats& splats, const scene::Edits& edits) {
-    return edited(splats, [&](Gaussians& g) { scene::apply_edits(g, edits); });
+/// A row of the table as a method.
+template <size_t letters>
+struct RowName {
+    char text[letters];
+    consteval RowName(const char (&name)[letters]) { std::copy_n(name, letters, text); }
+};
+template <RowName name>
+Splats without_value(const Splats& splats) {
+    return edited(splats, {edit::parse(name.text)});
 }
-
-Splats cleaned(const Splats& splats, const scene::Cleaning& cleaning,
-               const std::vector<Camera>& cameras = {}) {
-    return edited(splats, [&](Gaussians& g) { scene::clean(g, cleaning, cameras); });
+template <RowName name>
+Splats with_list(const Splats& splats, nb::handle list) {
+    const std::string text = list_text(list);
+    if (text.empty()) throw InputError(std::string("--") + name.text + ": the list is empty");
+    return edited(splats, {edit::parse(name.text, text)});
 }
 
 Splats transform(const Splats& splats, const nb::args& steps) {
-    return with(splats, {.transform = matrix_of_steps(steps)});
+    const glm::dmat4 matrix = matrix_of_steps(steps);
+    return edited(splats, {{.text = "--transform",
+                            .place = [matrix](const glm::dmat4& before) { return matrix * before; }}});
 }
 
-Splats decimate(const Splats& splats, nb::handle count) {
-    const std::string text = nb::isinstance<nb::str>(count) ? nb::cast<std::string>(count)
-                                                            : std::to_string(nb::cast<int64_t>(count));
-    if (text.empty()) throw InputError("decimate: the text is empty");
-    return with(splats, {.decimation = scene::parse_decimation(text)});
+/// A number, or a text as people type it.
+Splats with_number(const Splats& splats, const char* name, nb::handle number) {
+    const std::string text = nb::isinstance<nb::str>(number) ? nb::cast<std::string>(number)
+                                                             : std::to_string(nb::cast<int64_t>(number));
+    if (text.empty()) throw InputError(std::string(name) + ": the text is empty");
+    return edited(splats, {edit::parse(name, text)});
 }
 
-Splats crop(const Splats& splats, nb::handle box) {
-    const std::string text = list_text(box);
-    if (text.empty()) throw InputError("crop: the box is empty");
-    return cleaned(splats, {.box = text});
-}
-
-Splats min_opacity(const Splats& splats, double least) {
-    if (!(least >= 0 && least <= 1)) throw InputError("min_opacity: the opacity is not from 0 to 1");
-    return cleaned(splats, {.min_opacity = least});
-}
-
-Splats max_sh(const Splats& splats, int degree) {
-    if (degree < 0 || degree > kMaxShDegree) throw InputError("max_sh: the degree is not 0, 1, 2 or 3");
-    return with(splats, {.max_sh = degree});
-}
-
-Splats keep(const Splats& splats, const nb::args& ranges) {
-    return cleaned(splats, {.ranges = nb::cast<std::vector<std::string>>(ranges)});
-}
-
-Splats min_views(const Splats& splats, const ObjectOrPath<LoadedDataset>& given, int least) {
+Splats where(const Splats& splats, const nb::args& filters, nb::handle given) {
+    std::vector<edit::Edit> edits;
+    for (const std::string& filter : nb::cast<std::vector<std::string>>(filters))
+        edits.push_back(edit::parse("where", filter));
+    if (given.is_none()) return edited(splats, edits);
     const Opened<LoadedDataset> dataset(
-        given, [](const std::filesystem::path& path) { return open_dataset(path, {.need_images = false}); });
+        nb::cast<ObjectOrPath<LoadedDataset>>(given),
+        [](const std::filesystem::path& path) { return open_dataset(path, {.need_images = false}); });
     std::vector<Camera> cameras;
     for (const Frame& frame : dataset->dataset->frames) cameras.push_back(frame.camera);
-    return cleaned(splats, {.min_views = least}, cameras);
+    return edited(splats, edits, [&] { return cameras; });
 }
 
 }  // namespace
@@ -80,7 +77,7 @@ glm::dmat4 matrix_of_steps(nb::handle steps) {
     };
     std::vector<std::string> words;
     for (const nb::handle step : steps) words.push_back(word_of(step));
-    return scene::parse_transform(words);
+    return edit::parse_transform(words);
 }
 
 void bind_edits(nb::class_<Splats>& splats) {
@@ -90,35 +87,33 @@ void bind_edits(nb::class_<Splats>& splats) {
              nb::sig("def transform(self, *steps: str | numpy.typing.ArrayLike) -> Splats"),
              "The splats moved by steps, in this order: \"move=x,y,z\", \"turn=x,y,z,degrees\" about that "
              "axis, \"scale=s\", or a matrix [3, 4] or [4, 4].")
-        .def("crop", crop, "box"_a,
+        .def(
+            "scale_to", with_list<"scale-to">, "points_and_length"_a,
+            nb::sig("def scale_to(self, points_and_length: collections.abc.Sequence[float] | str) -> Splats"),
+            "The splats scaled until two points, x, y, z, X, Y, Z, are a length apart, which is the seventh "
+            "number.")
+        .def("crop", with_list<"crop">, "box"_a,
              nb::sig("def crop(self, box: collections.abc.Sequence[float] | str) -> Splats"),
              "The splats whose centre is in a box: x, y, z of its low corner, then of its high one.")
+        .def("where", where, "filters"_a, nb::kw_only(), "dataset"_a = nb::none(),
+             nb::sig("def where(self, *filters: str, dataset: " EWA_DATASET_TYPE " | None = None) -> Splats"),
+             "The splats that pass all filters: \"opacity=0.1..\", \"z=-1..2\", \"box=x,y,z,X,Y,Z\" or "
+             "\"sphere=x,y,z,radius\". Columns: x, y, z, opacity, scale (the largest), thickness (the "
+             "smallest "
+             "scale), red, green, blue, and with a dataset views: the images in which the centre is.")
         .def(
-            "crop_sphere",
-            [](const Splats& s, nb::handle sphere) { return cleaned(s, {.sphere = list_text(sphere)}); },
-            "sphere"_a,
-            nb::sig("def crop_sphere(self, sphere: collections.abc.Sequence[float] | str) -> Splats"),
-            "The splats whose centre is in a sphere: x, y, z, radius.")
-        .def("keep", keep, "ranges"_a, nb::sig("def keep(self, *ranges: str) -> Splats"),
-             "The splats whose columns are in all of these ranges, such as \"opacity=0.1..\" or "
-             "\"z=-1..2\". Columns: x, y, z, opacity, scale (the largest), thickness (the smallest scale), "
-             "red, green, blue.")
-        .def("min_opacity", min_opacity, "least"_a, "The splats with at least this opacity.")
-        .def("max_sh", max_sh, "degree"_a, "The splats with spherical harmonics of at most this degree.")
+            "max_sh", [](const Splats& s, int degree) { return with_number(s, "max-sh", nb::int_(degree)); },
+            "degree"_a, "The splats with spherical harmonics of at most this degree.")
+        .def("remove_invalid", without_value<"remove-invalid">,
+             "Without splats that have a value that is not finite, or a zero quaternion.")
+        .def("remove_floaters", without_value<"remove-floaters">,
+             "Without groups of fewer than 10 splats that touch no others of about their size.")
+        .def("largest_cluster", without_value<"largest-cluster">,
+             "The largest group of splats that touch others of about their size.")
         .def(
-            "remove_invalid", [](const Splats& s) { return cleaned(s, {.invalid = true}); },
-            "Without splats that have a value that is not finite, or a zero quaternion.")
-        .def(
-            "remove_floaters", [](const Splats& s) { return cleaned(s, {.floaters = true}); },
-            "Without groups of fewer than 10 splats that touch no others of about their size.")
-        .def(
-            "largest_cluster", [](const Splats& s) { return cleaned(s, {.largest_cluster = true}); },
-            "The largest group of splats that touch others of about their size.")
-        .def("min_views", min_views, "dataset"_a, "least"_a,
-             nb::sig("def min_views(self, dataset: " EWA_DATASET_TYPE ", least: int) -> Splats"),
-             "The splats whose centre is in at least so many images of the dataset.")
-        .def("decimate", decimate, "count"_a, nb::sig("def decimate(self, count: int | str) -> Splats"),
-             "Near splats merged until this number of them is left, or this part, such as \"50%\".");
+            "decimate", [](const Splats& s, nb::handle count) { return with_number(s, "decimate", count); },
+            "count"_a, nb::sig("def decimate(self, count: int | str) -> Splats"),
+            "Near splats merged until this number of them is left, or this part, such as \"50%\".");
 }
 
 }  // namespace ewa::python

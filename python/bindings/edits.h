@@ -9,7 +9,7 @@
 
 namespace ewa::python {
 
-/// steps: each a text that scene::parse_transform reads, or a matrix [3, 4] or [4, 4]. Throws ValueError, InputError.
+/// steps: each a text that edit::parse_transform reads, or a matrix [3, 4] or [4, 4]. Throws ValueError, InputError.
 glm::dmat4 matrix_of_steps(nanobind::handle steps);
 
 void bind_edits(nanobind::class_<Splats>& splats);

@@ -19,7 +19,6 @@
 #include "io/splats/output_options.h"
 #include "io/splats/prepare.h"
 #include "options.h"
-#include "scene/edits.h"
 
 namespace ewa::python {
 namespace {

@@ -10,12 +10,12 @@ from conftest import STILL_LIFE, make_splats
 MATRIX = [[0, -2, 0, 1], [2, 0, 0, 0], [0, 0, 2, 3]]
 EDITS = {
     "crop": (lambda s: s.crop((-0.5, -0.5, -1, 0.5, 0.5, 1)), ["--crop=-0.5,-0.5,-1,0.5,0.5,1"]),
-    "crop_sphere": (lambda s: s.crop_sphere([0, 0, 0, 0.8]), ["--crop-sphere=0,0,0,0.8"]),
-    "keep": (
-        lambda s: s.keep("opacity=0.3..", "scale=..0.2"),
-        ["--keep=opacity=0.3..", "--keep=scale=..0.2"],
+    "sphere": (lambda s: s.where("sphere=0,0,0,0.8"), ["--where=sphere=0,0,0,0.8"]),
+    "where": (
+        lambda s: s.where("opacity=0.3..", "scale=..0.2"),
+        ["--where=opacity=0.3..", "--where=scale=..0.2"],
     ),
-    "min_opacity": (lambda s: s.min_opacity(0.4), ["--min-opacity=0.4"]),
+    "scale_to": (lambda s: s.scale_to([0, 0, 0, 1, 0, 0, 3]), ["--scale-to=0,0,0,1,0,0,3"]),
     "max_sh": (lambda s: s.max_sh(1), ["--max-sh=1"]),
     "remove_invalid": (lambda s: s.remove_invalid(), ["--remove-invalid"]),
     "remove_floaters": (lambda s: s.remove_floaters(), ["--remove-floaters"]),
@@ -57,17 +57,17 @@ def test_edits_are_those_of_the_command_line(name, program, tmp_path):
     assert view.base is not None and np.array_equal(view, before["means"])
     for key, values in before.items():
         assert np.array_equal(getattr(splats, key), values)
-    assert len(edited) < len(splats) or name in ("max_sh", "transform", "matrix")
+    assert len(edited) < len(splats) or name in ("max_sh", "transform", "matrix", "scale_to")
 
 
 def test_splats_in_few_images_are_removed(program, tmp_path, still_life):
     run = tmp_path / "run"
     program("train", STILL_LIFE, "-o", run, "--steps", 1, "--downscale", 4, "--strategy", "none")
-    program("convert", run, tmp_path / "theirs.ply", "--min-views", 20)
+    program("convert", run, tmp_path / "theirs.ply", "--where", "views=20..")
     splats = ewa.load(run)
     expected = ewa.load(tmp_path / "theirs.ply")
     for dataset in (still_life, STILL_LIFE, run):
-        assert np.array_equal(splats.min_views(dataset, 20).means, expected.means)
+        assert np.array_equal(splats.where("views=20..", dataset=dataset).means, expected.means)
     assert 0 < len(expected) < len(splats)
 
 
@@ -82,14 +82,14 @@ def test_edits_keep_what_splats_are():
     "edit, text",
     [
         (lambda s: s.crop((1, 2, 3)), "^crop: '1.0,2.0,3.0' is not"),
-        (lambda s: s.crop_sphere((0, 0, 0, -1)), "^crop_sphere: .* is not x,y,z,radius"),
-        (lambda s: s.keep("opacty=0..1"), "^keep: .*did you mean opacity"),
+        (lambda s: s.where("sphere=0,0,0,-1"), "^where: .* is not x,y,z,radius"),
+        (lambda s: s.where("opacty=0..1"), "^where: .*did you mean opacity"),
+        (lambda s: s.where("views=3.."), "^where: views are known"),
         (lambda s: s.decimate("half"), "^decimate: 'half' is neither a number of splats"),
         (lambda s: s.decimate(0), "^decimate: '0' is neither"),
         (lambda s: s.transform("spin=3"), "^transform: 'spin=3' is not move=x,y,z"),
         (lambda s: s.transform("scale=0"), "flattens|could not be drawn"),
-        (lambda s: s.min_opacity(2), "^min_opacity: the opacity is not from 0 to 1"),
-        (lambda s: s.max_sh(4), "^max_sh: the degree is not 0, 1, 2 or 3"),
+        (lambda s: s.max_sh(4), "^max_sh: '4' is not 0, 1, 2 or 3"),
     ],
 )
 def test_wrong_edits(edit, text):
@@ -102,10 +102,10 @@ def test_wrong_types():
     splats = make_splats()
     for edit in (
         lambda: splats.decimate(2.5),
-        lambda: splats.keep(3),
+        lambda: splats.where(3),
         lambda: splats.crop(3),
         lambda: splats.crop("abcdef".split()),
-        lambda: splats.min_views(splats, 1),
+        lambda: splats.where("views=1..", dataset=splats),
     ):
         with pytest.raises((TypeError, ValueError)) as found:
             edit()

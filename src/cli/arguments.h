@@ -70,7 +70,7 @@ void add_device_options(CLI::App& app, DeviceOptions& options);
 void add_size_options(CLI::App& app, int& downscale, int& max_width);
 /// --frames and --test-every.
 void add_frames_options(CLI::App& app, std::string& frames, int& test_every);
-/// --transform, whose steps scene::parse_transform reads. of: what it moves.
+/// --transform, whose steps edit::parse_transform reads. of: what it moves.
 void add_transform_option(CLI::App& app, std::vector<std::string>& steps, const std::string& of);
 
 void add_quiet_option(CLI::App& app, bool& quiet);

@@ -14,7 +14,7 @@
 #include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/comparison.h"
-#include "cli/convert_clean.h"
+#include "cli/convert_edits.h"
 #include "cli/convert_files.h"
 #include "cli/convert_output.h"
 #include "cli/output.h"
@@ -23,6 +23,7 @@
 #include "core/folders.h"
 #include "core/messages.h"
 #include "core/text.h"
+#include "edit/steps.h"
 #include "ewa/error.h"
 #include "ewa/render_options.h"
 #include "ewa/splat_edit.h"
@@ -32,7 +33,6 @@
 #include "io/splats/place.h"
 #include "io/splats/prepare.h"
 #include "io/splats/scene_page.h"
-#include "scene/edits.h"
 
 namespace ewa::cli {
 namespace {
@@ -46,10 +46,7 @@ struct ConvertArguments {
     std::vector<fs::path> files;         // the last is written
     fs::path output;                     // -o, which becomes the last of the files
     std::vector<glm::dmat4> placements;  // of the inputs
-    std::vector<std::string> transform;
-    std::string scale_to, decimate, sort;
-    scene::Edits edits;
-    Cleaning cleaning;
+    EditArguments editing;
     io::OutputOptions output_options;
     int level = 0;  // of the inputs
     fs::path json;
@@ -74,7 +71,7 @@ PlacedInput parse_input(const std::string& text) {
         std::istringstream rest(text.substr(colon + 1));
         for (std::string step; std::getline(rest, step, ':');) steps.push_back(step);
         if (steps.empty()) steps.emplace_back();
-        return {file, scene::parse_transform(steps, file)};
+        return {file, edit::parse_transform(steps, file)};
     }
     return {text};
 }
@@ -126,7 +123,7 @@ void read_all(const ConvertArguments& arguments, Work& work) {
         SplatScene scene =
             arguments.level > 0 ? read_splat_level(path, size_t(arguments.level)) : read_splats(path);
         if (arguments.bake_sky) bake_sky(path, scene.gaussians);
-        scene::place_splats(scene.gaussians, arguments.placements.at(i), path.string());
+        edit::place_splats(scene.gaussians, arguments.placements.at(i), path.string());
         if (!arguments.quiet)
             fmt::print("{}\n",
                        described(path, name_of(scene.format), scene.variant, scene_size(scene.gaussians),
@@ -206,7 +203,7 @@ void check_files(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
     const bool unbundled = arguments.output_options.unbundled;
     std::vector<NamedFile> inputs,
-        outputs = {{"OUT", out}, {"--json", arguments.json}, {"--dry-run", arguments.cleaning.picture}};
+        outputs = {{"OUT", out}, {"--json", arguments.json}, {"--dry-run", arguments.editing.picture}};
     for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
         inputs.push_back({"an input", arguments.files[i]});
         check_not_a_part(unbundled ? io::levels_of_page(out) : out, arguments.files[i]);
@@ -245,26 +242,43 @@ Json output_json(const ConvertArguments& arguments, const SceneSize& size) {
     return json;
 }
 
-/// Removes what the options name and says how much. Whether that was all, for --dry-run. in_place: the splats are where the run has
-/// them.
-bool clean_scene(const ConvertArguments& arguments, Work& work, bool in_place) {
-    const std::optional<folders::Run> run = in_place ? arguments.run : std::nullopt;
-    const bool dry = !arguments.cleaning.picture.empty();
-    const Gaussians before = dry ? work.gaussians : Gaussians();
-    const size_t all = work.gaussians.size();
-    for (const scene::Removed& removed : clean(work.gaussians, arguments.cleaning, run)) {
-        work.lost.push_back(fmt::format("{} {} {} of {}", removed.option, dry ? "would remove" : "removed",
-                                        removed.splats, core::counted(all, "splat")));
-        work.removed[removed.option] = work.removed.value(removed.option, size_t(0)) + removed.splats;
+/// Applies the edits and says what they removed. Whether that was all, for --dry-run. Drops the run where the splats have moved.
+bool edit_scene(const ConvertArguments& arguments, Work& work, std::optional<folders::Run>& run) {
+    const fs::path& picture = arguments.editing.picture;
+    std::vector<edit::Edit> edits = arguments.editing.edits;
+    if (!picture.empty()) std::erase_if(edits, [](const edit::Edit& edit) { return bool(edit.change); });
+    const Gaussians before = picture.empty() ? Gaussians() : work.gaussians;
+    const edit::Applied applied = edit::apply(work.gaussians, edits, cameras_of(run));
+    for (const edit::Outcome& outcome : applied.outcomes) {
+        const std::string of = core::counted(outcome.before, "splat");
+        if (!outcome.removes) {
+            work.lost.push_back(fmt::format("{} left {} of {}", outcome.text, outcome.after, of));
+            continue;
+        }
+        const size_t removed = outcome.before - outcome.after;
+        work.lost.push_back(fmt::format("{} {} {} of {}", outcome.text,
+                                        picture.empty() ? "removed" : "would remove", removed, of));
+        work.removed[outcome.text] = work.removed.value(outcome.text, size_t(0)) + removed;
     }
-    if (!dry) return false;
-    draw_removed(arguments.cleaning.picture, before, work.gaussians, run);
-    if (!arguments.quiet)
-        for (const std::string& remark : work.lost) fmt::print("  {}\n", core::one_line(remark));
-    if (!arguments.json.empty())
-        write_json(arguments.json,
-                   {{"inputs", work.inputs}, {"removed", work.removed}, {"remarks", work.lost}});
-    return true;
+    if (!picture.empty()) {
+        draw_removed(picture, before, applied.left, run);
+        if (!arguments.quiet)
+            for (const std::string& remark : work.lost) fmt::print("  {}\n", core::one_line(remark));
+        if (!arguments.json.empty())
+            write_json(arguments.json,
+                       {{"inputs", work.inputs}, {"removed", work.removed}, {"remarks", work.lost}});
+        return true;
+    }
+    if (!applied.moved) return false;
+    drop_place(work);
+    run.reset();
+    return false;
+}
+
+/// Whether the splats are in an order that the format keeps.
+bool is_sorted(const ConvertArguments& arguments) {
+    const auto& edits = arguments.editing.edits;
+    return !edits.empty() && edits.back().text == "--sort";
 }
 
 int run(const ConvertArguments& arguments) {
@@ -274,32 +288,16 @@ int run(const ConvertArguments& arguments) {
     const io::FormatRow& row = io::row_to_write(out);
     if (arguments.check && !row.unchecked.empty()) throw InputError("--check: " + std::string(row.unchecked));
     // Report wrong use before the inputs are read: they may be large.
-    scene::Edits edits = arguments.edits;
-    edits.transform = scene::parse_transform(arguments.transform);
-    if (!arguments.scale_to.empty()) {
-        const double factor = scene::parse_scale_to(arguments.scale_to, edits.transform);
-        edits.transform = glm::scale(glm::dmat4(1.0), glm::dvec3(factor)) * edits.transform;
-        if (!arguments.quiet) fmt::print("--scale-to: times {:.6g}\n", factor);
-    }
-    edits.decimation = scene::parse_decimation(arguments.decimate);
-    if (!arguments.cleaning.picture.empty() && !arguments.cleaning.any())
-        throw InputError(
-            "--dry-run: no option removes splats; see --remove-floaters and others of ewa convert --help");
-    scene::check_cleaning(arguments.cleaning);
+    const auto& [edits, picture] = arguments.editing;
+    if (!picture.empty() &&
+        std::ranges::none_of(edits, [](const edit::Edit& edit) { return bool(edit.filter); }))
+        throw InputError("--dry-run: no option removes splats; see --where and others of ewa convert --help");
     check_files(arguments);
     read_all(arguments, work);
     const size_t read = work.gaussians.size();
-    const bool in_place = edits.transform == glm::dmat4(1);
-    if (!in_place) drop_place(work);
-    scene::place_splats(work.gaussians, edits.transform,
-                        arguments.scale_to.empty()    ? "--transform"
-                        : arguments.transform.empty() ? "--scale-to"
-                                                      : "--transform and --scale-to");
-    edits.transform = glm::dmat4(1);
-    if (arguments.cleaning.any() && clean_scene(arguments, work, in_place)) return 0;
-    for (std::string& remark : scene::apply_edits(work.gaussians, edits))
-        work.lost.push_back(std::move(remark));
-    for (std::string& remark : io::match_file(work.gaussians, row, arguments.sort == "morton"))
+    std::optional<folders::Run> run = arguments.run;
+    if (edit_scene(arguments, work, run)) return 0;
+    for (std::string& remark : io::match_file(work.gaussians, row, is_sorted(arguments)))
         work.lost.push_back(std::move(remark));
 
     const SceneSize size = scene_size(work.gaussians);
@@ -312,8 +310,7 @@ int run(const ConvertArguments& arguments) {
     work.save.progress = [&](uint64_t done, uint64_t) { progress.update(static_cast<int>(done)); };
     std::vector<std::string> remarks = work.lost;
     Dataset cameras;
-    if (row.format == SplatFormat::page && in_place && arguments.run)
-        show_run(*arguments.run, cameras, work.save.page, remarks);
+    if (row.format == SplatFormat::page && run) show_run(*run, cameras, work.save.page, remarks);
     const std::vector<std::string> quantised = row.write
                                                    ? save_splats(out, work.gaussians, work.save)
                                                    : save_splats(out, std::move(work.gaussians), work.save);
@@ -338,25 +335,6 @@ int run(const ConvertArguments& arguments) {
     return 0;
 }
 
-void add_editing_options(CLI::App& app, ConvertArguments& arguments) {
-    add_transform_option(app, arguments.transform, "Of the joined scene");
-    app.add_option(
-           "--scale-to", arguments.scale_to,
-           "Scale the joined scene until these two points are LENGTH apart; they are its points before "
-           "--transform. ewa-view measures points")
-        ->type_name("x,y,z,X,Y,Z,LENGTH");
-    app.add_option("--max-sh", arguments.edits.max_sh, "Reduce the spherical harmonics to this degree")
-        ->transform(in_range(0, kMaxShDegree))
-        ->type_name("0..3");
-    app.add_option("--decimate", arguments.decimate,
-                   "Merge near splats until this number of them is left, or this percentage: 500k, 50%")
-        ->type_name("N|P%");
-    app.add_option("--sort", arguments.sort,
-                   "Order of the splats: morton puts neighbours in space next to each other in the file")
-        ->transform(one_of({"morton"}))
-        ->type_name("ORDER");
-}
-
 }  // namespace
 
 Action add_convert(CLI::App& app) {
@@ -375,8 +353,7 @@ Action add_convert(CLI::App& app) {
         ->type_name("IN... OUT");
     app.add_option("-o,--output", arguments->output, "The output; all FILES are then inputs")
         ->type_name("OUT");
-    add_editing_options(app, *arguments);
-    add_cleaning_options(app, arguments->cleaning);
+    add_edit_options(app, arguments->editing);
     add_output_options(app, arguments->output_options);
     app.add_option("--level", arguments->level,
                    "Level of the inputs to read, each a lod-meta.json. 0: the finest")
@@ -392,11 +369,12 @@ Action add_convert(CLI::App& app) {
                    "Write the inputs, the output, remarks and errors of --check to this file")
         ->type_name("FILE");
     add_quiet_option(app, arguments->quiet);
-    return [arguments] {
+    return [arguments, &app] {
+        arguments->editing.edits = typed_edits(app);
         if (!arguments->output.empty()) arguments->files.push_back(arguments->output);
         // A picture of what would be removed needs no output.
-        if (arguments->files.size() == 1 && !arguments->cleaning.picture.empty())
-            arguments->files.emplace_back(arguments->cleaning.picture.string() + ".ply");
+        if (arguments->files.size() == 1 && !arguments->editing.picture.empty())
+            arguments->files.emplace_back(arguments->editing.picture.string() + ".ply");
         if (arguments->files.size() < 2)
             throw InputError("FILES: an input and the output are needed, and there is only " +
                              core::one_line(arguments->files[0].string()));

@@ -15,6 +15,7 @@
 #include "cli/run_inputs.h"
 #include "core/text.h"
 #include "core/typing.h"
+#include "edit/steps.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "io/datasets/dataset_folders.h"
@@ -25,7 +26,6 @@
 #include "mesh/scene_mesh.h"
 #include "run/loss_option.h"
 #include "scene/dataset_files.h"
-#include "scene/edits.h"
 #include "scene/splat_shape.h"
 
 namespace ewa::cli {
@@ -82,9 +82,9 @@ bool at_mean_depth(const MeshArguments& arguments, const std::optional<folders::
 
 /// From --transform and --scale-to.
 glm::dmat4 placement_of(const MeshArguments& arguments) {
-    const glm::dmat4 transform = scene::parse_transform(arguments.transform);
+    const glm::dmat4 transform = edit::parse_transform(arguments.transform);
     if (arguments.scale_to.empty()) return transform;
-    return glm::scale(glm::dmat4(1.0), glm::dvec3(scene::parse_scale_to(arguments.scale_to, transform))) *
+    return glm::scale(glm::dmat4(1.0), glm::dvec3(edit::parse_scale_to(arguments.scale_to, transform))) *
            transform;
 }
 

@@ -136,7 +136,7 @@ TEST(Convert, EditsOnTheWay) {
     };
     EXPECT_EQ(converted({}).means, g.means);
     EXPECT_EQ(converted({"--max-sh", "1"}).sh_degree, 1);
-    EXPECT_EQ(converted({"--min-opacity", "0.5"}).size(), 3u);
+    EXPECT_EQ(converted({"--where", "opacity=0.5.."}).size(), 3u);
     EXPECT_EQ(converted({"--crop", "0,0,0,4,4,4"}).means, (std::vector<float>{0, 0, 0, 1, 2, 3}));
     EXPECT_EQ(converted({"--transform", "move=1,0,0", "--crop", "1.5,0,0,9,9,9"}).size(), 2u);
     EXPECT_EQ(converted({"--decimate", "50%"}).size(), 2u);
@@ -217,7 +217,7 @@ TEST(Convert, WrongUse) {
     refuse({"--spz-version", "3"}, "--spz-version: only an .spz has one");
     refuse({"--crop", "1,2,3"}, "--crop");
     refuse({"--crop", "1,0,0,0,1,1"}, "lower corner");
-    refuse({"--min-opacity", "2"}, "min-opacity");
+    refuse({"--where", "opacity=a.."}, "--where");
     refuse({"--max-sh", "4"}, "max-sh");
     for (const char* text : {"0", "0%", "101%", "half", "-5", "%"})
         refuse({std::string("--decimate=") + text}, "--decimate: '");

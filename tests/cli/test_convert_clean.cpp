@@ -42,11 +42,11 @@ TEST(ConvertClean, RemovesAndSaysHowMany) {
     };
     EXPECT_EQ(left({"--remove-floaters"}, "--remove-floaters removed 4 of 16 splats"), 12u);
     EXPECT_EQ(left({"--largest-cluster"}, "--largest-cluster removed 4 of 16 splats"), 12u);
-    EXPECT_EQ(left({"--keep", "opacity=0.5.."}, "--keep opacity removed 8 of 16 splats"), 8u);
+    EXPECT_EQ(left({"--where", "opacity=0.5.."}, "--where opacity=0.5.. removed 8 of 16 splats"), 8u);
     EXPECT_EQ(left({"--crop", "0,-1,0,3.5,1,9"}, "--crop removed 12 of 16 splats"), 4u);
-    EXPECT_EQ(left({"--min-opacity", "0.5"}, "--min-opacity removed 8 of 16 splats"), 8u);
-    EXPECT_EQ(
-        left({"--keep", "x=2..4", "--keep", "red=..0.6", "--allow-empty"}, "--keep red removed 3 of 16"), 0u);
+    EXPECT_EQ(left({"--where", "x=2..4", "--where", "red=..0.6", "--allow-empty"},
+                   "--where red=..0.6 removed 3 of 3 splats"),
+              0u);
 }
 
 TEST(ConvertClean, RangesAndSphere) {
@@ -59,12 +59,21 @@ TEST(ConvertClean, RangesAndSphere) {
         expect_success(run_ewa(all));
         return ewa::load_splats(folder / "o.ply").size();
     };
-    EXPECT_EQ(left({"--keep", "x=2..4"}), 3u);
-    EXPECT_EQ(read_json(folder / "o.json")["removed"]["--keep x"], 13);
-    EXPECT_EQ(left({"--keep", "y=..50"}), 15u);
-    EXPECT_EQ(left({"--keep", "blue=0.7..", "--keep", "scale=0.4..0.6", "--keep", "thickness=0.4..0.6"}), 1u);
-    EXPECT_EQ(left({"--crop-sphere", "1,0,5,2.5"}), 4u);
-    EXPECT_EQ(left({"--transform", "move=10,0,0", "--keep", "x=..12"}), 3u);
+    EXPECT_EQ(left({"--where", "x=2..4"}), 3u);
+    EXPECT_EQ(read_json(folder / "o.json")["removed"]["--where x=2..4"], 13);
+    EXPECT_EQ(left({"--where", "y=..50"}), 15u);
+    EXPECT_EQ(left({"--where", "blue=0.7..", "--where", "scale=0.4..0.6", "--where", "thickness=0.4..0.6"}),
+              1u);
+    EXPECT_EQ(left({"--where", "sphere=1,0,5,2.5"}), 4u);
+    // In the order typed.
+    EXPECT_EQ(left({"--transform", "move=10,0,0", "--where", "x=..12"}), 3u);
+    EXPECT_EQ(left({"--where", "x=..12", "--transform", "move=10,0,0"}), 13u);
+    EXPECT_EQ(left({"--decimate", "4", "--where", "x=..5.37", "--allow-empty"}) +
+                  left({"--decimate", "4", "--where", "x=5.37..", "--allow-empty"}),
+              4u);
+    EXPECT_EQ(left({"--transform", "move=-10,0,0", "--where", "x=..-1", "--transform", "move=20,0,0",
+                    "--remove-floaters", "--where", "x=..12"}),
+              3u);
     Gaussians g = ewa::load_splats(folder / "s.ply");
     g.means[4] = std::numeric_limits<float>::quiet_NaN();
     ewa::save_splats(folder / "s.ply", g);
@@ -106,18 +115,19 @@ TEST(ConvertClean, RefusesWithTheReason) {
         expect_failure(run_ewa(all), 2, why);
         EXPECT_FALSE(std::filesystem::exists(folder / "o.ply"));
     };
-    refuse({"--keep", "opacity"}, "not COLUMN=LOW..HIGH");
-    refuse({"--keep", "opacity=.."}, "one bound or both");
-    refuse({"--keep", "opacty=0..1"}, "did you mean opacity?");
-    refuse({"--keep", "x=3..2"}, "the first is not above the second");
-    refuse({"--keep", "x=a..2"}, "numbers");
-    refuse({"--keep", "=1..2"}, "a column of x, y, z");
-    refuse({"--crop-sphere", "1,2,3"}, "x,y,z,radius");
-    refuse({"--crop-sphere", "1,2,3,0"}, "one above 0");
-    refuse({"--crop-sphere", "1,2,3,nan"}, "finite");
-    refuse({"--min-views", "2"}, "the folder of a training run");
+    refuse({"--where", "opacity"}, "not COLUMN=LOW..HIGH");
+    refuse({"--where", "opacity=.."}, "one bound or both");
+    refuse({"--where", "opacty=0..1"}, "did you mean opacity?");
+    refuse({"--where", "x=3..2"}, "the first is not above the second");
+    refuse({"--where", "x=a..2"}, "numbers");
+    refuse({"--where", "=1..2"}, "a column of x, y, z");
+    refuse({"--where", "box=1,2,3"}, "--where");
+    refuse({"--where", "sphere=1,2,3"}, "x,y,z,radius");
+    refuse({"--where", "sphere=1,2,3,0"}, "one above 0");
+    refuse({"--where", "sphere=1,2,3,nan"}, "finite");
+    refuse({"--where", "views=2.."}, "the folder of a training run");
     refuse({"--dry-run", folder / "p.png"}, "no option removes splats");
-    refuse({"--keep", "x=900.."}, "none of the 16 splats is left");
+    refuse({"--where", "x=900.."}, "none of the 16 splats is left");
 }
 
 }  // namespace

@@ -8,7 +8,7 @@ holds() { [[ $(splats_of "$1") == "$2" ]] || fail "$1 has $(splats_of "$1") spla
 # a.ply with all splats, b.ply with some of them.
 two_scenes() {
     cp "$SPLATS" a.ply
-    run 0 ewa convert a.ply b.ply --min-opacity 0.11 --quiet
+    run 0 ewa convert a.ply b.ply --where opacity=0.11.. --quiet
     all=$(splats_of a.ply) some=$(splats_of b.ply)
     ((some > 0 && some < all)) || fail "b.ply has $some of $all splats"
 }

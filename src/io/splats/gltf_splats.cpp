@@ -250,7 +250,8 @@ class SplatReader {
     /// An attribute of kSplatPrefix, or what an earlier draft calls it where only that is there.
     static std::string named(const tinygltf::Primitive& primitive, const std::string& name) {
         if (!name.starts_with(kSplatPrefix)) return name;
-        const std::string earlier = "_" + name.substr(kSplatPrefix.size());
+        std::string earlier = "_";
+        earlier += std::string_view(name).substr(kSplatPrefix.size());
         return !primitive.attributes.contains(name) && primitive.attributes.contains(earlier) ? earlier
                                                                                               : name;
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene/edits.h"
+#include "edit/steps.h"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -12,7 +12,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 
-namespace ewa::scene {
+namespace ewa::edit {
 namespace {
 
 /// what: the option or the file that has the step.
@@ -108,40 +108,4 @@ void place_splats(Gaussians& gaussians, const glm::dmat4& matrix, const std::str
             what, before - after, before));
 }
 
-std::optional<Decimation> parse_decimation(const std::string& text) {
-    if (text.empty()) return std::nullopt;
-    Decimation decimation;
-    if (text.back() == '%') {
-        const auto percent =
-            core::parse_number(core::trim(std::string_view(text).substr(0, text.size() - 1)));
-        if (percent && *percent > 0 && *percent <= 100) decimation.part = *percent / 100;
-    } else {
-        decimation.count = core::parse_count<size_t>(text).value_or(0);
-    }
-    if (decimation.part == 0 && decimation.count == 0)
-        throw InputError("--decimate: '" + text +
-                         "' is neither a number of splats from 1 on nor a percentage above 0 and up to 100");
-    return decimation;
-}
-
-size_t left_of(size_t count, const Decimation& decimation) {
-    if (decimation.part == 0) return std::min(count, decimation.count);
-    return std::min(count, std::max<size_t>(1, size_t(std::llround(double(count) * decimation.part))));
-}
-
-std::vector<std::string> apply_edits(Gaussians& gaussians, const Edits& edits) {
-    place_splats(gaussians, edits.transform, "--transform");
-    if (gaussians.sh_degree > edits.max_sh) set_sh_degree(gaussians, edits.max_sh);
-    std::vector<std::string> remarks;
-    if (edits.decimation) {
-        const size_t before = gaussians.size();
-        decimate_splats(gaussians, left_of(before, *edits.decimation));
-        if (gaussians.size() < before)
-            remarks.push_back(
-                fmt::format("--decimate left {} of {}", gaussians.size(), core::counted(before, "splat")));
-    }
-    if (edits.morton) select_splats(gaussians, morton_order(gaussians));
-    return remarks;
-}
-
-}  // namespace ewa::scene
+}  // namespace ewa::edit

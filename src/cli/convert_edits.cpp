@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/convert_edits.h"
+
+#include <CLI/CLI.hpp>
+#include <map>
+
+#include "cli/arguments.h"
+#include "cli/run_inputs.h"
+#include "ewa/error.h"
+#include "ewa/renderer.h"
+#include "scene/framing.h"
+
+namespace ewa::cli {
+
+void add_edit_options(CLI::App& app, EditArguments& arguments) {
+    const size_t others = app.get_options().size();
+    for (const edit::Row& row : edit::rows()) {
+        const std::string name = std::string("--") + row.name;
+        if (*row.value == 0) {
+            app.add_flag(name, row.help)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+            continue;
+        }
+        app.add_option(name, row.help)
+            ->type_name(row.value)
+            ->expected(1)
+            ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+            ->take_all();
+    }
+    app.add_option("--dry-run", arguments.picture,
+                   "Write only this picture, in which all that would be removed is red. OUT may be left out, "
+                   "and is not written")
+        ->type_name("PICTURE");
+    const std::vector<CLI::Option*> all = app.get_options();
+    for (size_t i = others; i < all.size(); ++i) all[i]->group("Edits, in the order typed");
+}
+
+std::vector<edit::Edit> typed_edits(const CLI::App& app) {
+    std::vector<edit::Edit> edits;
+    std::map<const CLI::Option*, size_t> used;  // values of an option so far
+    for (const CLI::Option* option : app.parse_order())
+        for (const edit::Row& row : edit::rows()) {
+            if (!option->check_lname(row.name)) continue;
+            const size_t value = used[option]++;
+            edits.push_back(edit::parse(row.name, *row.value == 0 ? "" : option->results().at(value)));
+        }
+    return edits;
+}
+
+edit::Cameras cameras_of(const std::optional<folders::Run>& run) {
+    if (!run) return {};
+    return [run = *run] {
+        std::vector<Camera> cameras;
+        for (const Frame& frame : cameras_of_run(run).frames) cameras.push_back(frame.camera);
+        return cameras;
+    };
+}
+
+void draw_removed(const std::filesystem::path& picture, const Gaussians& all,
+                  const std::vector<uint32_t>& left, const std::optional<folders::Run>& run) {
+    constexpr int kWidth = 1280, kHeight = 720;
+    Camera camera = scene::frame_scene(all, kWidth, kHeight).camera;
+    if (run)
+        if (const Dataset dataset = cameras_of_run(*run); !dataset.frames.empty())
+            camera = scene::pinhole_at(dataset.frames.front().camera);
+    RenderOptions options;
+    if (all.density) options.kernel = Footprint::density;
+    save_image(picture,
+               Renderer(open_device({}), edit::with_removed_in_red(all, left), options).render(camera).color);
+}
+
+}  // namespace ewa::cli

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Filters: which splats of a scene stay.
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "ewa/camera.h"
+#include "ewa/gaussians.h"
+
+namespace ewa::edit {
+
+/// The cameras of the run that the splats are of. Throws InputError if there are none.
+using Cameras = std::function<std::vector<Camera>()>;
+
+/// Whether each splat stays.
+using Filter = std::function<std::vector<bool>(const Gaussians&, const Cameras&)>;
+
+/// Parses a filter of --where. Throws InputError that begins with `what`.
+///   COLUMN=LOW..HIGH   a range of x, y, z, opacity, scale (the largest), thickness (the smallest), red, green, blue, or of the number of
+///                      the run's images in which the centre is (views). One bound is enough.
+///   box=x,y,z,X,Y,Z    the centre is in this box: its low corner, then its high one
+///   sphere=x,y,z,R     the centre is in this sphere
+Filter parse_filter(const std::string& text, const std::string& what);
+
+/// No value is infinite or NaN, and the quaternion is not zero.
+std::vector<bool> drawable_splats(const Gaussians& gaussians);
+/// The splat is in a group of at least 10 that touch others of about their size.
+std::vector<bool> grounded_splats(const Gaussians& gaussians);
+/// The splat is in the largest group of such splats.
+std::vector<bool> largest_cluster(const Gaussians& gaussians);
+
+/// The scene in grey, with what `left` lacks in red. left: numbers of splats of `all`, in ascending order.
+Gaussians with_removed_in_red(const Gaussians& all, const std::vector<uint32_t>& left);
+
+}  // namespace ewa::edit
