@@ -9,10 +9,10 @@
 #include <set>
 #include <utility>
 
+#include "core/json_field.h"
 #include "core/text.h"
 #include "core/typing.h"
 #include "io/datasets/importers/image_finder.h"
-#include "io/datasets/importers/json_field.h"
 
 namespace ewa::io {
 
@@ -72,7 +72,7 @@ constexpr size_t kNoList = kLists.size();
 
 /// Sets of[i] to the list that names image i. The last one wins: what is held out does not train, unless that leaves nothing. Then
 /// `both` counts what trains. Returns the names of no image.
-std::vector<std::string> read_name_lists(const JsonField& top, const std::vector<ImageRecord>& images,
+std::vector<std::string> read_name_lists(const core::JsonField& top, const std::vector<ImageRecord>& images,
                                          std::vector<size_t>& of, size_t& both) {
     const NamedImages named(images);
     std::set<size_t> trained;
@@ -107,7 +107,7 @@ std::vector<std::string> read_name_lists(const JsonField& top, const std::vector
 }  // namespace
 
 void split_by_names(const nlohmann::json& top, const std::string& where, ImageRecords& records) {
-    const JsonField field(top, where);
+    const core::JsonField field(top, where);
     std::vector<ImageRecord>& images = records.images;
     std::vector<size_t> of(images.size(), kNoList);
     size_t both = 0;

@@ -13,10 +13,10 @@
 #include <string>
 
 #include "core/json.h"
+#include "core/json_field.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/datasets/importers/importer.h"
-#include "io/datasets/importers/json_field.h"
 #include "io/datasets/rotation.h"
 #include "io/datasets/view_list.h"
 #include "scene/native_lens.h"
@@ -28,7 +28,7 @@ namespace {
 constexpr size_t kPathDigits = 5;  // of the number of a camera, below kMostCameras
 constexpr double kPathRate = 30;
 
-Lens lens_of_path(const JsonField& top) {
+Lens lens_of_path(const core::JsonField& top) {
     const std::string type = core::lower(top.has("camera_type") ? top.text("camera_type") : "perspective");
     if (type == "perspective") return Lens::brown;
     if (type == "fisheye") return Lens::fisheye;
@@ -37,7 +37,7 @@ Lens lens_of_path(const JsonField& top) {
              "\" is not supported; take perspective, fisheye or equirectangular");
 }
 
-void read_path_camera(const JsonField& field, Camera& camera) {
+void read_path_camera(const core::JsonField& field, Camera& camera) {
     const std::vector<double> m = field.numbers("camera_to_world", 16);
     glm::dmat3 axes;
     for (size_t row = 0; row < 3; ++row)
@@ -52,7 +52,7 @@ void read_path_camera(const JsonField& field, Camera& camera) {
 ImageRecords import_camera_path(const ImportSource& source) {
     const std::string name = core::one_line(source.file.string());
     const auto document = core::read_json_file<nlohmann::json>(source.file, {.not_finite = true});
-    const JsonField top(document, name);
+    const core::JsonField top(document, name);
     if (!document.is_object()) top.fail("is not a JSON object");
     const Lens lens = lens_of_path(top);
     const nlohmann::json& path = top.list("camera_path");
@@ -65,7 +65,7 @@ ImageRecords import_camera_path(const ImportSource& source) {
     records.folder = source.dataset / "images";
     for (size_t i = 0; i < path.size(); ++i) {
         const std::string number = std::to_string(i);
-        const JsonField field(path[i], name + ": camera " + number);
+        const core::JsonField field(path[i], name + ": camera " + number);
         if (!path[i].is_object()) field.fail("is not a JSON object");
         ImageRecord record;
         record.name = std::string(kPathDigits - number.size(), '0') + number;

@@ -8,11 +8,11 @@
 
 #include "core/file_reader.h"
 #include "core/folders.h"
+#include "core/json_field.h"
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "io/datasets/importers/image_finder.h"
-#include "io/datasets/importers/json_field.h"
 
 namespace ewa::io {
 
@@ -306,7 +306,7 @@ std::vector<fs::path> files_of_folder(const fs::path& folder) {
     return files;
 }
 
-ImageRecord begin_record(const ImageFinder& images, const std::string& name, const JsonField& camera) {
+ImageRecord begin_record(const ImageFinder& images, const std::string& name, const core::JsonField& camera) {
     ImageRecord record;
     const auto found = images.find(name, camera.where());
     record.name = found.name;

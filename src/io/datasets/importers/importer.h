@@ -12,10 +12,13 @@
 
 #include "io/datasets/image_records.h"
 
+namespace ewa::core {
+class JsonField;
+}
+
 namespace ewa::io {
 
 class ImageFinder;
-class JsonField;
 
 /// What an importer reads.
 struct ImportSource {
@@ -77,7 +80,7 @@ std::string head_of(const std::filesystem::path& file);
 std::vector<std::filesystem::path> files_of_folder(const std::filesystem::path& folder);
 
 /// The record of an image, with the "width", "height" (px), "fx" and "fy" of its camera.
-ImageRecord begin_record(const ImageFinder& images, const std::string& name, const JsonField& camera);
+ImageRecord begin_record(const ImageFinder& images, const std::string& name, const core::JsonField& camera);
 
 /// Checks the intrinsics and the rotation of a record. `where` begins the errors.
 void finish_record(ImageRecord& record, const std::string& where);

@@ -9,11 +9,11 @@
 #include <nlohmann/json.hpp>
 
 #include "core/json.h"
+#include "core/json_field.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/importer.h"
-#include "io/datasets/importers/json_field.h"
 #include "io/datasets/rotation.h"
 
 namespace ewa::io {
@@ -29,7 +29,7 @@ ImageRecords import_inria(const ImportSource& source) {
     records.folder = images.folder();
     for (size_t i = 0; i < document.size(); ++i) {
         const std::string where = name + ": camera " + std::to_string(i);
-        const JsonField field(document[i], where);
+        const core::JsonField field(document[i], where);
         ImageRecord record = begin_record(images, field.text("img_name"), field);
         Camera& camera = record.camera;
         camera.cx = 0.5 * camera.width;

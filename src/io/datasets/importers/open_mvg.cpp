@@ -13,11 +13,11 @@
 #include <nlohmann/json.hpp>
 
 #include "core/json.h"
+#include "core/json_field.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/importer.h"
-#include "io/datasets/importers/json_field.h"
 #include "io/datasets/rotation.h"
 
 namespace ewa::io {
@@ -47,19 +47,19 @@ const std::vector<OpenMvgLens>& open_mvg_lenses() {
 }
 
 /// The entries of a list of {key, value}, by key.
-using Keyed = std::map<uint64_t, JsonField>;
+using Keyed = std::map<uint64_t, core::JsonField>;
 
-Keyed keyed(const JsonField& top, const char* list, const std::string& what) {
+Keyed keyed(const core::JsonField& top, const char* list, const std::string& what) {
     Keyed entries;
     if (!top.has(list)) return entries;
     for (const json& entry : top.list(list)) {
-        const JsonField field(entry, top.where() + ": " + what + " " + std::to_string(entries.size()));
+        const core::JsonField field(entry, top.where() + ": " + what + " " + std::to_string(entries.size()));
         entries.insert_or_assign(field.index("key"), field.object("value"));
     }
     return entries;
 }
 
-JsonField data_of(const JsonField& value) {
+core::JsonField data_of(const core::JsonField& value) {
     return value.object("ptr_wrapper").object("data");
 }
 
@@ -67,7 +67,7 @@ JsonField data_of(const JsonField& value) {
 using TypeNames = std::map<uint64_t, std::string>;
 constexpr uint64_t kNewType = uint64_t(1) << 31;
 
-ImageRecord open_mvg_camera(const JsonField& value, TypeNames& types) {
+ImageRecord open_mvg_camera(const core::JsonField& value, TypeNames& types) {
     const uint64_t id = value.index("polymorphic_id") & ~kNewType;
     if (value.has("polymorphic_name")) types[id] = value.text("polymorphic_name");
     const std::string type = types[id];
@@ -77,8 +77,8 @@ ImageRecord open_mvg_camera(const JsonField& value, TypeNames& types) {
         value.fail("the intrinsic \"" + type.substr(0, 60) +
                    "\" is not supported; export undistorted images with openMVG_main_openMVG2Colmap, or "
                    "compute with another camera model");
-    const JsonField whole = data_of(value);
-    const JsonField data = whole.has("value0") ? whole.object("value0") : whole;
+    const core::JsonField whole = data_of(value);
+    const core::JsonField data = whole.has("value0") ? whole.object("value0") : whole;
     ImageRecord record;
     Camera& camera = record.camera;
     camera.width = data.side("width");
@@ -100,7 +100,7 @@ ImageRecord open_mvg_camera(const JsonField& value, TypeNames& types) {
     return record;
 }
 
-void read_extrinsic(const JsonField& value, Camera& camera) {
+void read_extrinsic(const core::JsonField& value, Camera& camera) {
     const std::vector<double> r = value.numbers("rotation", 9), c = value.numbers("center", 3);
     glm::dmat3 axes;  // the rows are the camera's axes in the world
     for (int i = 0; i < 9; ++i) axes[i / 3][i % 3] = r[size_t(i)];
@@ -109,14 +109,14 @@ void read_extrinsic(const JsonField& value, Camera& camera) {
     set_pose(camera, nearest_rotation(axes), {c[0], c[1], c[2]});
 }
 
-void add_structure(const JsonField& top, ImageRecords& records) {
+void add_structure(const core::JsonField& top, ImageRecords& records) {
     if (!top.has("structure")) return;
     size_t number = 0;
     for (const json& entry : top.list("structure")) {
         const std::string place = "point " + std::to_string(number++) + " of \"structure\"";
         const auto value = entry.find("value");
         const auto x = value != entry.end() && value->is_object() && value->contains("X")
-                           ? three_numbers((*value)["X"])
+                           ? core::three_numbers((*value)["X"])
                            : std::nullopt;
         if (!x) top.fail(place + " has no \"X\" of three finite numbers");
         add_point(records.points, records.dropped, {(*x)[0], (*x)[1], (*x)[2]}, {128, 128, 128},
@@ -134,13 +134,13 @@ ImageRecords import_open_mvg(const ImportSource& source) {
                                                                    .not_finite = true,
                                                                    .skipped = "observations"});
     if (!document.is_object()) throw InputError(name + ": is not a JSON object");
-    const JsonField top(document, name);
+    const core::JsonField top(document, name);
     TypeNames types;
     std::map<uint64_t, ImageRecord> cameras;
     // In the order of the file, in which the first of a type has its name.
     size_t number = 0;
     for (const json& entry : top.list("intrinsics")) {
-        const JsonField field(entry, name + ": intrinsic " + std::to_string(number++));
+        const core::JsonField field(entry, name + ": intrinsic " + std::to_string(number++));
         cameras.insert_or_assign(field.index("key"), open_mvg_camera(field.object("value"), types));
     }
     const Keyed poses = keyed(top, "extrinsics", "extrinsic");
@@ -154,7 +154,7 @@ ImageRecords import_open_mvg(const ImportSource& source) {
     number = 0;
     for (const json& entry : top.list("views")) {
         const std::string where = name + ": view " + std::to_string(number++);
-        const JsonField view = data_of(JsonField(entry, where).object("value"));
+        const core::JsonField view = data_of(core::JsonField(entry, where).object("value"));
         const auto pose = poses.find(view.index("id_pose"));
         if (pose == poses.end()) {
             ++unplaced;

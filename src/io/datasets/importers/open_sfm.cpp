@@ -14,11 +14,11 @@
 
 #include "core/folders.h"
 #include "core/json.h"
+#include "core/json_field.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/importer.h"
-#include "io/datasets/importers/json_field.h"
 
 namespace ewa::io {
 
@@ -82,7 +82,7 @@ const std::vector<OpenSfmLens>& open_sfm_lenses() {
     return lenses;
 }
 
-ImageRecord open_sfm_camera(const JsonField& field) {
+ImageRecord open_sfm_camera(const core::JsonField& field) {
     const std::string type =
         field.has("projection_type") ? field.text("projection_type") : std::string("perspective");
     const auto& lenses = open_sfm_lenses();
@@ -121,7 +121,7 @@ const json& largest(const json& list, const std::string& name) {
     const json* best = nullptr;
     size_t most = 0;
     for (const json& one : list) {
-        const JsonField shots = JsonField(one, name).object("shots");
+        const core::JsonField shots = core::JsonField(one, name).object("shots");
         if (!best || shots.value().size() > most) {
             best = &one;
             most = shots.value().size();
@@ -131,16 +131,16 @@ const json& largest(const json& list, const std::string& name) {
     return *best;
 }
 
-void add_open_sfm_points(const JsonField& reconstruction, ImageRecords& records) {
+void add_open_sfm_points(const core::JsonField& reconstruction, ImageRecords& records) {
     if (!reconstruction.has("points")) return;
     for (const auto& [id, point] : reconstruction.members("points").items()) {
         const std::string place = "point " + id.substr(0, 60);
         const auto position = point.is_object() && point.contains("coordinates")
-                                  ? three_numbers(point["coordinates"])
+                                  ? core::three_numbers(point["coordinates"])
                                   : std::nullopt;
         if (!position) reconstruction.fail(place + " has no three finite coordinates");
         std::array<uint8_t, 3> color{128, 128, 128};
-        if (const auto rgb = point.contains("color") ? three_numbers(point["color"]) : std::nullopt)
+        if (const auto rgb = point.contains("color") ? core::three_numbers(point["color"]) : std::nullopt)
             for (size_t i = 0; i < 3; ++i) color[i] = uint8_t(std::clamp((*rgb)[i], 0.0, 255.0) + 0.5);
         add_point(records.points, records.dropped, {(*position)[0], (*position)[1], (*position)[2]}, color,
                   [&] { return core::one_line(reconstruction.where() + ": " + place); });
@@ -156,7 +156,7 @@ ImageRecords import_open_sfm(const ImportSource& source) {
                                                               .values = size_t(1) << 25,
                                                               .not_finite = true});
     if (!top.is_array()) throw InputError(name + ": is not a list of reconstructions");
-    const JsonField reconstruction(largest(top, name), name);
+    const core::JsonField reconstruction(largest(top, name), name);
     ImageRecords records;
     records.program = source.file.parent_path().filename() == "opensfm" ? "OpenDroneMap" : "OpenSfM";
     records.files = {source.file};
@@ -170,7 +170,7 @@ ImageRecords import_open_sfm(const ImportSource& source) {
     const ImageFinder images(source.dataset, {"images"});
     records.folder = images.folder();
     for (const auto& [key, value] : reconstruction.members("shots").items()) {
-        const JsonField shot(value, name + ": shot \"" + key + "\"");
+        const core::JsonField shot(value, name + ": shot \"" + key + "\"");
         const auto camera = cameras.find(shot.text("camera"));
         if (camera == cameras.end()) shot.fail("its camera is not in the list of cameras");
         ImageRecord record = camera->second;

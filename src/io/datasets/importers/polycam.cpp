@@ -8,11 +8,11 @@
 
 #include "core/folders.h"
 #include "core/json.h"
+#include "core/json_field.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/importer.h"
-#include "io/datasets/importers/json_field.h"
 #include "io/datasets/rotation.h"
 
 namespace ewa::io {
@@ -27,7 +27,7 @@ ImageRecord read_polycam_camera(const fs::path& path, const ImageFinder& images)
     const std::string name = core::one_line(path.string());
     const nlohmann::json document =
         core::read_json_file<nlohmann::json>(path, {.bytes = kMostCameraBytes, .not_finite = true});
-    const JsonField field(document, name);
+    const core::JsonField field(document, name);
     if (!document.is_object()) field.fail("is not a JSON object");
     ImageRecord record = begin_record(images, path.stem().string(), field);
     Camera& camera = record.camera;

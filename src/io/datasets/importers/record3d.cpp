@@ -11,11 +11,11 @@
 
 #include "core/folders.h"
 #include "core/json.h"
+#include "core/json_field.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/importer.h"
-#include "io/datasets/importers/json_field.h"
 #include "io/datasets/rotation.h"
 
 namespace ewa::io {
@@ -25,14 +25,14 @@ namespace {
 using nlohmann::json;
 
 /// `count` finite numbers at that index of a list of lists.
-std::vector<double> numbers_at(const JsonField& top, const char* key, size_t index, size_t count) {
+std::vector<double> numbers_at(const core::JsonField& top, const char* key, size_t index, size_t count) {
     const json& entry = top.value()[key][index];
     const json wrapped{{"values", entry}};
-    return JsonField(wrapped, top.where() + ": \"" + key + "\" " + std::to_string(index))
+    return core::JsonField(wrapped, top.where() + ": \"" + key + "\" " + std::to_string(index))
         .numbers("values", count);
 }
 
-void set_record3d_intrinsics(const JsonField& top, size_t index, bool per_frame, Camera& camera) {
+void set_record3d_intrinsics(const core::JsonField& top, size_t index, bool per_frame, Camera& camera) {
     camera.width = top.side("w");
     camera.height = top.side("h");
     if (per_frame) {
@@ -50,7 +50,7 @@ void set_record3d_intrinsics(const JsonField& top, size_t index, bool per_frame,
     camera.cy = k[7];
 }
 
-void set_record3d_pose(const JsonField& top, size_t index, Camera& camera) {
+void set_record3d_pose(const core::JsonField& top, size_t index, Camera& camera) {
     const std::vector<double> p = numbers_at(top, "poses", index, 7);
     const glm::dquat q(p[3], p[0], p[1], p[2]);
     const double length = glm::length(q);
@@ -66,7 +66,7 @@ ImageRecords import_record3d(const ImportSource& source) {
     const std::string name = core::one_line(source.file.string());
     const json document = core::read_json_file<json>(source.file, {.not_finite = true});
     if (!document.is_object()) throw InputError(name + ": is not a JSON object");
-    const JsonField top(document, name);
+    const core::JsonField top(document, name);
     const size_t poses = top.list("poses").size();
     const bool per_frame = top.has("perFrameIntrinsicCoeffs") && !top.list("perFrameIntrinsicCoeffs").empty();
     if (per_frame && top.value()["perFrameIntrinsicCoeffs"].size() != poses)

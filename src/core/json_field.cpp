@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/datasets/importers/json_field.h"
+#include "core/json_field.h"
 
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -7,7 +7,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 
-namespace ewa::io {
+namespace ewa::core {
 
 namespace {
 
@@ -34,7 +34,7 @@ bool add_numbers(const nlohmann::json& list, int depth, std::vector<double>& num
 }  // namespace
 
 void JsonField::fail(const std::string& text) const {
-    throw InputError(core::one_line(where_ + ": " + text));
+    throw InputError(one_line(where_ + ": " + text));
 }
 
 bool JsonField::has(const char* key) const {
@@ -114,4 +114,4 @@ std::optional<std::vector<double>> three_numbers(const nlohmann::json& value) {
     return numbers;
 }
 
-}  // namespace ewa::io
+}  // namespace ewa::core

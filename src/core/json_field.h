@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace ewa::io {
+namespace ewa::core {
 
 class JsonField {
   public:
@@ -48,4 +48,4 @@ class JsonField {
 /// Three finite numbers; empty for anything else.
 std::optional<std::vector<double>> three_numbers(const nlohmann::json& value);
 
-}  // namespace ewa::io
+}  // namespace ewa::core
