@@ -99,11 +99,9 @@ constexpr std::array kRows{
         "--transform that stands right before. ewa-view measures points",
         scale_to},
     Row{"where", "FILTER",
-        "Keep only splats that pass the filter: COLUMN=LOW..HIGH, box=x,y,z,X,Y,Z or sphere=x,y,z,radius. A "
-        "bound "
-        "may be left out. Columns: x, y, z, opacity, scale (the largest), thickness (the smallest scale), "
-        "red, "
-        "green, blue, and of a training run views: the images in which the centre is",
+        "Keep only splats that pass the filter: COLUMN=LOW..HIGH, box=x,y,z,X,Y,Z or sphere=x,y,z,radius. "
+        "One bound is enough. Columns: x, y, z, opacity, scale (the largest), thickness (the smallest "
+        "scale), red, green, blue, and of a training run views: the images in which the centre is",
         where},
     Row{"crop", "x,y,z,X,Y,Z", "The same as --where box=x,y,z,X,Y,Z", crop},
     Row{"remove-invalid", "", "Remove splats with a value that is not finite, or a zero quaternion",
