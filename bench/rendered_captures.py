@@ -127,7 +127,7 @@ CAPTURES = {"corridor": (corridor, None), "twins": (twins, None), "nadir": (nadi
 def render(scene, out, lens, options):
     words = [options.ewa, "dataset", scene, "-o", out, "--size", options.size, "--samples", str(options.samples), "--points", "0", "--sky",
              "--quiet"]
-    subprocess.run([*words, *(("--lens", lens) if lens else ())], check=True)
+    subprocess.run([*words, *(("--through", lens) if lens else ())], check=True)
 
 
 def references(dataset):

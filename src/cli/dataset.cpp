@@ -94,7 +94,8 @@ Action add_dataset(CLI::App& app) {
                    "[those of the file if it has 8 or more, else 48]")
         ->transform(in_range(0, 100000))
         ->type_name("N");
-    app.add_option("--size", arguments->size, "Width and height in pixels [256x256, for equirect 256x128]")
+    app.add_option("--size", arguments->size,
+                   "Width and height in pixels [256x256, for equirectangular 256x128]")
         ->type_name("WxH");
     app.add_option("--samples", options.samples, "Paths per pixel")
         ->transform(in_range(1, 65536))
@@ -111,7 +112,7 @@ Action add_dataset(CLI::App& app) {
         "--vary-appearance", arguments->varied,
         "Give each image an exposure and colours of its own, and the camera a vignette and a response. "
         "DIR/appearance.json has them");
-    app.add_option("--lens", arguments->lens,
+    app.add_option("--through", arguments->lens,
                    std::string("The lens of all cameras, in place of a pinhole: ") + kLensForms)
         ->type_name("LENS");
     app.add_option("--rolling-shutter", arguments->shutter,

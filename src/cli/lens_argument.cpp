@@ -19,24 +19,24 @@ LensArgument lens_of(const std::string& text) {
     for (std::string word; std::getline(list, word, ',');) {
         const auto number = core::parse_number(word);
         if (!number || !std::isfinite(*number))
-            throw InputError("--lens: '" + word.substr(0, kShown) + "' is not a number; expected " +
+            throw InputError("--through: '" + word.substr(0, kShown) + "' is not a number; expected " +
                              kLensForms);
         numbers.push_back(*number);
     }
     const size_t most = name == "fisheye" ? 1 : name == "opencv" ? 4 : 0;
-    const bool good = name == "fisheye" || name == "equirect" || name == "ortho" ||
+    const bool good = name == "fisheye" || name == "equirectangular" || name == "orthographic" ||
                       (name == "opencv" && !numbers.empty() && numbers.size() != 3);
     if (!good || numbers.size() > most)
-        throw InputError("--lens: '" + text.substr(0, kShown) + "' is no lens; expected " + kLensForms);
+        throw InputError("--through: '" + text.substr(0, kShown) + "' is no lens; expected " + kLensForms);
     LensArgument out;
     if (name == "fisheye") {
         out.lens.lens = Lens::fisheye;
         if (!numbers.empty()) out.fisheye_degrees = numbers[0];
         if (!(out.fisheye_degrees > 0 && out.fisheye_degrees <= 360))
-            throw InputError("--lens: a fisheye shows more than 0 and at most 360 degrees");
-    } else if (name == "equirect") {
+            throw InputError("--through: a fisheye shows more than 0 and at most 360 degrees");
+    } else if (name == "equirectangular") {
         out.lens.lens = Lens::equirectangular;
-    } else if (name == "ortho") {
+    } else if (name == "orthographic") {
         out.lens.lens = Lens::orthographic;
     } else {
         numbers.resize(4);

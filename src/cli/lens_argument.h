@@ -8,14 +8,14 @@
 namespace ewa::cli {
 
 inline constexpr const char* kLensForms =
-    "fisheye[:DEGREES] (180), equirect, ortho or opencv:K1[,K2[,P1,P2]]";
+    "fisheye[:DEGREES] (180), equirectangular, orthographic or opencv:K1[,K2[,P1,P2]]";
 
 struct LensArgument {
     Distortion lens;
     double fisheye_degrees = 180;  // along the smaller side of a fisheye's image; above 0, at most 360
 };
 
-/// From text such as fisheye:190. Throws InputError that begins with --lens.
+/// From text such as fisheye:190. Throws InputError that begins with --through.
 LensArgument lens_of(const std::string& text);
 
 }  // namespace ewa::cli

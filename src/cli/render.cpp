@@ -42,7 +42,7 @@ namespace fs = std::filesystem;
 
 struct RenderArguments {
     fs::path splats, cameras, output = "out/render";
-    std::string frames = "all", format = "png", mode = "color", lens = "auto", codec;
+    std::string frames = "all", format = "png", mode = "color", through, codec;
     LensUse lens_use = LensUse::automatic;  // of a dataset's cameras
     AppearanceArguments appearance;
     int test_every = 8, downscale = 1, max_width = 0;
@@ -353,9 +353,8 @@ int render_free_views(RenderArguments arguments) {
 /// Completes the arguments by the run that SPLATS may name, and chooses whose cameras are used.
 int run(CLI::App& app, RenderArguments& arguments) {
     std::string of_frames;  // a given option that only a dataset's views have
-    for (const char* option : {"--frames", "--test-every", "--downscale", "--max-width"})
+    for (const char* option : {"--frames", "--test-every", "--downscale", "--max-width", "--lens"})
         if (app.count(option) > 0) of_frames = option;
-    if (arguments.lens == "native" || arguments.lens == "undistort") of_frames = "--lens " + arguments.lens;
     if (arguments.mode == "depth" && arguments.draw.integrator == "march")
         throw InputError("--mode depth: the integrator march draws no depth; the others do");
     if (!arguments.codec.empty() && views_output(arguments.output) != ViewsOutput::film)
@@ -365,10 +364,7 @@ int run(CLI::App& app, RenderArguments& arguments) {
     arguments.appearance.run = input.run ? input.run : folders::run_of_splats(arguments.splats);
     if (!arguments.cameras.empty()) arguments.cameras = dataset_input(arguments.cameras);
     if (input.run) use_options_of(*input.run, app, arguments.cameras);
-    if (const auto use = core::find_value(scene::kLensWords, arguments.lens))
-        arguments.lens_use = *use;
-    else
-        arguments.views.lens = lens_of(arguments.lens);
+    if (!arguments.through.empty()) arguments.views.lens = lens_of(arguments.through);
     if (!arguments.cameras.empty()) return render_dataset_views(arguments);
     const ViewsOutput output = views_output(arguments.output);
     const bool free = any_given(arguments.views) || (arguments.views.lens && of_frames.empty()) ||
@@ -421,13 +417,10 @@ Action add_render(CLI::App& app) {
         ->type_name("CODEC");
     add_picture_options(app, arguments->picture);
     add_draw_options(app, arguments->draw);
-    app.add_option(
-           "--lens", arguments->lens,
-           std::string("Lens to render through, in place of a pinhole: ") + kLensForms +
-               ". Or what becomes of the lenses of a dataset's cameras, as in ewa train: auto, native or "
-               "undistort")
-        ->type_name("LENS")
-        ->capture_default_str();
+    app.add_option("--through", arguments->through,
+                   std::string("Lens to render through, in place of a pinhole: ") + kLensForms)
+        ->type_name("LENS");
+    add_lens_option(app, arguments->lens_use);
     add_size_options(app, arguments->downscale, arguments->max_width);
     add_appearance_options(app, arguments->appearance);
     add_device_options(app, arguments->device);

@@ -194,7 +194,7 @@ Camera through(const LensArgument& lens, const Camera& camera, const glm::dvec3&
     if (lens.lens.lens != Lens::equirectangular) {
         const Camera seen = scene::through_lens(camera, lens.lens, lens.fisheye_degrees, middle);
         const std::string fault = scene::intrinsics_fault(seen, lens.lens);
-        if (!fault.empty()) throw InputError("--lens: " + fault);
+        if (!fault.empty()) throw InputError("--through: " + fault);
         return seen;
     }
     // A look straight down or up has its heading at the top or bottom of the image.

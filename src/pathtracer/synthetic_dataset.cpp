@@ -57,7 +57,7 @@ void check(const SyntheticOptions& o) {
         throw InputError("--lens: the angle is not in 0 .. 360");
     if (o.lens.lens == Lens::equirectangular && o.width != 2 * o.height)
         throw InputError(
-            "--lens equirect: a 360 degree image is twice as wide as high, as with --size 512x256");
+            "--through equirectangular: a 360 degree image is twice as wide as high, as with --size 512x256");
     if (o.rolling_shutter && !(std::abs(o.rolling_shutter->degrees) <= 90))
         throw InputError("--rolling-shutter: a readout turns by at most 90 degrees");
     if (o.rolling_shutter && !(o.rolling_shutter->percent >= 0 && o.rolling_shutter->percent <= 100))

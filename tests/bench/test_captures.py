@@ -37,7 +37,7 @@ if words[0] == "dataset":
     names = [node["name"] for node in scene["nodes"] if "camera" in node]
     (out / "images").mkdir(parents=True)
     for name in names:
-        (out / "images" / (name + ".png")).write_text(option("--lens") if "--lens" in words else "pinhole")
+        (out / "images" / (name + ".png")).write_text(option("--through") if "--through" in words else "pinhole")
     # The camera's right, up and back are the world's y, z and x: it looks along -x, three units from the origin.
     matrix = [[0, 0, 1, 3], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
     (out / "transforms.json").write_text(json.dumps({{"frames": [dict(file_path="images/" + name + ".png", transform_matrix=matrix)

@@ -124,11 +124,11 @@ TEST(Dataset, IsRenderedThroughLenses) {
     };
     const ewa::Dataset pinholes = rendered("pinhole", {});
     for (const auto& [text, lens] : {std::pair{"fisheye:190", ewa::Lens::fisheye},
-                                     {"equirect", ewa::Lens::equirectangular},
-                                     {"ortho", ewa::Lens::orthographic},
+                                     {"equirectangular", ewa::Lens::equirectangular},
+                                     {"orthographic", ewa::Lens::orthographic},
                                      {"opencv:-0.1,0.02,0.01,-0.01", ewa::Lens::brown}}) {
         SCOPED_TRACE(text);
-        const ewa::Dataset dataset = rendered(text, {"--lens", text});
+        const ewa::Dataset dataset = rendered(text, {"--through", text});
         const ewa::Camera& camera = dataset.frames[0].camera;
         EXPECT_EQ(camera.distortion.lens, lens);
         EXPECT_FALSE(camera.distortion.none());
@@ -136,28 +136,29 @@ TEST(Dataset, IsRenderedThroughLenses) {
         EXPECT_GT(dataset.points.positions.size(), 1900u) << "of the 2,000 that were asked for";
         expect_points_on_surfaces(dataset.points, pinholes, folder / "pinhole", 8);
     }
-    const Outcome info = run_ewa({"info", folder / "equirect"});
+    const Outcome info = run_ewa({"info", folder / "equirectangular"});
     EXPECT_NE(info.out.find("rendered through 360 degrees"), std::string::npos) << info.out;
     const Outcome fisheye = run_ewa({"info", folder / "fisheye:190"});
     EXPECT_NE(fisheye.out.find("undistorted on loading from a fisheye"), std::string::npos) << fisheye.out;
     for (const auto& [name, lens] : {std::pair{"pinhole", "pinhole"},
                                      {"fisheye:190", "fisheye"},
-                                     {"equirect", "equirectangular"},
-                                     {"ortho", "orthographic"},
+                                     {"equirectangular", "equirectangular"},
+                                     {"orthographic", "orthographic"},
                                      {"opencv:-0.1,0.02,0.01,-0.01", "opencv"}}) {
         const auto told = nlohmann::json::parse(run_ewa({"info", folder / name, "--json"}).out);
         EXPECT_EQ(told["cameras"][0]["lens"], lens);
     }
-    const Outcome square = run_ewa({"dataset", kScenes + "tea_table.gltf", "-o", folder / "no", "--lens",
-                                    "equirect", "--size", "96x96"});
+    const Outcome square = run_ewa({"dataset", kScenes + "tea_table.gltf", "-o", folder / "no", "--through",
+                                    "equirectangular", "--size", "96x96"});
     EXPECT_EQ(square.status, 2);
-    EXPECT_NE(square.err.find("--lens equirect: a 360 degree image is twice as wide as high"),
+    EXPECT_NE(square.err.find("--through equirectangular: a 360 degree image is twice as wide as high"),
               std::string::npos)
         << square.err;
-    for (const char* wrong : {"fishey", "fisheye:x", "opencv", "opencv:1,2,3", "equirect:2", "fisheye:400",
-                              "fisheye:1e-30", "opencv:1e300"})
+    for (const char* wrong : {"fishey", "fisheye:x", "opencv", "opencv:1,2,3", "equirectangular:2",
+                              "fisheye:400", "fisheye:1e-30", "opencv:1e300"})
         EXPECT_EQ(
-            run_ewa({"dataset", kScenes + "tea_table.gltf", "-o", folder / "no", "--lens", wrong}).status, 2)
+            run_ewa({"dataset", kScenes + "tea_table.gltf", "-o", folder / "no", "--through", wrong}).status,
+            2)
             << wrong;
 }
 
@@ -199,7 +200,7 @@ TEST(Dataset, IsRenderedByARollingShutter) {
             2)
             << wrong;
     EXPECT_EQ(run_ewa({"dataset", kScenes + "tea_table.gltf", "-o", folder / "no", "--rolling-shutter",
-                       "top-to-bottom:3", "--lens", "equirect"})
+                       "top-to-bottom:3", "--through", "equirectangular"})
                   .status,
               2);
 }

@@ -191,7 +191,7 @@ TEST_F(Pictures, ATransparentImageGoesOverAnyBackground) {
 TEST_F(Pictures, SizesOfScreensHaveNames) {
     place({{0, 0, 3}});
     EXPECT_EQ(image("p.png", {"--size", "720p"}).height, 720);
-    EXPECT_EQ(image("q.png", {"--size", "720p", "--lens", "equirect"}).height, 640);
+    EXPECT_EQ(image("q.png", {"--size", "720p", "--through", "equirectangular"}).height, 640);
     expect_failure(render("x.png", {"--size", "5k"}), 2, "--size");
 }
 
@@ -233,8 +233,8 @@ TEST_F(Pictures, WrongUse) {
         {{"--shutter", "0.5"}, "there is no motion"},
         {{"--focus", "2"}, "--focus needs"},
         {{"--aperture", "1", "--mode", "depth"}, "average colours"},
-        {{"--aperture", "1", "--lens", "equirect"}, "360"},
-        {{"--aperture", "1", "--lens", "fisheye:180"}, "pinhole"},
+        {{"--aperture", "1", "--through", "equirectangular"}, "360"},
+        {{"--aperture", "1", "--through", "fisheye:180"}, "pinhole"},
         {{"--codec", "av1"}, "only a film"}};
     for (const auto& [arguments, text] : cases) expect_failure(render("x.png", arguments), 2, text);
     EXPECT_FALSE(std::filesystem::exists(folder / "x.png"));

@@ -138,27 +138,28 @@ TEST_F(Views, ThroughALens) {
         expect_success(render(more));
         return load_image(folder / name);
     };
-    const Image all = image("all.png", {"--lens", "equirect", "--size", "400x200"});
+    const Image all = image("all.png", {"--through", "equirectangular", "--size", "400x200"});
     // The horizon is level: longitude and latitude in the world.
     const double left = std::atan2(5.0, 1.0), above = std::atan2(2.0, std::hypot(1.0, 5.0));
     const glm::dvec2 expected(200 - 200 * left / M_PI, 100 - 200 * above / M_PI);
     EXPECT_LT(glm::distance(bright_place(all), expected), 0.6);
     EXPECT_NE(read_file(folder / "all.png").find("GPano:ProjectionType=\"equirectangular\""),
               std::string::npos);
-    EXPECT_EQ(image("usual.jpg", {"--lens", "equirect"}).width, 2048);
+    EXPECT_EQ(image("usual.jpg", {"--through", "equirectangular"}).width, 2048);
     EXPECT_NE(read_file(folder / "usual.jpg").find("GPano:FullPanoWidthPixels=\"2048\""), std::string::npos);
 
-    EXPECT_EQ(image("depth.jpg", {"--mode", "depth", "--lens", "fisheye:200", "--size", "30x20"}).width, 30)
+    EXPECT_EQ(image("depth.jpg", {"--mode", "depth", "--through", "fisheye:200", "--size", "30x20"}).width,
+              30)
         << "a grey JPEG";
 
-    const Image fisheye = image("fisheye.png", {"--lens", "fisheye:200", "--size", "300x200"});
+    const Image fisheye = image("fisheye.png", {"--through", "fisheye:200", "--size", "300x200"});
     const glm::dvec3 axis = glm::normalize(glm::dvec3(4, 0, -1));
     const double angle = std::acos(glm::dot(axis, glm::normalize(glm::dvec3(place))));
     EXPECT_NEAR(glm::distance(bright_place(fisheye), glm::dvec2(150, 100)), glm::degrees(angle), 0.6)
         << "px for a degree: 200 px show 200 degrees";
     EXPECT_EQ(read_file(folder / "fisheye.png").find("GPano"), std::string::npos);
 
-    const Image parallel = image("parallel.png", {"--lens", "ortho", "--size", "300x200"});
+    const Image parallel = image("parallel.png", {"--through", "orthographic", "--size", "300x200"});
     const glm::dvec3 beside = glm::normalize(glm::cross(axis, glm::dvec3(0, 0, 1)));
     const glm::dvec2 at = bright_place(parallel) - glm::dvec2(150, 100);
     const double right = glm::dot(beside, glm::dvec3(place)),
@@ -168,16 +169,15 @@ TEST_F(Views, ThroughALens) {
 
 TEST_F(Views, WordsThatAreNoLens) {
     for (const char* lens :
-         {"fisheye:0", "fisheye:361", "fisheye:x", "equirect:2", "tele", "opencv:1,2,3", ""})
-        expect_failure(render({"-o", folder / "x.png", "--lens", lens}), 2, "--lens:");
+         {"fisheye:0", "fisheye:361", "fisheye:x", "equirectangular:2", "tele", "opencv:1,2,3", ""})
+        expect_failure(render({"-o", folder / "x.png", "--through", lens}), 2, "--through:");
     for (const char* lens : {"fisheye:1e-30", "opencv:1e300"})
-        expect_failure(render({"-o", folder / "x.png", "--lens", lens}), 2, "--lens: ");
-    const Outcome at_length = render({"-o", folder / "x.png", "--lens", std::string(3000, 'x')});
-    expect_failure(at_length, 2, "--lens: 'xxx");
+        expect_failure(render({"-o", folder / "x.png", "--through", lens}), 2, "--through: ");
+    const Outcome at_length = render({"-o", folder / "x.png", "--through", std::string(3000, 'x')});
+    expect_failure(at_length, 2, "--through: 'xxx");
     EXPECT_LT(at_length.err.size(), 300u);
     for (const std::string lens : {"native", "undistort"})
-        expect_failure(render({"-o", folder / "x.png", "--lens", lens}), 2,
-                       "--lens " + lens + " needs --cameras DATASET");
+        expect_failure(render({"-o", folder / "x.png", "--lens", lens}), 2, "--lens needs --cameras DATASET");
 }
 
 TEST_F(Views, TheMarkOfAntialiasingIsUsed) {
@@ -304,7 +304,7 @@ TEST_F(Views, ThatShowNothingAreSaid) {
     for (const char* mode : {"color", "alpha", "depth", "normal"})
         warned(with({"-o", folder / "x.png", "--mode", mode}), "x.png shows no splat");
     warned(with({"-o", folder / "x.exr", "--mode", "median-depth"}), "x.exr shows no surface");
-    warned(with({"-o", folder / "x.png", "--lens", "ortho"}), "x.png shows no splat");
+    warned(with({"-o", folder / "x.png", "--through", "orthographic"}), "x.png shows no splat");
     warned(with({"-o", folder / "x.png", "--background", "1,1,1"}), "x.png shows no splat");
     warned(with({"-o", folder / "x.png", "--integrator", "march"}), "x.png shows no splat");
     warned(with({"-o", folder / "x.png", "--points"}), "x.png shows no splat");
