@@ -43,7 +43,7 @@ Splats with_list(const Splats& splats, nb::handle list) {
 Splats transform(const Splats& splats, const nb::args& steps) {
     const glm::dmat4 matrix = matrix_of_steps(steps);
     return edited(splats, {{.text = "--transform",
-                            .place = [matrix](const glm::dmat4& before) { return matrix * before; }}});
+                            .place = [matrix](const glm::dmat4& before, auto&) { return matrix * before; }}});
 }
 
 /// A number, or a text as people type it.

@@ -35,6 +35,10 @@ _ADVICE = (
     ("a larger --test-every leaves more of them", "name some as train_frames="),
     ("with --transform move=", "by their means and origin"),
     ("with convert --crop", "with crop"),
+    (
+        "of the folder of a training run alone, before its splats move or others join them",
+        "with dataset= alone",
+    ),
     ("ewa cameras searches", "ewa.find_cameras searches"),
     ("ewa mesh makes meshes: ewa mesh IN -o ", "ewa.mesh makes meshes, such as "),
 )

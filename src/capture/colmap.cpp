@@ -36,7 +36,7 @@ constexpr int kMostCompared =
 constexpr int kMostPanoramas = 50;  // 360° photos, all pairs of which are compared
 constexpr int kNext = 2;            // photos that follow, which are compared whatever they look like
 constexpr const char* kMostFeatures = "3000";  // of a view; a 360° photo has six
-constexpr int kRounds = 2;                     // of a rig's bundle adjustment, each with new points
+constexpr int kRigRounds = 2;                  // of a rig's bundle adjustment, each with new points
 constexpr std::array kKnownLens{"--Mapper.ba_refine_focal_length", "0", "--Mapper.ba_refine_extra_params",
                                 "0"};
 constexpr size_t kSamePairs = 2000;  // that one thread verifies, so that the same ones pass each time
@@ -231,13 +231,13 @@ RigPoses adjust_rig(const Colmap& colmap, const PanoramaViews& views, RigPoses p
                     const fs::path& model) {
     const fs::path start = work / "rig", rig = work / "rig.json", points = work / "rig_points";
     const bool adjusts = colmap.has_option("rig_bundle_adjuster", "rig_config_path");
-    for (int round = 0; round < kRounds; ++round) {
+    for (int round = 0; round < kRigRounds; ++round) {
         write_rig(poses.photos, views, start, rig);
         for (const fs::path& folder : {points, model}) {
             fs::remove_all(folder);
             core::make_folder(folder);
         }
-        const CaptureProgress now{CapturePhase::cameras, "adjusted", "rounds", round, kRounds, {}};
+        const CaptureProgress now{CapturePhase::cameras, "adjusted", "rounds", round, kRigRounds, {}};
         const auto nothing = [](const std::string&) { return std::nullopt; };
         std::vector<std::string> words{"colmap",          "point_triangulator",
                                        "--database_path", argument(work / "database.db"),

@@ -18,11 +18,11 @@ constexpr int kSequence = 10;  // photos that follow, of a sequence
 constexpr int kFarthest = 512;
 constexpr int kLasting = 200;  // pairs, after which a killed search need not begin again
 
-using Places = std::vector<ImagePair>;
+using PairPlaces = std::vector<ImagePair>;
 
 /// How many prominent features the photos of each pair share.
 std::vector<int> shared_features(const FeatureDatabase& database, const std::vector<std::int64_t>& images,
-                                 const Places& pairs, const ProgressFunction& progress) {
+                                 const PairPlaces& pairs, const ProgressFunction& progress) {
     std::vector<Descriptors> prominent(images.size());
     on_all_cores({CapturePhase::matches, "read", "images", 0, int(images.size()), {}}, progress,
                  [&](size_t i) { prominent[i] = database.prominent(images[i], kProminent); });
@@ -61,7 +61,7 @@ std::optional<std::vector<ImagePair>> compare_photos(const std::filesystem::path
         const auto found = numbers.find(name.string());
         images.push_back(found == numbers.end() ? 0 : found->second);
     }
-    Places pairs = comparison.pairs;
+    PairPlaces pairs = comparison.pairs;
     if (comparison.by_look) {
         pairs = pairs_by_look(pairs, shared_features(database, images, pairs, progress), kEach);
         pairs.insert(pairs.end(), comparison.always.begin(), comparison.always.end());

@@ -15,10 +15,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int32_t kSimpleRadial = 2, kRadial = 3, kOpenCv = 4;  // COLMAP's numbers
-constexpr int kPhotosOfALens = 10;   // that determine four terms of distortion; or all photos
-constexpr uint32_t kHeldOutOf = 10;  // of the observations one is held out
-constexpr size_t kLeastTrack = 3;    // observations that a point keeps
-constexpr double kMostError = 16;    // px; a mismatch says nothing of a lens
+constexpr int kPhotosOfALens = 10;      // that determine four terms of distortion; or all photos
+constexpr uint32_t kHeldOutOf = 10;     // of the observations one is held out
+constexpr size_t kLeastTrack = 3;       // observations that a point keeps
+constexpr double kMostPixelError = 16;  // px; a mismatch says nothing of a lens
 constexpr size_t kLeastHeldOut = 50;
 constexpr double kChance = 2;  // standard errors
 
@@ -76,11 +76,11 @@ std::vector<double> errors_of(const SparseModel& adjusted, const std::vector<Hel
     for (const HeldOut& each : observations) {
         const auto camera = cameras.find(each.image);
         const auto point = adjusted.points.find(each.point);
-        double error = kMostError;
+        double error = kMostPixelError;
         if (camera != cameras.end() && point != adjusted.points.end())
             error = reprojection_error(camera->second, point->second.position,
                                        adjusted.images.at(each.image).features[each.feature].at);
-        errors.push_back(std::isfinite(error) ? std::min(error, kMostError) : kMostError);
+        errors.push_back(std::isfinite(error) ? std::min(error, kMostPixelError) : kMostPixelError);
     }
     return errors;
 }

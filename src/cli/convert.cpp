@@ -249,6 +249,7 @@ bool edit_scene(const ConvertArguments& arguments, Work& work, std::optional<fol
     if (!picture.empty()) std::erase_if(edits, [](const edit::Edit& edit) { return bool(edit.change); });
     const Gaussians before = picture.empty() ? Gaussians() : work.gaussians;
     const edit::Applied applied = edit::apply(work.gaussians, edits, cameras_of(run));
+    work.lost.insert(work.lost.end(), applied.remarks.begin(), applied.remarks.end());
     for (const edit::Outcome& outcome : applied.outcomes) {
         const std::string of = core::counted(outcome.before, "splat");
         if (!outcome.removes) {
@@ -275,12 +276,6 @@ bool edit_scene(const ConvertArguments& arguments, Work& work, std::optional<fol
     return false;
 }
 
-/// Whether the splats are in an order that the format keeps.
-bool is_sorted(const ConvertArguments& arguments) {
-    const auto& edits = arguments.editing.edits;
-    return !edits.empty() && edits.back().text == "--sort";
-}
-
 int run(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
     Work work;
@@ -297,8 +292,7 @@ int run(const ConvertArguments& arguments) {
     const size_t read = work.gaussians.size();
     std::optional<folders::Run> run = arguments.run;
     if (edit_scene(arguments, work, run)) return 0;
-    for (std::string& remark : io::match_file(work.gaussians, row, is_sorted(arguments)))
-        work.lost.push_back(std::move(remark));
+    for (std::string& remark : io::match_file(work.gaussians, row)) work.lost.push_back(std::move(remark));
 
     const SceneSize size = scene_size(work.gaussians);
     const size_t count = size.splats;

@@ -17,7 +17,9 @@ void add_edit_options(CLI::App& app, EditArguments& arguments) {
     for (const edit::Row& row : edit::rows()) {
         const std::string name = std::string("--") + row.name;
         if (*row.value == 0) {
-            app.add_flag(name, row.help)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+            app.add_flag(name, row.help)
+                ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+                ->disable_flag_override();
             continue;
         }
         app.add_option(name, row.help)
@@ -28,7 +30,7 @@ void add_edit_options(CLI::App& app, EditArguments& arguments) {
     }
     app.add_option("--dry-run", arguments.picture,
                    "Write only this picture, in which all that would be removed is red. OUT may be left out, "
-                   "and is not written")
+                   "and is not written. Edits that merge or sort splats are left out then")
         ->type_name("PICTURE");
     const std::vector<CLI::Option*> all = app.get_options();
     for (size_t i = others; i < all.size(); ++i) all[i]->group("Edits, in the order typed");

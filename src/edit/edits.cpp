@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "edit/edits.h"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <numeric>
+#include <utility>
 
 #include "core/text.h"
 #include "core/typing.h"
@@ -58,13 +61,17 @@ Edit fixed(const char* text) {
 
 Edit transform(const std::string& value) {
     return {.text = "--transform",
-            .place = [step = parse_transform({value})](const glm::dmat4& before) { return step * before; }};
+            .place = [step = parse_transform({value})](const glm::dmat4& before, auto&) {
+                return step * before;
+            }};
 }
 
 Edit scale_to(const std::string& value) {
     parse_scale_to(value);
-    return {.text = "--scale-to", .place = [value](const glm::dmat4& before) {
-                return glm::scale(glm::dmat4(1.0), glm::dvec3(parse_scale_to(value, before))) * before;
+    return {.text = "--scale-to", .place = [value](const glm::dmat4& before, auto& remarks) {
+                const double factor = parse_scale_to(value, before);
+                remarks.push_back(fmt::format("--scale-to: times {:.6g}", factor));
+                return glm::scale(glm::dmat4(1.0), glm::dvec3(factor)) * before;
             }};
 }
 
@@ -123,8 +130,8 @@ struct Steps {
     glm::dmat4 matrix{1.0};
     std::vector<std::string> names;
 
-    void add(const Edit& edit) {
-        matrix = edit.place(matrix);
+    void add(const Edit& edit, std::vector<std::string>& remarks) {
+        matrix = edit.place(matrix, remarks);
         if (std::ranges::find(names, edit.text) == names.end()) names.push_back(edit.text);
     }
     /// Whether they move the splats.
@@ -169,7 +176,7 @@ Applied apply(Gaussians& gaussians, std::span<const Edit> edits, const Cameras& 
     Steps steps;
     for (const Edit& edit : edits) {
         if (edit.place) {
-            steps.add(edit);
+            steps.add(edit, applied.remarks);
             continue;
         }
         applied.moved = steps.apply(gaussians) || applied.moved;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Edits of a whole scene: one row of a table each. ewa convert, Python and the window use the same rows.
+// Edits of a whole scene: one row of a table each. ewa convert and Python use the same rows.
 #pragma once
 #include <cstdint>
 #include <glm/mat4x4.hpp>
@@ -17,7 +17,8 @@ struct Edit {
     std::string text;  // such as "--where opacity=0.1.."
     Filter filter = {};
     /// Moves the scene. before: what the steps right before it do, which is not applied yet. Returns the matrix of all of them.
-    std::function<glm::dmat4(const glm::dmat4& before)> place = {};
+    /// Adds a line on what was found, if there is one.
+    std::function<glm::dmat4(const glm::dmat4& before, std::vector<std::string>& remarks)> place = {};
     /// Merges, reduces or sorts splats.
     std::function<void(Gaussians&)> change = {};
 };
@@ -42,6 +43,7 @@ struct Outcome {
 
 struct Applied {
     std::vector<Outcome> outcomes;  // of filters, and of other edits that have changed the number of splats
+    std::vector<std::string> remarks;  // of steps
     bool moved = false;
     std::vector<uint32_t>
         left;  // the numbers of the splats that filters have left, if nothing merges or sorts splats

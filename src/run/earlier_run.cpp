@@ -13,6 +13,7 @@
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
+#include "folders/former_options.h"
 #include "folders/run_folder.h"
 #include "io/datasets/dataset_folders.h"
 #include "report/summary.h"
@@ -80,9 +81,10 @@ void check_no_dataset(const fs::path& folder, const RunOptions& options) {
 
 /// Whether the file has options of a run alone.
 bool is_config(const fs::path& file) try {
-    const Json config = core::read_json_file<Json>(file);
+    const Json config = folders::with_present_names(core::read_json_file<Json>(file));
     const auto known = [](const auto& item) {
-        return std::ranges::any_of(run_options(),
+        return item.value() == false || item.value() == "" ||
+               std::ranges::any_of(run_options(),
                                    [&](const RunOption& option) { return option.name == item.key(); });
     };
     const auto items = config.items();

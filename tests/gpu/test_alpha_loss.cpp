@@ -73,8 +73,8 @@ TEST_P(AlphaLoss, ValueAndGradientMatchTheReference) {
                 pipeline::FrameInputs inputs{{nullptr, 0, uint32_t(width), uint32_t(height)}, {1, 1, 1}};
                 if (bands > 1) inputs.band = band;
                 r.run([&](gpu::Recording& recording) {
-                    pipeline::FramePasses{{recording, r.cache}, plan, frame, inputs}.loss(
-                        texels, false, nullptr, nullptr, true);
+                    pipeline::FramePasses{{recording, r.cache}, plan, frame, inputs}.loss(texels, false,
+                                                                                          nullptr, true);
                 });
                 EXPECT_TRUE(guarded.intact());
                 const shared::Counts counts = frame.read_counts();

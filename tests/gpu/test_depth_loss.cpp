@@ -62,7 +62,7 @@ TEST_P(DepthLoss, ValueAndGradientMatchTheReference) {
             rig().run([&](gpu::Recording& recording) {
                 recording.fill(frame.counts, 0, 0, sizeof(shared::Counts));
                 pipeline::FramePasses{{recording, rig().cache}, plan, frame, inputs}.loss(
-                    texels, false, nullptr, nullptr, alpha, {map, counted});
+                    texels, false, nullptr, alpha, {map, counted});
             });
             return frame.image_gradient.download<float>(frame.sizes.image_gradient / 4);
         };

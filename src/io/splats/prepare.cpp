@@ -76,10 +76,10 @@ bool is_prepared(const Gaussians& gaussians, const FormatRow& row) {
     return scene::is_computable(gaussians);
 }
 
-std::vector<std::string> match_file(Gaussians& gaussians, const FormatRow& row, bool morton) {
+std::vector<std::string> match_file(Gaussians& gaussians, const FormatRow& row) {
     std::vector<std::string> remarks;
     if (!row.undrawable) make_drawable(gaussians, remarks);
-    if (row.morton || morton) select_splats(gaussians, morton_order(gaussians));
+    if (row.morton) select_splats(gaussians, morton_order(gaussians));
     return remarks;
 }
 

@@ -16,8 +16,8 @@ std::vector<std::string> prepare(Gaussians& gaussians, const FormatRow& row);
 bool is_prepared(const Gaussians& gaussians, const FormatRow& row);
 
 /// Leaves the splats that the file will have, in its order, so that a file that is read back can be compared splat by splat. Their
-/// positions and opacities stay as they are. morton: put them in morton_order whatever the format.
-std::vector<std::string> match_file(Gaussians& gaussians, const FormatRow& row, bool morton = false);
+/// positions and opacities stay as they are.
+std::vector<std::string> match_file(Gaussians& gaussians, const FormatRow& row);
 
 /// The comments and the mark that the format drops.
 std::vector<std::string> dropped_remarks(const SaveOptions& options, const FormatRow& row);

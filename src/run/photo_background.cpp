@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prepare/photo_background.h"
+#include "run/photo_background.h"
 
 #include <algorithm>
 #include <array>
@@ -15,7 +15,7 @@
 namespace ewa::train {
 namespace {
 
-constexpr size_t kBackgroundImages = 16;
+constexpr size_t kMostImages = 16;
 // Enough that splats become opaque, and so little that its gradients disturb few: docs/experiments/background.md has figures.
 constexpr double kNoise = 0.4;
 // The mean is rounded, so that the same photos in other sizes have the same background.
@@ -43,7 +43,7 @@ Sum sum_of(const Frame& frame) {
 
 /// Nothing if a photo is transparent somewhere, or none has a pixel that counts.
 std::optional<std::array<float, 3>> mean_colour(const Dataset& dataset, const std::vector<int>& frames) {
-    const size_t count = std::min(kBackgroundImages, frames.size());
+    const size_t count = std::min(kMostImages, frames.size());
     std::vector<const Frame*> read;
     for (size_t k = 0; k < count; ++k)
         read.push_back(&dataset.frames[size_t(frames[k * frames.size() / count])]);
