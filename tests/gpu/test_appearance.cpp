@@ -284,7 +284,7 @@ TEST_P(ShownModel, DoesNotMoveWhereTheInstancesDidNotFit) {
     EXPECT_EQ(s.values(), s.start);
     show(s, guarded.frame, 1, guarded.frame.instance_capacity);  // they just fit
     std::vector<float> now = s.values();
-    const uint32_t own = s.appearances.photo_floats() * kShownPhoto;
+    const uint32_t own = s.appearances.layout.row_floats * kShownPhoto;
     EXPECT_NE(now[own], s.start[own]);
     if (GetParam() == AppearanceModel::ppisp) {
         EXPECT_NE(s.camera_values(now, 0)[0], s.camera_values(s.start, 0)[0]);
@@ -297,7 +297,7 @@ TEST_P(ShownModel, GivesOtherRanksWhatAViewLearns) {
     show(s, guarded.frame, 1);
     EXPECT_NE(s.values(), other.values());
     other.appearances.set(kShownPhoto, 0, s.appearances.words(kShownPhoto, 0));
-    const uint32_t floats = s.appearances.photo_floats();
+    const uint32_t floats = s.appearances.layout.row_floats;
     const auto of_photo = [&](const gpu::Buffer& buffer) {
         const auto all = buffer.download<float>(s.appearances.bytes() / 4);
         return std::vector<float>(all.begin() + floats * kShownPhoto,
