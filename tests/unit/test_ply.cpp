@@ -277,7 +277,7 @@ TEST(Ply, ADensityIsSavedAsOthersShowItAndReadAsItWas) {
     // The other formats hold these, too, and say so.
     const auto remarks = save_splats(folder / "c.spz", density, SaveOptions{});
     ASSERT_FALSE(remarks.empty());
-    EXPECT_NE(remarks.back().find("--kernel density"), std::string::npos) << remarks.back();
+    EXPECT_NE(remarks.front().find("--kernel density"), std::string::npos) << remarks.front();
     EXPECT_FALSE(load_splats(folder / "c.spz").density);
 }
 
