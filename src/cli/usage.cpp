@@ -22,11 +22,11 @@ const std::map<std::string, std::string>& subjects() {
         const auto add = [&made](const char* subject, std::initializer_list<const char*> names) {
             for (const char* name : names) made[name] = subject;
         };
-        add("Data",
-            {"cameras",   "frame",    "split", "transform", "exposures",    "appearance-of", "max-sh",
-             "sort",      "splats",   "cases", "decimate",  "level",        "bake-sky",      "views",
-             "size",      "look-at",  "up",    "orbit",     "film-seconds", "matching",      "visible",
-             "view-time", "aperture", "focus", "shutter",   "scene-splats", "geo",           "scale-to"});
+        add("Data", {"cameras",      "frame",        "split",   "transform", "exposures", "appearance-of",
+                     "max-sh",       "sort",         "splats",  "cases",     "decimate",  "level",
+                     "bake-sky",     "views",        "size",    "look-at",   "up",        "orbit",
+                     "film-seconds", "matching",     "visible", "view-time", "aperture",  "focus",
+                     "shutter",      "scene-splats", "geo",     "scale-to",  "through"});
         add("Quality", {"quality", "integrator", "samples", "runs", "training-steps", "blur-samples"});
         add("Output",
             {"output",    "format",    "mode",        "json",      "svg",         "heat-map", "heat-scale",

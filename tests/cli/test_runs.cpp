@@ -350,7 +350,7 @@ TEST_F(Runs, WrongExposuresAreNamed) {
         write_file(folder / "x.json", text);
         expect_failure(run_ewa({"eval", run, "--exposures", folder / "x.json"}), 2, reason);
     };
-    fails("[]", "the JSON is not an object of exposures");
+    fails("[]", "the JSON is not an object of appearances");
     fails(R"({"images/1.png": [[1, 0, 0, 0], [0, 1, 0, 0]]})", "three rows of four finite numbers");
     fails(R"({"images/1.png": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1]]})",
           "three rows of four finite numbers");

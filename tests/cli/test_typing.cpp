@@ -314,7 +314,7 @@ size_t longest_line(unsigned short columns) {
             text.append(buffer, size_t(count));
         }
     });
-    EXPECT_EQ(run_ewa({"train", "--help"}, {.out_path = name}).status, 0);
+    EXPECT_EQ(run_ewa({"train", "--help-all"}, {.out_path = name}).status, 0);
     EXPECT_EQ(write(held, "\x04", 1), 1);
     reader.join();
     close(held);

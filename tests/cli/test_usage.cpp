@@ -84,8 +84,11 @@ std::set<std::string> entries_of(const std::string& help) {
     std::set<std::string> entries;
     std::istringstream lines(help);
     for (std::string line; std::getline(lines, line);)
-        if (line.size() > 2 && line.starts_with("  ") && line[2] != ' ')
-            entries.insert(line.substr(2, line.find("  ", 2) - 2));
+        if (line.size() > 2 && line.starts_with("  ") && line[2] != ' ') {
+            constexpr size_t kDescriptions = 30;  // their column
+            const size_t end = std::min(line.find("  ", 2), kDescriptions);
+            entries.insert(line.substr(2, line.find_last_not_of(' ', end - 1) - 1));
+        }
     return entries;
 }
 
