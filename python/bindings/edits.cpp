@@ -113,7 +113,12 @@ void bind_edits(nb::class_<Splats>& splats) {
         .def(
             "decimate", [](const Splats& s, nb::handle count) { return with_number(s, "decimate", count); },
             "count"_a, nb::sig("def decimate(self, count: int | str) -> Splats"),
-            "Near splats merged until this number of them is left, or this part, such as \"50%\".");
+            "Near splats merged until this number of them is left, or this part, such as \"50%\".")
+        .def(
+            "sort",
+            [](const Splats& s, const std::string& order) { return edited(s, {edit::parse("sort", order)}); },
+            "order"_a = "morton",
+            "The splats in another order: \"morton\" puts neighbours in space next to each other.");
 }
 
 }  // namespace ewa::python

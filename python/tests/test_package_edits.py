@@ -16,6 +16,7 @@ EDITS = {
         ["--where=opacity=0.3..", "--where=scale=..0.2"],
     ),
     "scale_to": (lambda s: s.scale_to([0, 0, 0, 1, 0, 0, 3]), ["--scale-to=0,0,0,1,0,0,3"]),
+    "sort": (lambda s: s.remove_invalid().sort(), ["--remove-invalid", "--sort=morton"]),
     "max_sh": (lambda s: s.max_sh(1), ["--max-sh=1"]),
     "remove_invalid": (lambda s: s.remove_invalid(), ["--remove-invalid"]),
     "remove_floaters": (lambda s: s.remove_floaters(), ["--remove-floaters"]),

@@ -203,7 +203,7 @@ def test_every_option_in_an_error_of_libewa_is_an_argument():
         known |= set(re.findall(r"(\w+):", function.__nb_signature__[0][0]))
     known |= set(vars(ewa.Splats))
     found = {}
-    modules = "core image scene gpu io pipeline operators report live mesh train run ranks portions".split()
+    modules = "core image scene edit folders prepare gpu io pipeline operators report live mesh train run ranks portions".split()
     for path in (p for m in modules for p in (ROOT / "src" / m).rglob("*.cpp")):
         code = re.sub(r"//.*", "", path.read_text())
         for literal in re.findall(r'"(?:[^"\\\n]|\\.)*"', code):

@@ -231,8 +231,19 @@ std::vector<int> select_frames(const Dataset& dataset, const std::string& which,
     return frames;
 }
 
+namespace {
+
+/// A glTF of splats is one, too, where a dataset is expected: the reader of meshes says that it has none.
+bool is_scene_file(const fs::path& path) {
+    const What what = what_is(path);
+    const std::string extension = core::lower(path.extension().string());
+    return what == What::mesh || (what == What::splats && (extension == ".gltf" || extension == ".glb"));
+}
+
+}  // namespace
+
 Dataset load_cameras_as_trained(const fs::path& path, const CamerasInput& input) {
-    if (what_is(path) == What::mesh) {
+    if (is_scene_file(path)) {
         Dataset dataset = scene_cameras(path, {});
         for (Frame& frame : dataset.frames) {
             if (input.max_width > 0)
@@ -312,7 +323,7 @@ void add_view_options(CLI::App& app, ViewArguments& arguments) {
 Views load_views(const ViewArguments& arguments, const std::string& which, int test_every) {
     fs::path folder = arguments.dataset;
     std::unique_ptr<core::TemporaryFolder> rendered;
-    if (what_is(arguments.dataset) == What::mesh) {
+    if (is_scene_file(arguments.dataset)) {
         select_frames(scene_cameras(arguments.dataset, {}), which, test_every);
         folder = arguments.splats.parent_path() / folders::kMadeDataset;
         if (!is_rendered(arguments.dataset, folder, {})) {
