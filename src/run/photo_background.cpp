@@ -69,8 +69,8 @@ void choose_background(RunOptions& options, const Dataset& dataset, const std::v
     const bool automatic = std::exchange(options.automatic_background, false);
     const bool chosen = train.sky || train.random_background || train.render.points ||
                         train.render.background != RenderOptions().background;
-    // Where splats are still transparent, the noise would move cameras.
-    if (!automatic || chosen || train.refine_poses) return;
+    // Where splats are still transparent, the noise would move cameras, and look like what single images show.
+    if (!automatic || chosen || train.refine_poses || options.robust) return;
     const auto mean = mean_colour(dataset, frames);
     if (!mean) return;
     train.render.background = *mean;

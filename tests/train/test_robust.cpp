@@ -201,7 +201,9 @@ TEST(Robust, LeavesOutWhatSingleImagesShow) {
 TEST(Robust, LeavesAlmostNothingOutWhereImagesAgree) {
     TempFolder folder;
     const Visited data(false);
-    run_training(data.run(folder / "plain", false));
+    RunOptions plain = data.run(folder / "plain", false);
+    plain.automatic_background = false;  // as with robust
+    run_training(plain);
     Notes notes;
     run_training(data.run(folder / "robust", true), notes);
     EXPECT_TRUE(std::ranges::count(notes.lines, "robust: the images agree, and nothing is masked") == 1);
