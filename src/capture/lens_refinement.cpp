@@ -58,7 +58,7 @@ std::vector<HeldOut> hold_out(SparseModel& model) {
     for (auto& [id, point] : model.points) {
         auto& track = point.track;
         size_t kept = track.size();
-        std::erase_if(track, [&](const std::pair<uint32_t, uint32_t>& entry) {
+        std::erase_if(track, [&, id = id](const std::pair<uint32_t, uint32_t>& entry) {
             if (kept <= kLeastTrack || !is_held_out(entry.first, entry.second)) return false;
             --kept;
             taken.push_back({entry.first, entry.second, id});

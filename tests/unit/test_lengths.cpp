@@ -69,7 +69,7 @@ TEST(Lengths, OfSplatsAreChecked) {
     for (const auto& [name, call] : calls)
         for (const auto& [wrong, part] : test::wrong_splats()) {
             SCOPED_TRACE(name + ": " + part);
-            expect_refused([&] { call(wrong); }, part);
+            expect_refused([&call = call, &wrong = wrong] { call(wrong); }, part);
         }
     EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
@@ -154,7 +154,7 @@ TEST(Lengths, OfImagesAreChecked) {
     for (const auto& [name, call] : calls)
         for (const Image& image : wrong) {
             SCOPED_TRACE(name);
-            expect_refused([&] { call(image); }, "an image of ");
+            expect_refused([&call = call, &image] { call(image); }, "an image of ");
         }
     EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
     expect_refused([&] { check(wrong[0]); },
