@@ -10,6 +10,7 @@ struct Sums {
     vec3 gww;      // sum g u^2, g u v, g v^2
     vec3 color;
     vec2 absolute;
+    float depth;   // dL/d(depth of the mean), with UPDATE_DEPTH
 };
 
 struct FootprintGradient {

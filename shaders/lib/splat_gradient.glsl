@@ -41,4 +41,11 @@ SplatGradient splat_gradient(FootprintGradient f, StoredProjection stored, Store
     result.log_scale = f.log_scale;
     return result;
 }
+
+// by_depth: dL/d(depth of the mean), of the depth plane.
+void add_depth_gradient(inout SplatGradient g, float by_depth) {
+    const vec3 by_view = vec3(0.0, 0.0, by_depth);
+    g.view += by_view;
+    g.mean += transpose(camera_rotation()) * by_view;
+}
 #endif

@@ -43,7 +43,7 @@ Sums sums_of(vec3 shape_gradient, float compensation_gradient, Projection p) {
                    -2.0 * p.vy * p.vy * by_c);
     }
     const float g = COMPENSATIONS && p.factor > float(COMPENSATION_MIN) ? compensation_gradient * p.factor : 0.0;
-    return Sums(g, vec2(0.0), gww, vec3(0.0), vec2(0.0));
+    return Sums(g, vec2(0.0), gww, vec3(0.0), vec2(0.0), 0.0);
 }
 
 // Adds w (a b^T + b a^T) / 2 to a symmetric matrix, whose entries off the diagonal count both of their places.

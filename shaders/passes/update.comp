@@ -100,7 +100,7 @@ MotionGradients update_splat(uint i) {
                p2 = fetch(params, index_of(2, i));
     vec4 sum[SLOT_TEXELS];
     sum_slots(visible ? first_instances[i] : 0u, count, ABSOLUTE || BY_DEPTH_PLANE, sum);
-    Sums s = Sums(sum[0].x, sum[0].yz, vec3(sum[0].w, sum[1].xy), vec3(sum[1].zw, sum[2].x), sum[2].yz);
+    Sums s = Sums(sum[0].x, sum[0].yz, vec3(sum[0].w, sum[1].xy), vec3(sum[1].zw, sum[2].x), sum[2].yz, sum[2].w);
     const StoredSplat splat = StoredSplat(p0.xyz, p0.w, p1, p2.xyz);
     const StoredProjection stored = project_splat(splat);
     const Projection p = stored.footprint;
@@ -115,11 +115,7 @@ MotionGradients update_splat(uint i) {
 
     const FootprintGradient f = footprint_gradient(s, p);
     SplatGradient g = splat_gradient(f, stored, splat, s.g, direction, direction_gradient);
-    if (BY_DEPTH_PLANE) {
-        const vec3 by_depth = vec3(0.0, 0.0, sum[2].w);
-        g.view += by_depth;
-        g.mean += transpose(camera_rotation()) * by_depth;
-    }
+    if (BY_DEPTH_PLANE) add_depth_gradient(g, s.depth);
     const float depth = visible ? depth_of_splat(p) : 3.4e38;
 
     const vec4 zero = vec4(0.0);

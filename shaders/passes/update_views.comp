@@ -17,7 +17,8 @@
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
-const bool GRADIENT_ONLY = false, BANDS = (MODE & UPDATE_BANDS) != 0u;
+const bool GRADIENT_ONLY = false, BANDS = (MODE & UPDATE_BANDS) != 0u,
+           BY_DEPTH_PLANE = (MODE & UPDATE_DEPTH) != 0u;
 
 TEXELS(0, params);
 layout(set = 0, binding = 2, scalar) readonly buffer ListIndices { uint list_indices[]; };
@@ -32,17 +33,18 @@ layout(set = 0, binding = 10, scalar) buffer Statistics { vec2 statistics[]; };
 layout(push_constant, scalar) uniform Push { UpdateViewsPush push; };
 #include "lib/splat_update.glsl"
 
-const uint FLOATS = ABSOLUTE ? SUM_FLOATS_ABSOLUTE : SUM_FLOATS;
+const uint FLOATS = BY_DEPTH_PLANE ? SUM_FLOATS_DEPTH : ABSOLUTE ? SUM_FLOATS_ABSOLUTE : SUM_FLOATS;
 
 Sums sums_at(uint index) {
-    float s[SUM_FLOATS_ABSOLUTE];
-    s[9] = s[10] = 0.0;
+    float s[SUM_FLOATS_DEPTH];
+    s[9] = s[10] = s[11] = 0.0;
     [[unroll]] for (uint f = 0; f < FLOATS; ++f) s[f] = sums[FLOATS * index + f];
-    return Sums(s[0], vec2(s[1], s[2]), vec3(s[3], s[4], s[5]), vec3(s[6], s[7], s[8]), vec2(s[9], s[10]));
+    return Sums(s[0], vec2(s[1], s[2]), vec3(s[3], s[4], s[5]), vec3(s[6], s[7], s[8]), vec2(s[9], s[10]), s[11]);
 }
 
 Sums added(Sums a, Sums b) {
-    return Sums(a.g + b.g, a.gw + b.gw, a.gww + b.gww, a.color + b.color, a.absolute + b.absolute);
+    return Sums(a.g + b.g, a.gw + b.gw, a.gww + b.gww, a.color + b.color, a.absolute + b.absolute,
+                a.depth + b.depth);
 }
 
 // The sums of splat i over the bands of a view, in their order. Whether a band lists the splat.
@@ -89,7 +91,8 @@ void main() {
             by_sh[plane] = added(first, by_sh[plane], sh_gradient(plane, value, s.color, basis, direction_gradient));
         }
         const FootprintGradient f = footprint_gradient(s, p);
-        const SplatGradient g = splat_gradient(f, stored, splat, s.g, direction, direction_gradient);
+        SplatGradient g = splat_gradient(f, stored, splat, s.g, direction, direction_gradient);
+        if (BY_DEPTH_PLANE) add_depth_gradient(g, s.depth);
         by_mean = added(first, by_mean, vec4(g.mean, g.logit));
         by_quaternion = added(first, by_quaternion, g.quaternion);
         by_scale = added(first, by_scale, vec4(g.log_scale, basis.value[0] * s.color.r));

@@ -67,10 +67,11 @@ EWA_UINT(SLOT_TEXELS, 3u);
 // ---- A batch of views: each view has a list of the splats that reach a tile of it, in the order of the splats ----
 // A view may be cut into bands of tile rows. Then each band has a list.
 EWA_UINT(NOT_LISTED, 0xffffffffu);  // list index of a splat that is not in a list
-// Sums over the slots of a listed splat: the first 9 floats of a slot, with UPDATE_ABSOLUTE 11. The gradient of a colour
-// that is cut off at 0 is 0.
+// Sums over the slots of a listed splat: the first 9 floats of a slot, with UPDATE_ABSOLUTE 11, with UPDATE_DEPTH all 12. The
+// gradient of a colour that is cut off at 0 is 0.
 EWA_UINT(SUM_FLOATS, 9u);
 EWA_UINT(SUM_FLOATS_ABSOLUTE, 11u);
+EWA_UINT(SUM_FLOATS_DEPTH, 12u);
 
 // ---- An instance for a part of its tile, with SPEC_PARTS ----
 // A part is a block of PART_SIZE x PART_SIZE pixels, or of the tile's width. Its number, row by row, is in the bits of
@@ -507,7 +508,9 @@ struct AlphaPush {
 
 struct DepthPush {
     ImageLayout image;
-    float scale;  // d(loss)/d|difference of the logarithms| of one pixel
+    uint first_pixel;  // of the depth map: the image's first
+    uint own[2];       // first and one-past-last of the rows that the loss counts
+    float scale;       // d(loss)/d|difference of the logarithms| of one pixel
 };
 
 struct ReducePush {

@@ -19,7 +19,7 @@ static_assert(sizeof(BlendPush) == 48 && offsetof(BlendPush, capacity) == 44);
 static_assert(sizeof(RayPush) == 56);
 static_assert(sizeof(CollectPush) == 20 && sizeof(GatherPush) == 12);
 static_assert(sizeof(UnpackPush) == 32 && sizeof(MaskPush) == 20 && sizeof(LossPush) == 36 &&
-              sizeof(AlphaPush) == 32 && sizeof(DepthPush) == 20 && sizeof(ReducePush) == 20);
+              sizeof(AlphaPush) == 32 && sizeof(DepthPush) == 32 && sizeof(ReducePush) == 20);
 static_assert(sizeof(ImageLayout) == 16 && sizeof(PackPush) == 4);
 static_assert(sizeof(PpispPush) == 24 && sizeof(PpispUpdatePush) == 36 && sizeof(PpispCameraPush) == 24 &&
               sizeof(GridPush) == 32 && sizeof(GridUpdatePush) == 32);

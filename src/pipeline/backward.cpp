@@ -113,18 +113,22 @@ void FramePasses::compare_alpha(const gpu::Buffer& photo, bool cut, const shared
 }
 
 /// The depths of a photo as a term of the loss, and the gradient by the planes of depth and transmittance.
-void FramePasses::compare_depth(const DepthUse& depths) const {
-    const shared::ImageLayout image = frame.sizes.image();
+void FramePasses::compare_depth(const DepthUse& depths, const shared::MaskPush& at,
+                                const shared::LossPush& loss) const {
+    const shared::ImageLayout& image = at.image;
     const uint64_t plane = uint64_t(image.plane_floats) * 4;
     if (plan.loss.alpha == 0) recording.fill(frame.image_gradient, 0, shared::PLANE_T * plane, plane);
     if (!depths.map) return recording.fill(frame.image_gradient, 0, shared::PLANE_DEPTH * plane, plane);
-    const double share =
-        1.0 / (depths.pixels > 0 ? double(depths.pixels) : double(image.size[0]) * image.size[1]);
+    const uint32_t height = inputs.band.rows > 0 ? inputs.camera.height : image.size[1];
+    const double share = 1.0 / (depths.pixels > 0 ? double(depths.pixels) : double(image.size[0]) * height);
     record(passes::DepthLoss{.planes = frame.planes,
                              .depths = *depths.map,
                              .image_gradient = frame.image_gradient,
                              .partials = frame.partials},
-           {.image = image, .scale = float(plan.loss.depth * share)});
+           {.image = image,
+            .first_pixel = at.first_pixel,
+            .own = {loss.own[0], loss.own[1]},
+            .scale = float(plan.loss.depth * share)});
     // The partial sums of one channel.
     mean_of_partials(shared::REDUCE_TO_DEPTH, frame.sizes.partials / 3, 1, float(share));
 }
@@ -164,7 +168,7 @@ void FramePasses::loss(const gpu::Buffer& photo, bool masked, const AppearanceUs
         record(passes::MaskGradient{.photo = photo, .image_gradient = frame.image_gradient}, mask, colors);
     mean_of_partials(shared::REDUCE_TO_L1, frame.sizes.partials, plan.loss.l2 > 0 ? 3 : 2, float(share));
     if (plan.loss.alpha > 0) compare_alpha(photo, cut, mask, push);
-    if (plan.loss.depth > 0) compare_depth(depths);
+    if (plan.loss.depth > 0) compare_depth(depths, mask, push);
     if (appearance) appearance_backward(*appearance);
 }
 

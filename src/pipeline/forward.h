@@ -98,7 +98,8 @@ struct FramePasses : passes::Recorder {
     void compare(const gpu::Buffer& image, const shared::LossPush& push, float share) const;
     void compare_alpha(const gpu::Buffer& photo, bool cut, const shared::MaskPush& at,
                        const shared::LossPush& loss) const;
-    void compare_depth(const DepthUse& depths) const;
+    void compare_depth(const DepthUse& depths, const shared::MaskPush& at,
+                       const shared::LossPush& loss) const;
     void mean_of_partials(uint32_t target, uint32_t items, uint32_t rows, float scale) const;
     void apply_appearance(const AppearanceUse& use) const;
     void appearance_backward(const AppearanceUse& use) const;

@@ -58,7 +58,10 @@ shared::UpdateViewsPush update_views_push(const Model& model, const Rates& rates
 }  // namespace
 
 uint64_t ViewBuffers::sum_bytes(const Plan& plan, uint64_t splats) {
-    return 4 * splats * (plan.absolute ? shared::SUM_FLOATS_ABSOLUTE : shared::SUM_FLOATS);
+    return 4 * splats *
+           (plan.loss.depth > 0 ? shared::SUM_FLOATS_DEPTH
+            : plan.absolute     ? shared::SUM_FLOATS_ABSOLUTE
+                                : shared::SUM_FLOATS);
 }
 
 uint64_t ViewBuffers::most_bytes(const Plan& plan, uint64_t splats, uint64_t views, uint64_t bands) {
@@ -150,7 +153,8 @@ void FramePasses::list_backward(uint32_t splats, const Sorted& sorted, const gpu
                             .sorted_indices = *sorted.indices,
                             .sums = sums},
            {.splats = splats, .first_index = first_index},
-           {{shared::SPEC_MODE, plan.absolute ? shared::UPDATE_ABSOLUTE : 0}});
+           {{shared::SPEC_MODE, (plan.absolute ? shared::UPDATE_ABSOLUTE : 0) |
+                                    (plan.loss.depth > 0 ? shared::UPDATE_DEPTH : 0)}});
 }
 
 void FramePasses::update_views(const Model& model, const ViewBuffers& buffers, const Rates& rates,

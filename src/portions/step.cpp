@@ -90,6 +90,7 @@ void add_losses(const LossWeights& weights, std::span<const PartLoss> losses, si
             view.terms.l2 += band.terms.l2;
             view.terms.ssim += band.terms.ssim;
             view.terms.alpha += band.terms.alpha;
+            view.terms.depth += band.terms.depth;
             view.squared += band.squared;
         }
         sums.loss += loss_of(weights, view.terms) / double(views);

@@ -32,9 +32,6 @@ inline bool compares_point_depths(const TrainOptions& options) {
     return options.loss.sfm_depth > 0;
 }
 
-inline constexpr std::string_view kDepthReason =
-    "the gradient by the depth of a splat is gathered within the one picture that shows it";
-
 inline constexpr std::array kExclusions{
     Exclusion{"--points",
               [](const TrainOptions& options) { return options.render.points; },
@@ -48,8 +45,6 @@ inline constexpr std::array kExclusions{
               [](const TrainOptions& options) { return options.refine_poses; },
               {true, true, true, true},
               "a camera learns while the splats of its own step are moved"},
-    Exclusion{"--loss depth", compares_depth_maps, {true, true, true, true}, kDepthReason},
-    Exclusion{"--loss sfm-depth", compares_point_depths, {true, true, true, true}, kDepthReason},
     Exclusion{"--appearance",
               [](const TrainOptions& options) {
                   const AppearanceModel model = options.appearance;

@@ -58,6 +58,14 @@ struct SeenScene {
     }
 };
 
+/// Of which three in four pixels have one.
+std::vector<float> some_depths(uint64_t seed) {
+    Random random(seed + 400);
+    std::vector<float> depths(size_t(kWidth) * kHeight);
+    for (float& depth : depths) depth = std::max(0.0f, float(random.uniform(-2, 6)));
+    return depths;
+}
+
 /// The device's step of a scene's views, whose parts are the bands of one view after those of another.
 struct Step {
     uint32_t bands;
@@ -65,7 +73,7 @@ struct Step {
     Model model;
     FrameBuffers frame;
     ViewBuffers buffers;
-    std::vector<gpu::Buffer> cameras, photos;
+    std::vector<gpu::Buffer> cameras, photos, depths;
     std::vector<uint32_t> first_indices{0};
     std::vector<std::vector<float>> renders;
 
@@ -78,6 +86,8 @@ struct Step {
         for (size_t v = 0; v < seen.cameras.size(); ++v) {
             cameras.push_back(camera_buffer(seen.cameras[v], rig().config()));
             photos.push_back(upload_photo(*device(), seen.targets[v]));
+            depths.emplace_back(*device(), "depth map", 4ull * kWidth * kHeight);
+            depths.back().upload(std::span<const float>(some_depths(uint64_t(v))));
         }
         reserve(kHeight);
         buffers.reserve(*device(), model.splats, uint32_t(cameras.size()), bands, model.splats);
@@ -89,7 +99,8 @@ struct Step {
                        .height = height,
                        .instances = 1 << 16,
                        .gradients = true,
-                       .overlaid = true});
+                       .overlaid = true,
+                       .loss = plan.loss});
     }
     FrameInputs inputs(const SeenScene& seen, size_t view_part) const {
         FrameInputs result{.camera = {&cameras[view_part / bands], 0, uint32_t(kWidth), uint32_t(kHeight)},
@@ -122,7 +133,7 @@ struct Step {
         recording.copy(buffers.visible, 0, frame.records, 0, 48ull * listed(view_part));
         const FramePasses on{{recording, r.cache}, plan, frame, drawn};
         const pipeline::Sorted sorted = on.draw_list(listed(view_part));
-        on.loss(photos[view_part / bands]);
+        on.loss(photos[view_part / bands], false, nullptr, false, {&depths[view_part / bands]});
         on.list_backward(listed(view_part), sorted, buffers.sums, first_indices[view_part]);
         r.executor.run(recording);
         renders.push_back(frame.planes.download<float>(frame.sizes.planes / 4));
@@ -399,12 +410,16 @@ void expect_same_floats(const gpu::Buffer& a, const gpu::Buffer& b, size_t count
     }
 }
 
-/// Against the kernel of a step of one view, whose bytes runs of one rank have.
+/// Against the kernel of a step of one view, whose bytes runs of one rank have. Packed moments go with gradients of single
+/// pixels, and depths with the kernel that the other two do not have.
 TEST(ViewBatch, AStepOfOneViewHasTheBytesOfTheFusedKernel) {
     for (const bool packed : {false, true})
         for (const Footprint kernel : {Footprint::peak, Footprint::antialias, Footprint::density}) {
             const SeenScene seen(100, 400, 1, SplatKind::mixed, kernel);
+            const bool by_depth = kernel == Footprint::antialias;
             const PlanRequest request{.render = {},
+                                      .loss = {.depth = by_depth ? 0.5 : 0},
+                                      .depths = by_depth,
                                       .statistics = true,
                                       .absolute_gradients = packed,
                                       .packed_moments = packed,
@@ -420,7 +435,7 @@ TEST(ViewBatch, AStepOfOneViewHasTheBytesOfTheFusedKernel) {
                 const FrameInputs inputs = fused.inputs(seen, 0);
                 const FramePasses on{{recording, rig().cache}, fused.plan, fused.frame, inputs};
                 const pipeline::Sorted sorted = on.forward(fused.model);
-                on.loss(fused.photos[0]);
+                on.loss(fused.photos[0], false, nullptr, false, {fused.depths.data()});
                 on.backward(fused.model, sorted, rates);
                 rig().executor.run(recording);
             }
@@ -429,6 +444,21 @@ TEST(ViewBatch, AStepOfOneViewHasTheBytesOfTheFusedKernel) {
             if (!packed) expect_same_floats(split.model.moments1, fused.model.moments1, floats, 1e-3);
             expect_same_floats(split.model.statistics, fused.model.statistics, 800, 1e-5);
         }
+}
+
+/// Each band compares its own rows of the depth maps.
+TEST(ViewBatch, DepthsOfBandsAreThoseOfTheirView) {
+    const SeenScene seen(97, 300, 2, SplatKind::ordinary);
+    const PlanRequest request{
+        .render = {}, .loss = {.l1 = 0, .ssim = 0, .depth = 1}, .depths = true, .statistics = true};
+    Step whole(seen, request), cut(seen, request, 3);
+    for (Step* step : {&whole, &cut}) step->update(seen, some_rates(1));
+    const size_t floats = parameter_bytes(300, 2) / 4;
+    const auto moved = whole.model.moments1.download<float>(floats);
+    const auto by_bands = cut.model.moments1.download<float>(floats);
+    EXPECT_GT(std::ranges::count_if(moved, [](float m) { return m != 0; }), 300);
+    for (size_t i = 0; i < floats; ++i)
+        ASSERT_NEAR(moved[i], by_bands[i], 1e-7 + 1e-3 * std::abs(moved[i])) << i;
 }
 
 TEST(ViewBatch, WhatNoViewSeesMovesByItsMomentsAlone) {
