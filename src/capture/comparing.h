@@ -18,8 +18,8 @@ struct Comparison {
     std::vector<ImagePair> pairs;        // of places in `names`
     bool by_look = false;                // only those that probably show the same things
     std::vector<ImagePair> always = {};  // compared in any case
-    bool pass_over_others =
-        false;  // all other pairs are marked, so that COLMAP's exhaustive matcher passes over them
+    /// Marks all other pairs, so that COLMAP's exhaustive matcher skips them.
+    bool pass_over_others = false;
 };
 
 /// Compares pairs of photos on all cores, unless the database has their matches. names: of the images, in the order that the

@@ -17,8 +17,8 @@ struct JsonLimits {
     size_t objects = size_t(1) << 20;
     size_t values = size_t(1) << 22;  // lists and scalars
     bool comments = false;            // whether // and /* */ are allowed between values
-    bool not_finite =
-        false;  // whether NaN, Infinity and -Infinity, which Python writes, are numbers; all become NaN
+    /// Reads NaN, Infinity and -Infinity as numbers, because Python writes them. All become NaN.
+    bool not_finite = false;
     std::string_view skipped = {};  // values of this key are neither kept nor counted; empty: none
     uint64_t begin = 0;             // offset of the text in its file, for errors
 };

@@ -61,8 +61,8 @@ struct SurfaceDifference {
     double f_score() const {
         return precision + recall > 0 ? 2 * precision * recall / (precision + recall) : 0;
     }
-    double normal_error =
-        0;  // degrees: mean angle of A's normals to those of B, without their signs; NaN with a scan
+    /// Mean angle between the normals of A and B without their signs, degrees. NaN with a scan.
+    double normal_error = 0;
 };
 
 SurfaceDifference difference(const Surface& a, const Surface& b, const SurfaceComparison& comparison);

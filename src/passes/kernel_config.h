@@ -31,8 +31,8 @@ struct KernelConfig {
     uint32_t broadcast = shared::BROADCAST_SHUFFLES;  // of blending: SPEC_BROADCAST
     uint32_t frames_in_flight = 1;                    // training steps that are submitted and not finished
     bool texel_buffers = true;  // read-only buffers are texel buffers, or storage buffers
-    float cut_off =
-        float(shared::ALPHA_MIN);  // smaller contributions are skipped; other values compare speed
+    /// Smaller alphas are skipped. Benchmarks change it to compare speed.
+    float cut_off = float(shared::ALPHA_MIN);
 };
 
 constexpr uint32_t kRankedBytes = 32768;  // of shared memory, at most, in radix_scatter_ranked.comp

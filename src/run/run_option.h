@@ -23,8 +23,8 @@ struct RunOption {
     bool& (*flag)(RunOptions&) = nullptr;  // the member of a flag
     /// The value of runs from before the option existed, as on the command line. Empty: it has always existed.
     std::string before = {};
-    std::string subject =
-        {};  // the heading in the help; empty: an advanced option, which the help does not show
+    /// The heading in the help. Empty: an advanced option, which the help does not show.
+    std::string subject = {};
     std::string brief = {};   // in the short help; empty: only the whole help has the option
     std::string python = {};  // the argument of ewa.Trainer; empty: it has none
 };

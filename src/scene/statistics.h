@@ -23,8 +23,8 @@ T quantile(std::vector<T>& values, double share) {
 /// The middle of values, and how far they are from it.
 struct Center {
     double median = 0;
-    double deviation =
-        0;  // the standard deviation of a normal distribution with the same median absolute deviation
+    /// The standard deviation of a normal distribution with the same median absolute deviation.
+    double deviation = 0;
 };
 
 /// The centre of the values, which few outliers do not change. Zeros without values. Overwrites the values. O(n).

@@ -81,8 +81,8 @@ void write_points_ply(const std::filesystem::path& path, const PointCloud& point
 struct ColmapModel {
     std::filesystem::path folder;        // of the files
     std::filesystem::path dataset = {};  // the folder that the images are in or below
-    std::filesystem::path originals =
-        {};  // above that folder: it and those between also may have them; empty: no other folder has
+    /// A folder above that one. It and the folders between may have images too. Empty: no other folder has any.
+    std::filesystem::path originals = {};
     std::string extension = ".bin";  // or .txt
     uint64_t images = 0;             // only counted where there are several models
 };
