@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a camera does to the colours of a training image, as training learns it.
+// The appearance of training images: how a camera changes their colours. Training learns it.
 #pragma once
 #include <array>
 #include <filesystem>
@@ -52,29 +52,29 @@ using Appearance = std::variant<Exposure, Ppisp, ColorGrid>;
 
 /// Throws InputError unless a ColorGrid has all of its cells. Functions that take an Appearance call it.
 void check(const Appearance& appearance);
-/// The same for each, and unless all have one model.
+/// Checks each of them. Throws InputError also unless all have one model.
 void check(const std::vector<Appearance>& appearances);
 
-/// The first three channels as the camera shows them. Other channels stay. Ppisp clamps to 0..1. Throws InputError for fewer
-/// than 3 channels.
+/// Applies the appearance to the first three channels, colours as the splats have them. Other channels stay. Ppisp clamps to 0..1.
+/// Throws InputError for fewer than 3 channels.
 Image with_appearance(Image image, const Appearance& appearance);
 
-/// What views show that training has not seen. Neighbouring photos of a camera that exposes by itself have similar appearances, so
-/// a new view's is between those of the photos near it: a mean with weights of 1 / distance^4 (Shepard 1968). Where that would
-/// predict the brightness of the training images worse, each from the others, it is the mean over all images, or with Exposure the splats'
-/// own colours.
+/// The appearance of views that training has not seen. Neighbouring images of a camera with automatic exposure look alike. So a new
+/// view gets a mean of the training images' appearances, with weights of 1 / distance^4 between the cameras (Shepard 1968).
+/// That rule is tested first: it predicts the brightness of each training image from the others. If it predicts worse than one
+/// appearance for all places, all views get that one: the mean over all images, or with Exposure none, the splats' own colours.
 class NewViewAppearance {
   public:
-    /// There is none.
+    /// Without appearances.
     NewViewAppearance() = default;
     /// centers: of the images' cameras, in world coordinates; empty: unknown. Throws InputError for appearances of several models,
     /// for another number of centres, and for centres that are not finite.
     explicit NewViewAppearance(std::vector<Appearance> of_images, std::vector<glm::dvec3> centers = {});
 
-    /// The appearance of a view from this place in world coordinates. Empty without appearances.
+    /// The appearance of a view whose camera has this centre in world coordinates. Empty without appearances.
     std::optional<Appearance> at(const glm::dvec3& center) const;
 
-    /// Whether it differs from place to place.
+    /// Whether the appearance depends on the camera's centre.
     bool is_local() const { return !centers_.empty(); }
 
   private:

@@ -37,7 +37,7 @@ struct Distortion {
 /// Where the sensor of a rolling shutter begins to read the image.
 enum class ReadoutFrom { top, bottom, left, right };
 
-/// A rolling shutter, which reads a row or column after another. Camera's own pose is that of the border where the readout begins.
+/// A rolling shutter, which reads one row or column after another. Camera's own pose is that at the border where the readout begins.
 /// Between the poses the camera turns at a constant rate about one axis, and its centre moves along a line.
 struct Readout {
     ReadoutFrom from = ReadoutFrom::top;
@@ -46,6 +46,7 @@ struct Readout {
     glm::dvec3 translation{0.0};
 };
 
+/// A view: pose, intrinsics, lens and shutter.
 struct Camera {
     int width = 0, height = 0;              // px
     double fx = 0, fy = 0, cx = 0, cy = 0;  // px; (cx, cy) from the image's top left corner
@@ -63,7 +64,7 @@ struct Camera {
 /// InputError for a factor below 1.
 Camera downscale(const Camera& camera, int factor);
 
-/// The same view in an image of another size in px.
+/// The same view in an image of another size in px: focal lengths and principal point follow it, per axis.
 Camera resized(const Camera& camera, int width, int height);
 
 }  // namespace ewa

@@ -5,23 +5,23 @@
 
 namespace ewa {
 
-/// The motion (w, s, f) of a camera with rotation W, centre e and focal lengths: exp(w) W, e + W^T s, exp(f) times the
-/// focal lengths. W and e of a rolling shutter are those of the middle of the readout. During the readout, the camera turns by
-/// `readout_turn` more, and its centre moves by `readout_shift` more. These two do nothing with a global shutter.
+/// The motion (w, s, f) of a camera with rotation W and centre e. The moved camera has the rotation exp(w) W, the centre e + W^T s, and
+/// exp(f) times the focal lengths. W and e of a rolling shutter are those of the middle of the readout. During the readout, the
+/// camera turns by `readout_turn` more, and its centre moves by `readout_shift` more. Global shutters ignore these two.
 struct CameraMotion {
     glm::dvec3 rotation{0.0};      // w: axis times angle, radians, camera axes
     double log_focal = 0;          // f
     glm::dvec3 shift{0.0};         // s: world units, along the camera's axes before the motion
     glm::dvec3 readout_turn{0.0};  // radians, camera axes
-    glm::dvec3 readout_shift{
-        0.0};  // world units, along the axes of the moved camera at the middle of the readout
+    /// World units, along the axes of the moved camera at the middle of the readout.
+    glm::dvec3 readout_shift{0.0};
     bool operator==(const CameraMotion&) const = default;
 };
 
-/// The turn of a readout is at most shared::READOUT_TURN_LEARNED.
+/// The camera after the motion. The turn of a readout is clamped to shared::READOUT_TURN_LEARNED.
 Camera moved(const Camera& camera, const CameraMotion& motion);
 
-/// How far a camera is from another one of the same image, at the middle of the readout.
+/// The distance between two cameras of one image, at the middle of the readout.
 struct CameraDistance {
     double degrees = 0;  // between their rotations
     double length = 0;   // between their centres, world units

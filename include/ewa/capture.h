@@ -12,7 +12,7 @@
 
 namespace ewa {
 
-/// Which pairs of images are compared.
+/// Which pairs of images COLMAP compares.
 enum class Matching {
     automatic,  // those that look as if they showed the same things, up to 1,000 images; else sequence. 360° photos: unordered up to 50
     sequence,   // each image with those that follow it in the order of names
@@ -23,7 +23,8 @@ enum class Matching {
 inline constexpr int kFewestVideoFrames = 3, kMostVideoFrames = 100000;
 
 struct CaptureOptions {
-    int frames = 300;  // of a video, about; the sharpest of each of as many equal parts is taken
+    int frames =
+        300;  // of a video, about: it is divided into as many equal parts, and each gives its sharpest frame
     Matching matching = Matching::automatic;
     bool level = true;  // false: the world keeps COLMAP's axes
 };
@@ -42,17 +43,17 @@ struct CaptureProgress {
 };
 
 struct Capture {
-    int images = 0;                       // given to COLMAP
+    int images = 0;                       // that COLMAP got
     int placed = 0;                       // that have a camera
-    bool interrupted = false;             // the other members are then not known
-    std::vector<std::string> not_placed;  // names
+    bool interrupted = false;             // true: the other members are not known
+    std::vector<std::string> not_placed;  // names of images without a camera
     std::vector<std::string> remarks;     // for the user: a line each
     /// A line on the world's axes and scale. Empty: they are COLMAP's, or of an earlier search.
     std::string axes;
 };
 
-/// Whether the path is a video by its extension, a zip archive, or a folder with photos or videos that load_dataset does not
-/// read because it has no cameras.
+/// Whether the path is a video by its extension, a zip archive, or a folder of photos or videos without cameras, which
+/// load_dataset does not read. It throws nothing.
 bool is_capture(const std::filesystem::path& path);
 
 /// Whether the dataset is made of frames: the path is a video by its extension, or a folder with videos and no photos.
@@ -62,7 +63,8 @@ struct CaptureContents {
     std::string text;   // "8 photos"
     std::string masks;  // a line on the photos' masks; empty if there are none
 };
-/// The photos or videos that make_dataset would take of a folder or video. Throws InputError.
+/// Counts the photos or videos that make_dataset would take from a folder or video. Throws InputError: a folder that
+/// cannot be read, HEIC that no program converts, a link that leads out of the folder.
 CaptureContents capture_contents(const std::filesystem::path& path);
 
 /// Whether the path is a zip archive by its extension and its first bytes.
@@ -73,17 +75,18 @@ bool archive_has_cameras(const std::filesystem::path& archive);
 /// RunError.
 std::filesystem::path unpack_archive(const std::filesystem::path& archive,
                                      const std::filesystem::path& folder);
-/// Unpacks the dataset of an archive into a temporary folder, and calls `read` with it. An InputError of `read` names the archive
-/// and the entry in place of the folder. Returns what keeps the folder. Throws InputError for an archive without cameras, and as
-/// unpack_archive does.
+/// Unpacks the dataset of an archive into a temporary folder, and calls `read` with it. The folder exists while the returned value
+/// does. An InputError of `read` names the archive and the entry in place of the folder. Throws InputError for an archive without
+/// cameras, and as unpack_archive does.
 std::shared_ptr<const void> read_archive(
     const std::filesystem::path& archive,
     const std::function<void(const std::filesystem::path& folder)>& read);
 
-/// The size of the smallest photo, or of the video's frames. 0 x 0 where that cannot be known before make_dataset.
+/// The size of the smallest photo, or of the video's frames, px. 0 x 0 if that is not known before make_dataset. Throws InputError
+/// for a video that cannot be read.
 ImageSize smallest_image(const std::filesystem::path& input);
 
-/// The dataset that has cameras of the images in this folder, which is one of its own; empty if there is none.
+/// The dataset that `folder` is the images folder of, and that has their cameras. Empty: there is none.
 std::filesystem::path dataset_of_images(const std::filesystem::path& folder);
 
 /// Throws InputError that says what the path is, unless is_capture holds or it has the files of a dataset. Also for a
@@ -93,19 +96,21 @@ void check_training_input(const std::filesystem::path& path);
 /// Makes a dataset of a folder of photos, a video, a folder of videos, or a zip archive. Photos are JPEG, PNG, TIFF or BMP, and
 /// HEIC or AVIF where a program converts them. Subfolders count. An archive is
 /// unpacked into unpacked/. If it holds a dataset, that becomes the folder's, and nothing is searched.
-/// - images: the frames of the videos, or a link to the photos' folder, or the photos with those that were converted.
+/// - images: the frames of the videos, or a link to the photos' folder, or a folder with converted photos and the others beside them.
 /// - masks: those that lie among the photos, or in masks/ beside their folder.
 /// - sparse/0: COLMAP's model, made last. A lens has one radial term, or OpenCV's radial and tangential terms where many photos
 ///   share it and determine them. 360° photos get the lens of all directions.
-///   With `level`, y of its world points down where the photos determine it. Where the photos' GPS says so, x points east, z north, and a unit is a metre.
+///   With `level`, y of its world points down where the photos determine that. With GPS in the photos, x points east, z north, and
+///   a unit is a metre.
 /// - place.json: the place of the world's origin on the globe, where GPS says it.
 /// - colmap/: what COLMAP needs to continue, and log.txt with what the programs print.
 /// - capture.json: input, options, and what distinguishes the contents of the photos or the video. A folder with the
 ///   same ones is continued; what is done is kept.
 ///
 /// progress is called at least every tenth of a second; false ends the run. Throws InputError: no such input, a folder
-/// of something else, too few photos, HEIC that no program converts. Also where photos or a video have changed since, ffmpeg cannot read the
-/// video, or COLMAP cannot place the photos. Throws RunError: ffmpeg or colmap is missing or fails, disk.
+/// of something else, too few photos, HEIC that no program converts, a video that ffmpeg cannot read. It also throws InputError if
+/// photos or a video have changed since the search began, or if COLMAP finds no cameras. Throws RunError: ffmpeg or colmap is
+/// missing or fails, disk.
 Capture make_dataset(const std::filesystem::path& input, const std::filesystem::path& folder,
                      const CaptureOptions& options,
                      const std::function<bool(const CaptureProgress&)>& progress);

@@ -27,28 +27,29 @@ enum class MaskUse {
     none        // masks and alpha are not used
 };
 
-/// What becomes of images through other lenses than a pinhole.
+/// How images through other lenses than a pinhole are used.
 enum class LensUse {
-    /// native for 360 degrees and parallel rays, which no pinhole shows; else undistort
+    /// native for 360 degrees and parallel rays, which no pinhole shows; else undistort.
     automatic,
     native,    // splats are rendered through the lens; images stay as they are
     undistort  // images are resampled to those of a pinhole
 };
 
-/// The result of load_frame_image for a frame with these values.
+/// The result of load_frame_image, for a Frame with the same `downscale` and `left_out`.
 struct KeptImage {
     Image image;
     int downscale = 1;
     std::shared_ptr<const Image> left_out;
 };
 
+/// An entry of a dataset: an image, its camera, and what belongs to it.
 struct Frame {
     std::string name;                  // in the dataset, e.g. "0001.jpg"
     std::filesystem::path image_path;  // may not exist: see image_exists
     bool image_exists = false;
     int orientation = 1;    // EXIF orientation to apply; 1 unless the camera belongs to the turned image
     bool eight_bit = true;  // the file has at most 256 levels
-    Camera camera;          // of load_frame_image's result: a pinhole, or with LensUse::native the lens
+    Camera camera;          // of load_frame_image's result: a pinhole; with LensUse::native, with the lens
     Camera source;          // the camera of the file's pixels, before undistortion and downscaling
     bool reduced = false;   // DatasetOptions::max_width has made `source` smaller than the file
     std::filesystem::path mask_path;   // empty: none
@@ -62,14 +63,14 @@ struct Frame {
     std::optional<std::array<float, 3>> behind;
     /// Indices in Dataset::points of the points that the reconstruction saw in this image. Null: the dataset does not say.
     std::shared_ptr<const std::vector<uint32_t>> seen;
-    /// The median distance between these points' images and where the reconstruction saw them, px of its image, whose size may not
-    /// be that of the file. 0: not known.
+    /// The median reprojection error of these points. In px of the reconstruction's image, which may have another size than the
+    /// file. 0: not known.
     float point_error = 0;
     Distortion distortion;  // of the file, which load_frame_image takes out; none with LensUse::native
     Camera pinhole;         // `camera` before downscaling
     int downscale = 1;      // factor that is applied to the file, which may be a smaller copy already
     int split = 0;          // 1 train, 2 test; 0: split_frames decides
-    /// The frame's image, for as long as somebody keeps it who has read it before.
+    /// The frame's image, while another owner caches it. load_frame_image then needs not read the file again.
     std::weak_ptr<const KeptImage> kept;
 
     /// Whether alpha in load_frame_image's result is the weight of pixels.
@@ -81,11 +82,11 @@ struct PointCloud {
     std::vector<std::array<uint8_t, 3>> colors;  // sRGB
 };
 
-/// How many things of a kind a dataset has, and how many of them are used.
+/// How many files, points or models of a kind a dataset has, and how many of them are used.
 struct UsedOf {
     std::string what;  // "photo", "mask", "depth map", "point" or "model"
-    std::string where =
-        {};  // the folder of the photos, relative to the dataset's, if it is not images; empty: it is
+    /// The images' folder, relative to the dataset's. Empty: images/.
+    std::string where = {};
     uint64_t used = 0, found = 0;
     std::string why = {};  // the first that is not used, and why; empty: all are
 };
@@ -102,10 +103,10 @@ struct Dataset {
     /// False if the dataset has "view_dependent": false. Then SH degree 0 suffices.
     bool color_depends_on_view = true;
     std::string format, program;  // of the cameras; the program may be unknown, and empty
-    double frame_rate =
-        0;  // of a path of cameras for a film, which has no images: frames per second; 0: no path
-    std::vector<std::string> notes;  // what of the cameras' file is skipped
-    std::vector<UsedOf> used;        // what was found, and is used; only what is there
+    /// Frames per second, if the cameras are the path of a film, which has no images. 0: they are not.
+    double frame_rate = 0;
+    std::vector<std::string> notes;  // contents of the cameras' file that are skipped, one line each
+    std::vector<UsedOf> used;        // counts of each kind that the dataset has
 };
 
 /// One line on Dataset::used: "8 of 8 photos, 0 of 8 masks (masks/0.png matches no photo), 200 points".
@@ -116,15 +117,15 @@ struct DatasetOptions {
     MaskUse masks = MaskUse::automatic;
     LensUse lens = LensUse::automatic;
     bool need_images = true;  // false: only cameras; frames without a file are kept if the size is known
-    bool need_points =
-        true;  // false: the points of a transforms.json, which are in a file of their own, are not read
-    int max_width =
-        0;  // px; wider images are reduced so that they have this width after `downscale`; 0: none are
+    /// False: the points of a transforms.json are not read. They are in a file of their own.
+    bool need_points = true;
+    /// Images that are wider after `downscale` are reduced to this width, px. 0: none are.
+    int max_width = 0;
 };
 
 /// Loads a dataset. There are four kinds of paths:
-/// - A folder with a COLMAP model (.bin or .txt, in sparse/0 and so on, sparse, the folder itself, or a workspace such as dense/0) and
-///   images. The model with the most images counts.
+/// - A folder with images and a COLMAP model (.bin or .txt). The model is in sparse/0 and so on, in sparse, in the folder itself, or
+///   in a workspace such as dense/0. The model with the most images counts.
 /// - A folder with transforms.json, or with transforms_train.json and transforms_test.json.
 /// - A folder with the cameras of another program: Metashape, RealityScan, OpenSfM, OpenDroneMap, OpenMVG, Polycam or Record3D.
 /// - One of these files. src/io/datasets/transforms.cpp has the dialects, and src/io/datasets/importers/ the other formats.
@@ -140,7 +141,7 @@ struct DatasetOptions {
 /// made, an image that is cut off or no image counts as missing. Throws InputError.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options);
 
-/// What holds a frame's camera: the points that the reconstruction saw in its image.
+/// The points that the reconstruction saw in a frame's image. They determine its camera.
 struct CameraSupport {
     size_t points = 0;
     float error = 0;  // Frame::point_error
@@ -150,11 +151,11 @@ struct CameraSupport {
     };
     std::vector<Neighbor> neighbors;  // the frames that see most of the same points, the most first
 };
-/// That of each frame, with at most `most` neighbours each. Empty where the dataset does not say which frame sees which points.
+/// One for each frame, with at most `most` neighbours each. Empty if the dataset does not say which frame sees which points.
 std::vector<CameraSupport> camera_support(const Dataset& dataset, size_t most = 3);
-/// "312 points, 0.42 px; most in common with b.jpg (120) and c.jpg (88)".
+/// A text such as "312 points, 0.42 px; most in common with b.jpg (120) and c.jpg (88)".
 std::string support_text(const Dataset& dataset, const CameraSupport& support);
-/// "b.jpg (120) and c.jpg (88)". Empty without neighbours.
+/// A text such as "b.jpg (120) and c.jpg (88)". Empty without neighbours.
 std::string neighbors_text(const Dataset& dataset, const CameraSupport& support);
 
 /// Throws InputError unless `frames` are indices into dataset.frames. Functions that take both call it.
@@ -172,21 +173,22 @@ struct TrainingImage {
     Image image;    // RGB, composited over the background if masks cut
     Image weights;  // one channel, the weight of each pixel; empty if all count
 };
+/// Throws InputError as load_frame_image does. background: RGB.
 TrainingImage load_training_image(const Frame& frame, const std::array<float, 3>& background);
 
 /// Indices of train and test frames. A frame's own split wins. Otherwise it is a test frame if its index in
 /// the order of names is a multiple of test_every, as in INRIA's code and gsplat. test_every 0: all are train
-/// frames, also those of a dataset that would hold all out.
+/// frames, also if the dataset holds all of them out.
 struct Split {
     std::vector<int> train, test;
 };
 Split split_frames(const Dataset& dataset, int test_every);
 
 /// 1.1 times the largest distance of a camera from the cameras' mean position (INRIA's cameras_extent,
-/// getNerfppNorm). Throws InputError for frames that the dataset lacks.
+/// getNerfppNorm), world units. Throws InputError for frames that the dataset lacks.
 double scene_extent(const Dataset& dataset, const std::vector<int>& frames);
 
-/// One splat per point, as in INRIA's create_from_pcd: identity rotation, opacity 0.1, colour in SH degree 0.
+/// One splat per point, as in INRIA's create_from_pcd: identity rotation, opacity 0.1, colour in SH degree 0. World frame.
 /// The scale is the root of the mean squared distance to the 3 nearest neighbours, which is at least 1e-7.
 /// With fewer neighbours, the mean is over these; a single point has scale 1. Throws InputError without
 /// points, if one is not finite or has no colour, or for an SH degree that is not 0 to 3.

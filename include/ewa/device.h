@@ -20,8 +20,8 @@ struct DeviceInfo {
     std::string api_version;         // "1.3.230"
     uint32_t subgroup_size = 0;      // lanes
     uint64_t memory_bytes = 0;       // of the largest device-local heap
-    std::string unusable;            // empty, or what it lacks
-    std::vector<std::string> lacks;  // of a usable device: what ewa does without, and what follows from it
+    std::string unusable;            // why ewa cannot use it; empty: it can
+    std::vector<std::string> lacks;  // features that a usable device lacks, with the consequence of each
 };
 
 /// Every Vulkan device of this machine, in the loader's order. Throws RunError when there is no Vulkan
@@ -29,25 +29,27 @@ struct DeviceInfo {
 std::vector<DeviceInfo> list_devices();
 
 struct DeviceOptions {
-    std::string selector;  // empty: the first usable discrete, integrated, virtual, then CPU device;
-                           // a number: that index; else a case-insensitive part of the name
-    bool validation =
-        false;  // turn the Khronos validation layer on; its messages become RunError at the next submit
-    bool own_queue = true;  // take a queue without graphics where there is one: work and desktop do not
-                            // wait for each other
+    /// Empty: the first usable discrete, integrated, virtual, then CPU device. A number: that index. Else a case-insensitive part
+    /// of the name.
+    std::string selector;
+    /// Turns the Khronos validation layer on. Its messages become a RunError at the next submission.
+    bool validation = false;
+    /// Takes a queue without graphics if there is one. Work and desktop then do not wait for each other.
+    bool own_queue = true;
 };
 
 /// Renderers and trainers of one device share the shaders that it has compiled: the second starts faster.
 /// Throws InputError when the selector names no usable device (the text lists those there are), RunError when
 /// the driver fails.
 std::shared_ptr<gpu::Device> open_device(const DeviceOptions& options);
+/// The entry of list_devices for an open device.
 DeviceInfo device_info(const gpu::Device& device);
 
-/// Device memory held now and at most so far, in bytes.
+/// Device memory that the device's buffers take now, and the most that they took so far, in bytes.
 uint64_t device_bytes(const gpu::Device& device);
 uint64_t peak_device_bytes(const gpu::Device& device);
 
-/// The time that a device took for the commands of one name.
+/// The time of a pass on the device.
 struct PassTime {
     std::string pass;
     double milliseconds = 0;

@@ -15,6 +15,7 @@
 
 namespace ewa {
 
+/// The figures of one frame.
 struct EvalFrame {
     std::string name;  // Frame::name
     double psnr = 0;   // dB
@@ -22,7 +23,7 @@ struct EvalFrame {
     std::vector<Figure> figures;  // of Measures::meter
 };
 
-/// How renders and images are compared. docs/figures.md tells what each protocol does.
+/// How renders and images are compared. docs/figures.md describes each protocol.
 enum class Protocol {
     ewa,            // values as they are
     nerfbaselines,  // as NeRFBaselines: 8-bit values, SSIM without the image's rim
@@ -36,7 +37,7 @@ struct Measures {
 };
 
 struct Evaluation {
-    double psnr = 0, ssim = 0;    // means over `frames`; NaN without any
+    double psnr = 0, ssim = 0;    // dB and 1; means over `frames`, NaN without any
     std::vector<Figure> figures;  // means; NaN if a frame has NaN
     std::vector<EvalFrame> frames;
     double seconds = 0;  // wall time

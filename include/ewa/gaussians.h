@@ -15,22 +15,25 @@ constexpr int sh_coefficients(int degree) {
     return (degree + 1) * (degree + 1);
 }
 
+/// n splats. Each array has the length of its comment; check() tests that.
 struct Gaussians {
     int sh_degree = 0;  // 0..3
-    glm::dvec3 origin{
-        0.0};  // world; zero unless the scene is far from the world's origin, see set_world_means
+    /// World units. Zero unless the scene is far from the world's origin, see set_world_means.
+    glm::dvec3 origin{0.0};
     std::vector<float> means;           // 3 n, world units, relative to `origin`
     std::vector<float> quaternions;     // 4 n, w x y z, any non-zero norm
     std::vector<float> log_scales;      // 3 n, natural logarithm of the standard deviations in world units
     std::vector<float> opacity_logits;  // n
-    bool density = false;               // opacity_logits are parameters of Footprint::density
-    std::vector<float> sh;              // n * (degree + 1)^2 * 3: coefficient after coefficient, RGB inner
+    bool density =
+        false;  // opacity_logits are parameters of Footprint::density, which fit_opacities converts
+    std::vector<float> sh;  // n * (degree + 1)^2 * 3: coefficient after coefficient, RGB inner
 
     size_t size() const { return opacity_logits.size(); }
     /// The position of splat i in the world.
     glm::dvec3 world_mean(size_t i) const {
         return origin + glm::dvec3(means[3 * i], means[3 * i + 1], means[3 * i + 2]);
     }
+    /// The number of SH values of a splat.
     size_t sh_stride() const { return size_t(sh_coefficients(sh_degree)) * 3; }
     void resize(size_t n) {
         means.resize(3 * n);
@@ -55,11 +58,11 @@ int sh_degree_present(const Gaussians& gaussians);
 /// that are not finite. Throws InputError unless there is one position for each splat.
 void set_world_means(Gaussians& gaussians, const std::vector<glm::dvec3>& positions);
 
-/// The same with the scene's own positions. They move by at most float32's rounding.
+/// Calls set_world_means with the scene's own positions. They move by at most float32's rounding.
 void settle_origin(Gaussians& gaussians);
 
-/// Whether splat i < size can be visible: its quaternion is not zero, and its values are finite. Only an opacity may be infinite,
-/// which hides all or is never seen, and the logarithm of a scale may be minus infinity, of a flat splat.
+/// Whether splat i < size can be visible: its quaternion is not zero, and its values are finite. Two exceptions are drawable: an
+/// infinite opacity logit (opacity 0 or 1), and a log scale of minus infinity (a flat splat).
 bool drawable(const Gaussians& gaussians, size_t i);
 
 }  // namespace ewa

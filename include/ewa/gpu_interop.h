@@ -20,8 +20,8 @@ namespace ewa {
 
 class Renderer;
 
-/// What libewa uses of a device. VkDeviceCreateInfo::pNext points to `features`, and pEnabledFeatures is null. Its extensions are
-/// `extensions`. A program adds what it uses itself to the members and to the end of the chain, and its
+/// The extensions and features of a device that libewa uses. VkDeviceCreateInfo::pNext points to `features`, and pEnabledFeatures is null. Its extensions are
+/// `extensions`. A program adds its own needs to the members and to the end of the chain, and its
 /// VkPhysicalDeviceVulkan13Features by use(). libewa cannot do without
 /// VkPhysicalDeviceVulkan12Features::scalarBlockLayout. Without the other features and the extensions it is slower.
 struct DeviceNeeds {
@@ -34,8 +34,8 @@ struct DeviceNeeds {
     VkPhysicalDeviceVulkan12Features vulkan12{};                   // its second
     VkPhysicalDeviceSubgroupSizeControlFeatures subgroup_sizes{};  // its third, where the device has this
 
-    /// Puts the program's structure in the place of subgroup_sizes, whose features it gets: Vulkan allows only one of both in a
-    /// chain. Its pNext stays. For instances and devices of Vulkan 1.3.
+    /// Puts the program's structure into the chain in place of subgroup_sizes, and enables the features of that in it. Vulkan allows
+    /// only one of both in a chain. Its pNext stays. For instances and devices of Vulkan 1.3.
     void use(VkPhysicalDeviceVulkan13Features& vulkan13);
 };
 
@@ -47,8 +47,8 @@ struct VulkanDevice {
     VkQueue queue = VK_NULL_HANDLE;             // for compute; all work of libewa goes there
     uint32_t queue_family = 0;                  // the queue's
     uint32_t api_version = VK_API_VERSION_1_3;  // VkApplicationInfo::apiVersion of the instance
-    /// What the device was created with, or a structure that says the same: Vulkan does not tell which features and extensions
-    /// are enabled. Read during borrow_device alone.
+    /// The structure that the device was created with, or an equal one: Vulkan does not tell which features and extensions are
+    /// enabled. Only borrow_device reads it.
     const VkDeviceCreateInfo* created_with = nullptr;
     /// Submits to the queue in place of vkQueueSubmit, for a program whose threads share the queue: Vulkan allows one of them
     /// at a time. Null: no other thread may use the queue while a function of libewa runs.
@@ -66,8 +66,8 @@ struct DeviceImage {
     VkExtent2D size{};   // px, of the mip level
     VkOffset2D place{};  // px; where the render's top left corner goes
     uint32_t mip_level = 0, array_layer = 0;
-    VkImageLayout layout_before =
-        VK_IMAGE_LAYOUT_UNDEFINED;  // undefined: nothing of the level and layer is kept
+    /// VK_IMAGE_LAYOUT_UNDEFINED: the earlier contents of the level and layer are lost.
+    VkImageLayout layout_before = VK_IMAGE_LAYOUT_UNDEFINED;
     VkImageLayout layout_after = VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL;
     /// For an image of VK_SHARING_MODE_EXCLUSIVE that another queue family uses next: that family, whose queue then acquires
     /// the image with the same layouts, TRANSFER_DST_OPTIMAL and layout_after.
@@ -79,11 +79,11 @@ struct DeviceBuffer {
     VkBuffer buffer = VK_NULL_HANDLE;
     VkDeviceSize size = 0;   // bytes, of the buffer
     VkDeviceSize begin = 0;  // bytes; where the render's first row begins, a multiple of 4
-    VkDeviceSize row_bytes =
-        0;  // from a row to the next, a multiple of 4; 0: rows follow each other without a gap
+    /// Bytes from the start of a row to that of the next, a multiple of 4. 0: rows have no gap between them.
+    VkDeviceSize row_bytes = 0;
 };
 
-/// Where a render goes, and what of it. Rows go from top to bottom.
+/// Where a render is written, and which of its planes: the format decides. Rows go from top to bottom.
 /// - VK_FORMAT_R32G32B32A32_SFLOAT: Rendering::color and Rendering::alpha, the same values. The background is blended in. Over
 ///   a black one, the colour is multiplied by alpha.
 /// - VK_FORMAT_R8G8B8A8_UNORM and VK_FORMAT_R8G8B8A8_SRGB: the same as bytes, rounded and clamped as save_image does it. The
@@ -97,8 +97,8 @@ struct DeviceTarget {
 
 /// Semaphores of a render, each null for none. Values are those of timeline semaphores; 0: a binary one.
 struct DeviceSync {
-    VkSemaphore wait =
-        VK_NULL_HANDLE;  // before the targets are written. What signals it must have been submitted
+    /// The targets are written after its signal, which must have been submitted before.
+    VkSemaphore wait = VK_NULL_HANDLE;
     uint64_t wait_value = 0;
     VkSemaphore signal = VK_NULL_HANDLE;  // after the targets are written
     uint64_t signal_value = 0;

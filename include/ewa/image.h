@@ -33,7 +33,7 @@ struct ImageSize {
     int orientation = 1;        // EXIF's, see oriented
     bool eight_bit = true;      // no more than 256 levels
 };
-/// Throws InputError.
+/// Reads the header. Throws InputError for formats that load_image does not read, and for a damaged header.
 ImageSize read_image_size(const std::filesystem::path& path);
 
 /// The image turned by EXIF's orientation (1..8). 5 to 8 exchange width and height. Throws InputError for another one.
@@ -51,8 +51,8 @@ Image load_image(const std::filesystem::path& path);
 /// Throws RunError (disk, more channels than a PNG or JPEG can have), InputError (extension, no pixels).
 void save_image(const std::filesystem::path& path, const Image& image);
 
-/// As save_image, of an equirectangular image of all directions: a PNG or JPEG says so to viewers of panoramas, by XMP's
-/// schema GPano ("Photo Sphere XMP Metadata").
+/// Writes an equirectangular image of all directions as save_image does, and throws as it does. A PNG or JPEG gets the XMP schema
+/// GPano ("Photo Sphere XMP Metadata"), by which viewers of panoramas recognise it.
 void save_panorama(const std::filesystem::path& path, const Image& image);
 
 /// Divides the size by factor >= 1, rounded down, to at least 1 px. Each new pixel is the mean over the area

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the messages of functions go that have no other way to give them. libewa prints nothing by itself.
+// The messages of functions that cannot return them. libewa prints nothing itself: a handler of the program gets them.
 #pragma once
 #include <functional>
 #include <string_view>

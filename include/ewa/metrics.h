@@ -27,11 +27,11 @@ struct Figure {
     double value = 0;  // NaN: not computed, or no pixel counts
 };
 
-/// Measures some metrics.
+/// Measures a choice of metrics.
 class Meter {
   public:
-    Meter() = default;  // none
-    /// names: of all_metrics. "psnr" and "ssim" are skipped.
+    Meter() = default;  // measures nothing
+    /// names: of all_metrics, as metrics_named returns them. "psnr" and "ssim" are skipped.
     explicit Meter(const std::vector<std::string>& names);
 
     /// Whether it measures nothing.

@@ -33,6 +33,7 @@ struct SplatArrays {
     size_t size() const { return means.size() / 3; }
 };
 
+/// C views.
 struct ViewArrays {
     std::span<const float> view_matrices;  // [C, 4, 4], world to camera; the last row is not read
     std::span<const float> intrinsics;     // [C, 3, 3]: fx 0 cx, 0 fy cy, 0 0 1 (px)
@@ -46,7 +47,8 @@ struct ProjectionOptions {
     float low_pass = 0.3f;            // added to both diagonal entries of the 2D covariance (px^2)
     float near = 0.01f, far = 1e10f;  // a splat is visible where near < z < far (world units)
     float radius_clip = 0;            // a splat with both radii at or below it is not visible (px)
-    bool compensations = false;       // Mip-Splatting's factor of the opacity
+    bool compensations =
+        false;  // sqrt(det of the 2D covariance without low_pass / with it), Mip-Splatting's factor
     // Whiteners in place of conics. They keep their digits where a conic has lost them: a needle 1,000 px long and 1 px
     // wide has a conic whose determinant is a millionth of its products.
     bool whiteners = false;
@@ -63,7 +65,7 @@ struct ProjectedSplats {
     std::vector<float> compensations;  // [C, N]; empty unless asked for
 };
 
-/// dL/d(output) of a projection. An empty array is a gradient of zero.
+/// dL/d(output) of a projection, with the shapes of ProjectedSplats. An empty array is a gradient of zero.
 struct ProjectedGradient {
     std::span<const float> means2d{}, depths{}, conics{}, compensations{};
 };
@@ -124,7 +126,7 @@ struct TileLists {
 struct BlendOptions {
     uint32_t width = 0, height = 0;       // px
     std::span<const float> background{};  // [D]; empty: 0
-    // A pixel whose tile has 0 here shows the background and has alpha 0. Row by row; empty: all are drawn.
+    /// One value for each tile, row by row. 0: the tile's pixels show the background and have alpha 0. Empty: all tiles are drawn.
     std::span<const uint8_t> tile_mask{};
     uint32_t mask_tile_size = 16;  // px
     bool gradients = true;         // keep what blend_backward needs
@@ -142,6 +144,7 @@ class BlendRecord {
     std::unique_ptr<operators::BlendFrame> frame_;
 };
 
+/// An image of H x W pixels with D channels, first row at the top.
 struct BlendedImage {
     std::vector<float> features;          // [H, W, D]: sum of f alpha T, and T times the background
     std::vector<float> alphas;            // [H, W], 1 - T
@@ -150,13 +153,14 @@ struct BlendedImage {
     uint32_t skipped_nonfinite = 0;
 };
 
+/// dL/d(input) of blending.
 struct ScreenGradient {
     std::vector<float> means2d;     // [M, 2]
     std::vector<float> conics;      // [M, 3], by conics or by whiteners
     std::vector<float> opacities;   // [M]
     std::vector<float> features;    // [M, D]
     std::vector<float> background;  // [D]
-    // [M, 2], sum over the pixels of |dL/d(mean)| (Ye et al. 2024, AbsGS, eq. 7); empty unless asked for.
+    /// [M, 2]: sum over the pixels of |dL/d(mean)| (Ye et al. 2024, AbsGS, eq. 7). Empty unless asked for.
     std::vector<float> absolute;
 };
 
@@ -177,15 +181,15 @@ class Operators {
                                    const ProjectionOptions& options, std::span<const int32_t> radii,
                                    const ProjectedGradient& gradient, bool view_gradients);
 
-    /// Colours [C, N, D].
+    /// The colours, [C, N, D].
     std::vector<float> spherical_harmonics(const HarmonicsArrays& harmonics);
     /// colors_gradient: [C, N, D].
     HarmonicsGradient spherical_harmonics_backward(const HarmonicsArrays& harmonics,
                                                    std::span<const float> colors_gradient,
                                                    bool direction_gradients);
 
-    /// Blending, front to back: C = sum f alpha T + T background (Kerbl et al. 2023, eq. 3). An alpha below 1/255
-    /// is skipped, and a pixel is complete before T would fall to 1e-4.
+    /// Blends front to back: C = sum f alpha T + T background (Kerbl et al. 2023, eq. 3). An alpha below 1/255 is skipped. A pixel
+    /// ends before the splat that would take T to 1e-4 or below.
     BlendedImage blend(const ScreenSplats& splats, const DepthOrder& order, const BlendOptions& options);
     BlendedImage blend(const ScreenSplats& splats, const TileLists& lists, const BlendOptions& options);
     /// features_gradient: [H, W, D]. alphas_gradient: [H, W]; empty: 0.

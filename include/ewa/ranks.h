@@ -10,7 +10,7 @@
 
 namespace ewa {
 
-/// gather and exchange are collective: every rank calls them in the same order. Both throw RunError if a rank does
+/// A group of processes. gather and exchange are collective: every rank calls them in the same order. Both throw RunError if a rank does
 /// not answer within the time that the group was opened with. All that crosses a rank is copied or is an integer,
 /// so results do not depend on the order of arrival.
 class Ranks {

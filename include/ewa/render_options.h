@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an image depends on besides the splats and the camera.
+// The options of a render: all that an image depends on besides the splats and the camera.
 #pragma once
 #include <array>
 #include <memory>
@@ -22,7 +22,7 @@ enum class Integrator {
 inline constexpr int kMostSamples = 4096, kMostNearest = 1000;
 
 struct RenderOptions {
-    std::array<float, 3> background{0, 0, 0};
+    std::array<float, 3> background{0, 0, 0};  // RGB, as the pixels of Image
     Footprint kernel = Footprint::peak;
     int sh_degree = 3;  // degrees above this, or above the scene's, are skipped
     Integrator integrator = Integrator::splat;
@@ -36,17 +36,20 @@ struct RenderOptions {
 /// check of the sky throws. Functions that take RenderOptions call it.
 void check(const RenderOptions& options);
 
+/// The planes of a render.
 enum class Drawing {
     color,
-    depth,         // Rendering::depth also
-    count,         // Rendering::count also
-    ellipsoids,    // each splat as a solid of ELLIPSOID_REACH standard deviations: the nearest one's shaded
-                   // colour
-    median_depth,  // Rendering::median_depth in place of the colour; Integrator::splat without `points`
-    normal         // Rendering::normal in place of the colour; likewise
+    depth,  // Rendering::depth also
+    count,  // Rendering::count also
+    /// Each splat as a solid ellipsoid of ELLIPSOID_REACH standard deviations. The nearest one gives the pixel its shaded colour.
+    ellipsoids,
+    /// Rendering::median_depth in place of the colour. For Integrator::splat without `points`.
+    median_depth,
+    /// Rendering::normal in place of the colour. For Integrator::splat without `points`.
+    normal
 };
 
-/// What may differ from one image of a scene to the next.
+/// The options that may differ from one image of a scene to the next.
 struct DrawOptions {
     RenderOptions render;
     Drawing drawing = Drawing::color;

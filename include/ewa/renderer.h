@@ -21,21 +21,21 @@ namespace ewa {
 struct DeviceTarget;  // ewa/gpu_interop.h, for renders that stay on the device
 struct DeviceSync;
 
+/// The planes of a render, of the camera's size. T is the transmittance. Planes that Drawing does not ask for are empty.
 struct Rendering {
     Image color;  // RGB, background blended in, not clamped
     Image alpha;  // one channel, 1 - T
-    Image depth;  // one channel, sum of view z * alpha_i * T_i, divided by alpha where alpha > 0; empty
-                  // unless asked for
-    Image count;  // one channel, splats blended; empty unless asked for
-    // One channel, view z or the distance through a fisheye or 360° lens: where the ray meets the surface of the
-    // splat that takes the transmittance to a half or below; 0 where none does. Empty unless asked for; then
-    // there is no colour.
+    Image depth;  // one channel, world units: sum of view z * alpha_i * T_i, divided by alpha where alpha > 0
+    Image count;  // one channel, number of splats blended
+    /// One channel, world units: view z, or the distance through a fisheye or 360° lens. It is where the ray meets the surface of
+    /// the splat that takes the transmittance to a half or below, and 0 if none does. The render then has no colour.
     Image median_depth{};
-    // Three channels, world axes: normals of the splats' surfaces towards the eye, blended as colours are, of
-    // length 1; 0 where no splat is. Empty unless asked for; then there is no colour.
+    /// Three channels, world axes: normals of the splats' surfaces towards the eye, blended as colours are, of length 1. 0 where no
+    /// splat is. The render then has no colour.
     Image normal{};
 };
 
+/// Holds a scene on a device and renders it. One thread at a time may use it.
 class Renderer {
   public:
     /// Uploads the scene. Throws InputError for arrays of a wrong length and options out of range. Throws RunError when it
@@ -44,25 +44,25 @@ class Renderer {
     ~Renderer();
     Renderer(Renderer&&) noexcept;
 
-    /// Throws InputError when the camera's size is not positive or exceeds what the device can address.
+    /// Throws InputError when the camera's size is not positive or exceeds what the device can address, RunError when memory runs
+    /// out.
     Rendering render(const Camera& camera, bool with_depth = false);
     Rendering render(const Camera& camera, Drawing drawing);
 
-    /// The same with other options than the renderer's. SH degrees above those it was made for stay off.
+    /// Renders with other options than the renderer's. SH degrees above those it was made for stay off.
     Rendering render(const Camera& camera, const DrawOptions& options);
 
-    /// The colour alone, as 8-bit RGBA: rounded and clamped as save_image does it. What a window shows: the
-    /// floating-point planes stay on the device. Drawing::color or ellipsoids. The reference holds until the
-    /// next render.
+    /// The colour alone, as 8-bit RGBA, rounded and clamped as save_image does it. This is for windows: the floating-point planes
+    /// stay on the device. Drawing::color or ellipsoids. The reference is valid until the next render.
     const std::vector<uint8_t>& render_bytes(const Camera& camera, const DrawOptions& options);
 
-    /// Another scene in place of the present one, with the kernels that there are. Throws as the constructor
-    /// does; after a RunError the renderer has no splats.
+    /// Replaces the scene. Compiled kernels are used again. Throws as the constructor does; after a RunError the renderer has no
+    /// splats.
     void replace(const Gaussians& gaussians);
 
     /// Splats skipped in the last render because a stored value is not finite or the quaternion is zero.
     uint32_t skipped_nonfinite() const;
-    /// Splats that reach a pixel's tile in the last render with DrawOptions.
+    /// Splats that reach a tile of the image in the last render with DrawOptions.
     uint32_t splats_drawn() const;
     std::vector<PassTime> pass_times() const;  // of the last frame
 
@@ -73,6 +73,7 @@ class Renderer {
     std::unique_ptr<State> state_;
 };
 
+/// The loss of a view, its terms without their weights (ssim: the mean SSIM), and its gradient.
 struct LossGradient {
     double loss = 0, l1 = 0;
     double l2 = 0, ssim = 0, alpha = 0, depth = 0;  // 0 if their weight is 0

@@ -9,10 +9,11 @@
 
 namespace ewa {
 
+/// The outcome of a run.
 struct RunResult {
     Summary summary;                     // Summary::interrupted: should_stop ended the run
     std::filesystem::path folder;        // output_folder
-    std::filesystem::path first_render;  // of the report's images; empty if there is none
+    std::filesystem::path first_render;  // the first of the report's images; empty if there is none
 };
 
 /// Trains, evaluates, and writes into the run's folder:
@@ -36,6 +37,7 @@ struct RunResult {
 /// Throws InputError: options, dataset, start splats, a checkpoint of other options or of a later step, a folder with an
 /// earlier run, an output that is an input. Throws RunError: device, memory, disk, a folder that another run uses.
 RunResult run_training(const RunOptions& options, RunObserver& observer);
+/// The same without an observer.
 RunResult run_training(const RunOptions& options);
 
 }  // namespace ewa

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What follows a training run from outside, and may end it.
+// The observer of a training run, which may end it.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace ewa {
 
-/// What is known of a run before its training begins.
+/// Facts of a run that are known before its training begins.
 struct RunStart {
     std::string name;  // run_name
     size_t train_views = 0, test_views = 0;
@@ -38,19 +38,19 @@ class RunObserver {
     /// Asked before each step and each evaluated view. True ends the run: splats and checkpoint are saved, and
     /// a run with RunOptions::resume can continue it.
     virtual bool should_stop() { return false; }
-    /// One line for the user.
+    /// One line of text for the user.
     virtual void on_note(const std::string&) {}
 
     /// The dataset and the device are open. No device memory is allocated yet.
     virtual void on_start(const RunStart&) {}
-    /// What the training skips because the scene does not need it.
+    /// The work that the training skips because the scene does not need it.
     virtual void on_plan(const std::vector<PlanLine>&) {}
     /// Training begins. metrics: the lines of the run that this one continues.
     virtual void on_begin(const std::filesystem::path& /*folder*/,
                           const std::vector<MetricsLine>& /*metrics*/) {}
-    /// A step is done.
+    /// An optimisation step is done.
     virtual void on_step(const StepReport&) {}
-    /// The held-out views were evaluated after this step, which is not the last one.
+    /// The held-out views were evaluated after this step. The last step has on_evaluated instead.
     virtual void on_evaluation(int /*step*/, const Evaluation&) {}
     /// A line was added to metrics.jsonl.
     virtual void on_metrics(const MetricsLine&) {}

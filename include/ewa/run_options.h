@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a whole training run is asked for. ewa/run.h carries it out.
+// The options of a whole training run, which ewa/run.h does.
 #pragma once
 #include <filesystem>
 #include <memory>
@@ -15,14 +15,14 @@
 
 namespace ewa {
 
-/// Whether splats start between neighbouring points, too.
+/// Whether further first splats are put between neighbouring points.
 enum class DenseStart {
     automatic,  // in short runs of adc
     on,
     off
 };
 
-/// What a run is asked for. `ewa train --help` describes the options of the same names.
+/// Options of a run. `ewa train --help` describes the options of the same names.
 struct RunOptions {
     std::filesystem::path dataset;  // folder or file, as load_dataset takes it
     std::filesystem::path scene;    // mesh scene, photos or video that the dataset was made from; empty: none
@@ -38,23 +38,24 @@ struct RunOptions {
     std::filesystem::path init_folder;
     DenseStart dense_start = DenseStart::automatic;  // of first splats that come from points
     double init_opacity = 0.1;   // of first splats that come from points or at random; above 0, below 1
-    double init_scale = 1;       // factor of their scales, which are the distance to their neighbours
+    double init_scale = 1;       // factor of their scales: 1 is the distance to their neighbours
     std::string frames = "all";  // or a list, as scene::frames_named reads it: other frames are not used
     bool level = true;           // of photos whose cameras are searched: as CaptureOptions::level
     int downscale = 1;           // divides the images' width and height
     int max_width = 0;           // px; images that are wider after `downscale` are reduced to it; 0: none are
     MaskUse masks = MaskUse::automatic;
     LensUse lens = LensUse::automatic;
-    /// With TrainOptions::refine_poses: frames without a readout get one in this order, and learn their cameras' motion from rest.
+    /// With TrainOptions::refine_poses: frames without a readout get one from this side. Training learns their cameras' motion, from rest.
     std::optional<ReadoutFrom> rolling_shutter;
-    /// Photos without transparency have TrainOptions::background_noise of 0.4 around their mean colour (docs/training_options.md#background).
-    /// Only where RenderOptions::background is black, and not with a sky, a random background, points or refined poses.
+    /// Training images without transparency get a background of their mean colour, with TrainOptions::background_noise of 0.4
+    /// (docs/training_options.md#background). Only if RenderOptions::background is black, and not with a sky, a random background,
+    /// points, refined poses or `robust`.
     bool automatic_background = true;
     int test_every = 8;         // every K-th image in name order is held out; 0: none
-    bool skip_blurred = false;  // training images are skipped that are blurred far more than the others
-    bool robust = false;        // masks what single images show and the others do not
+    bool skip_blurred = false;  // skips training images that are blurred far more than the others
+    bool robust = false;        // masks objects that single images show and the others do not
     int eval_every = 0;         // evaluates the held-out views every N steps; 0: only at the end
-    std::string metrics;        // that evaluations measure beside PSNR and SSIM: see metrics_named
+    std::string metrics;        // a list for metrics_named: evaluations measure these beside PSNR and SSIM
     bool tensorboard = false;   // also writes the figures of metrics.jsonl as TensorBoard's events
     int save_every = 0;  // saves splats and checkpoint every N steps; 0: the checkpoint every 30 s or more
     int keep = 0;        // of the splats of save_every, the last N stay as splats_007000.ply and the like

@@ -20,9 +20,9 @@ struct SkyMap {
 /// Throws InputError unless the size is in its range and there are texels for it. Functions that take a SkyMap call it.
 void check(const SkyMap& sky);
 
-/// sky.json of a run's folder. Throws InputError if the file cannot be read, or values are missing or not finite.
+/// Reads sky.json of a run's folder. Throws InputError if the file cannot be read, or values are missing or not finite.
 SkyMap load_sky(const std::filesystem::path& path);
-/// Throws RunError (disk), InputError (size).
+/// Writes sky.json. Throws RunError (disk), InputError (size).
 void save_sky(const std::filesystem::path& path, const SkyMap& sky);
 
 }  // namespace ewa

@@ -22,29 +22,30 @@ void transform_splats(Gaussians& gaussians, const glm::dmat4& matrix);
 /// Replaces the scene by the splats of `indices`, in that order. Each index is < size and may be repeated. Throws InputError.
 void select_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices);
 
-/// The same in place, for ascending indices without repetition: it takes no memory for a copy. Throws InputError.
+/// Does the same in place, without memory for a copy. The indices ascend without repetition. Throws InputError.
 void keep_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices);
 
 /// Sets the SH degree (0..3). Higher coefficients are cut, new ones are zero. Throws InputError for another degree.
 void set_sh_degree(Gaussians& gaussians, int degree);
 
-/// Merges near splats until `target` of them are left, at least one. A merged splat has the mean, the covariance and the colour of
-/// the light that both take, and as much of that light as its opacity allows. Rounds merge the pairs of the least relative error.
-/// Splats that are not drawable are removed first. The others come in about Morton order. The same scene gives the same splats. O(n log n) in time; the memory beside
-/// the scene is about 110 bytes a splat. progress: called with the number of splats that are left, after each round.
+/// Merges near splats until `target` of them are left, at least one. A merged splat has the mean, covariance and colour of both
+/// splats' contributions, and as much of their opacity as one splat can have. Each round merges the pairs of the least relative
+/// error. Splats that are not drawable are removed first. The others come in about Morton order. The same scene gives the same
+/// splats. The time is O(n log n), and the memory beside the scene about 110 bytes a splat. progress: called after each round, with
+/// the number of splats that are left.
 void decimate_splats(Gaussians& gaussians, size_t target, const std::function<void(size_t)>& progress = {});
 
 /// Appends the splats of `more`. The SH degree becomes the larger of both. If only one of them has opacities of
 /// Footprint::density, these are fitted to the other kernels.
 void append_splats(Gaussians& gaussians, const Gaussians& more);
 
-/// Opaque splats in the colours of the sky, one for each of its texels, on a sphere around the scene. Its radius is 30 times that
-/// of the scene. They replace the sky where a viewer has none.
+/// Opaque splats in the colours of the sky, one for each texel, on a sphere around the scene with 30 times the scene's radius. They
+/// stand for the sky in viewers that have none. World frame of `scene`. Throws InputError also for a sky of a wrong size.
 Gaussians sky_splats(const SkyMap& sky, const Gaussians& scene);
 
 /// Converts the opacities to those of Footprint::density, or from them to those of the other kernels, so that renders
-/// look about the same. Does nothing if Gaussians::density says that they are of that kind. Exact to float32 when it is
-/// undone.
+/// look about the same. Does nothing if Gaussians::density is `density` already. Converting back gives the same values, up to
+/// float32's rounding.
 void fit_opacities(Gaussians& gaussians, bool density);
 
 /// The splat indices in Morton order: along a Z-order curve with 21 bits per axis over the bounds of the

@@ -20,24 +20,24 @@ std::string_view readers_of(SplatFormat format);
 /// .sog .usda .usdz .html, or of the names meta.json, lod-meta.json and tileset.json. Throws InputError for any other.
 SplatFormat format_of_name(const std::filesystem::path& path);
 
-/// The same for a file to write. Throws InputError also for .ksplat, which ewa only reads.
+/// The format for a file to write. Throws as format_of_name does, and for .ksplat, which ewa only reads.
 SplatFormat format_to_write(const std::filesystem::path& path);
 
-/// The format of a file by its first bytes, or by its extension where these do not tell, as for .splat.
-/// Throws InputError.
+/// The format of a file by its first bytes, or by its extension if the bytes are of no known kind, as for .splat. Throws InputError
+/// if neither is of a format, or the file cannot be read.
 SplatFormat format_of_file(const std::filesystem::path& path);
 
-/// Reads any of the formats but .usda, .usdz, .html and tileset.json, which ewa only writes. The peak memory is at most twice the larger of the file and the scene. A file is
-/// refused if it claims more than 4 times its size and 40 MiB; for SPZ and SOG, which are compressed, 32 times. Values
-/// may be infinite or NaN if the format can store that. Throws InputError that names the file and the byte or
-/// property.
+/// Reads any of the formats but .usda, .usdz, .html and tileset.json, which ewa only writes. The peak memory is at most twice the
+/// larger of the file and the scene. A file is refused if it claims more than 4 times its size and 40 MiB, or 32 times for SPZ and
+/// SOG, which are compressed. Values may be infinite or NaN if the format can store that. Throws InputError that names the file and
+/// the byte or property.
 SplatScene read_splats(const std::filesystem::path& path);
 
 /// Reads a level of a lod-meta.json; read_splats reads level 0. Throws InputError as read_splats does, and for a level that the
 /// file lacks.
 SplatScene read_splat_level(const std::filesystem::path& path, size_t level);
 
-/// The number of splats of each level of a lod-meta.json, the finest first. Throws InputError.
+/// The number of splats of each level of a lod-meta.json, the finest first. Throws InputError as read_splats does.
 std::vector<size_t> level_counts(const std::filesystem::path& path);
 
 /// Reads the splats alone. Skipped contents are warnings for the log handler (ewa/log.h). Throws as read_splats does.
@@ -51,7 +51,7 @@ Gaussians load_splats(const std::filesystem::path& path);
 std::vector<std::string> save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                      const SaveOptions& options);
 
-/// The same with a scene that is not needed afterwards. So a lod-meta.json, a tileset.json and an .html take no memory for a copy.
+/// The same for a scene that the caller gives up. Then a lod-meta.json, a tileset.json and an .html need no memory for a copy.
 std::vector<std::string> save_splats(const std::filesystem::path& path, Gaussians&& gaussians,
                                      const SaveOptions& options);
 

@@ -13,7 +13,7 @@
 
 namespace ewa {
 
-/// The sources in src/io/splats describe the layouts. sog is one file, sog_meta a meta.json with images beside it, and sog_levels a
+/// Formats of splat files. The sources in src/io/splats describe the layouts. sog is one file, sog_meta a meta.json with images beside it, and sog_levels a
 /// lod-meta.json with folders of those beside it. tileset is a tileset.json of 3D Tiles with the tiles beside it, and page an .html that
 /// shows the scene in a browser.
 enum class SplatFormat {
@@ -33,20 +33,21 @@ enum class SplatFormat {
     page
 };
 
+/// The contents of a splat file.
 struct SplatScene {
     Gaussians gaussians;  // in the frame of an INRIA PLY (x right, y down, z forward), whatever the file uses
     SplatFormat format = SplatFormat::ply;
     std::string variant;     // of the format, e.g. "version 3", "ascii"; may be empty
     int file_sh_degree = 0;  // may exceed 3; gaussians holds at most degree 3
-    bool antialiased =
-        false;  // the file states that the scene was trained with --kernel antialias (Mip-Splatting)
+    /// The file states that the scene was trained with --kernel antialias (Mip-Splatting).
+    bool antialiased = false;
     std::vector<std::string> comments;
     std::vector<std::string> remarks;  // one line for each kind of content that is skipped
 };
 
 struct Dataset;
 
-/// What a page shows besides the scene.
+/// The contents of a page besides the scene.
 struct PageOptions {
     std::string title = {};            // empty: the name of the file
     bool unbundled = false;            // the scene is beside it, in NAME-levels/lod-meta.json
@@ -59,10 +60,10 @@ struct SaveOptions {
     bool antialiased = false;
     int spz_version = 3;    // of an .spz: 2, 3 or 4
     bool gltf_spz = false;  // a glTF holds an SPZ of version 2, by KHR_gaussian_splatting_compression_spz_2
-    int levels =
-        0;  // of a lod-meta.json or tileset.json; 0: until one has a million splats, or a tile 100,000
-    /// Of a tileset.json: from the scene's world to earth-centred, earth-fixed coordinates (EPSG 4978), metres. Empty: by the place
-    /// that the comments name, if any.
+    /// Number of levels of a lod-meta.json or tileset.json. 0: until a level has at most a million splats, or a tile 100,000.
+    int levels = 0;
+    /// For a tileset.json: maps world coordinates of the scene to earth-centred, earth-fixed ones (EPSG 4978, metres). Empty: the
+    /// position that the comments state, if any.
     std::optional<glm::dmat4> earth = {};
     PageOptions page = {};
     std::function<void(uint64_t, uint64_t)> progress = {};  // splats written, all splats

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the steps of a training have done, and the state that they have reached.
+// Figures of the steps of a training, and its state after them.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -10,6 +10,7 @@
 
 namespace ewa {
 
+/// Figures of a training after a step.
 struct StepReport {
     int step = 0;        // steps done
     double seconds = 0;  // wall time in Trainer::step so far
@@ -37,7 +38,7 @@ struct TrainerArray {
     std::vector<std::byte> bytes;
 };
 
-/// All that later steps depend on, besides dataset, training frames and options.
+/// The state that later steps depend on, besides dataset, training frames and options.
 struct TrainerState {
     StepReport report;
     int sh_degree = 0;  // of the stored coefficients

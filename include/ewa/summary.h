@@ -15,16 +15,16 @@ struct CameraMoves {
     double median_degrees = 0, largest_degrees = 0;  // between rotations
     double median_share = 0, largest_share = 0;      // of the scene extent, between centres
     double least_focal = 1, largest_focal = 1;       // factors of the focal lengths
-    bool test_aligned =
-        false;  // test_psnr and test_ssim are of cameras that were aligned to their images first
+    /// Whether the test cameras were aligned to their images before test_psnr and test_ssim were measured.
+    bool test_aligned = false;
 };
 
-/// What a rank of several has exchanged, and what it held. Means a training view.
+/// Data and memory of one of several ranks. Data and times are means of a training view.
 struct RankFigures {
     std::string name;       // e.g. "rank 1 (node7)"
     double sent_bytes = 0;  // to other ranks
-    double exchange = 0;    // ms, in which data moved
-    double waiting = 0;     // ms, until the other ranks had come as far
+    double exchange = 0;    // ms of moving data
+    double waiting = 0;     // ms of waiting for the other ranks
     double own_bytes = 0;   // largest state so far: parameters, moments and statistics of its splats
     double peak_device_bytes = 0;
 };

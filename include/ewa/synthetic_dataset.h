@@ -16,14 +16,15 @@
 
 namespace ewa {
 
-/// The usual pose of a camera is that of the middle of its readout.
+/// A rolling shutter of all cameras. A camera's pose without it is that of the middle of its readout.
 struct RollingShutter {
     ReadoutFrom from = ReadoutFrom::top;
-    double degrees = 0;  // by which a camera turns during the readout, about an axis of its own; at most 90
-    double percent =
-        0;  // of its distance to the scene's middle, by which it moves in a direction of its own; 0..100
+    double degrees = 0;  // the turn of a camera during the readout, about an axis of its own; at most 90
+    /// Length of its motion during the readout, in a direction of its own: 0 to 100 % of its distance to the scene's middle.
+    double percent = 0;
 };
 
+/// Options of render_dataset.
 struct SyntheticOptions {
     /// The number of cameras on a dome over the scene. 0: the file's cameras. Empty: the file's cameras if it
     /// has 8 or more, else 48 on a dome.
@@ -41,16 +42,17 @@ struct SyntheticOptions {
     /// The lens of all cameras, which scene::is_native accepts. Parallel rays give a world unit at the scene's middle the size that
     /// the pinhole gives it.
     Distortion lens{};
-    double fisheye_degrees =
-        180;  // what a fisheye's image shows along its smaller side: above 0, at most 360
+    /// The angle that a fisheye's image spans along its smaller side: above 0, at most 360.
+    double fisheye_degrees = 180;
     std::optional<RollingShutter> rolling_shutter;  // of all cameras, pinholes or fisheyes
     bool sky = false;    // images show the sky, and have no alpha; else they are transparent there
     bool force = false;  // replaces the views of another scene or of other options in the folder
 };
 
+/// The outcome of render_dataset.
 struct SyntheticDataset {
     int views = 0;
-    int kept = 0;                       // views that an earlier, interrupted run had rendered
+    int kept = 0;                       // views that an earlier, interrupted run has rendered
     double exposure = 0;                // stops
     bool color_depends_on_view = true;  // false: every material is diffuse, and SH degree 0 suffices
     bool interrupted = false;
@@ -60,7 +62,7 @@ struct SyntheticDataset {
     std::vector<std::string> remarks;  // contents of the file that a render does not show
 };
 
-/// Whether the file is a glTF of triangles without splats.
+/// Whether the file is a glTF of triangles without splats. It throws nothing.
 bool is_mesh_scene(const std::filesystem::path& path);
 
 /// Renders the scene into a folder, in the glTF's own world frame. docs/meshes.md describes the light
@@ -83,7 +85,7 @@ SyntheticDataset render_dataset(const std::shared_ptr<gpu::Device>& device,
                                 const std::function<bool(int, int)>& progress);
 
 /// Whether the folder has every view that render_dataset would render with these options. Throws InputError
-/// as that does.
+/// as that does, if the folder has a dataset of render_dataset.
 bool is_rendered(const std::filesystem::path& scene, const std::filesystem::path& folder,
                  const SyntheticOptions& options);
 

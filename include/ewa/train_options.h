@@ -14,7 +14,7 @@ namespace ewa {
 
 /// How the number of splats changes during training.
 enum class Strategy {
-    none,      // it does not
+    none,      // the number stays
     adc,       // adaptive density control of 3DGS: splats are cloned, split and pruned
     mcmc,      // 3DGS-MCMC: dead splats are relocated, and the number grows to max_splats
     automatic  // strategy_for(steps); adc if an option of adc is set
@@ -26,8 +26,8 @@ Strategy strategy_for(int steps);
 /// TrainOptions::sh_degree: 3, or 0 if the dataset says that no colour depends on the view.
 inline constexpr int kAutomaticShDegree = -1;
 
-/// Half the width and height at first, in short runs of adc with many training images, for their first hundred steps
-/// (docs/training_options.md#resolution). It replaces a resolution_every that is the default.
+/// `TrainOptions::halvings`: 1 in short runs of adc with many training images, for their first hundred steps, else 0
+/// (docs/training_options.md#resolution). It also replaces a resolution_every that has its default.
 inline constexpr int kAutomaticHalvings = -1;
 
 /// TrainOptions::max_splats: splat_cap() of ewa/training_needs.h chooses it.
@@ -37,7 +37,7 @@ inline constexpr uint32_t kAutomaticMaxSplats = 0;
 /// scene_extent() of ewa/dataset.h, or the median distance of the start's splats if all cameras coincide.
 struct TrainOptions {
     int steps = 30000;  // views: an optimisation step takes `batch` of them
-    /// Views a step, at least 1. Their gradients are averaged. Rates and Adam's decays follow the square root rule of
+    /// Views of an optimisation step, at least 1. Their gradients are averaged. Rates and Adam's decays follow the square root rule of
     /// Grendel (Zhao et al. 2024, section 3.3): rates times sqrt(batch), decays to the power of batch.
     int batch = 1;
     /// Bands of tile rows that each view is cut into, at least 1, so that several ranks can draw one view. An image needs
@@ -45,25 +45,25 @@ struct TrainOptions {
     int bands = 1;
     Strategy strategy = Strategy::mcmc;
     uint32_t max_splats = kAutomaticMaxSplats;  // hard limit
-    /// Splats that the last quarter of the run has at most: those of the largest weight at a pixel of a training image. 0: all.
+    /// The most splats in the last quarter of the run: those with the largest weight at any pixel of a training image. 0: all.
     uint32_t final_splats = 0;
     int sh_degree = 3;               // 0 to 3, or kAutomaticShDegree
     uint64_t seed = 0;               // the same seed on the same device gives the same bytes
     bool random_background = false;  // a new background colour each step
-    /// Each step adds another number to each channel of the background, of this width around 0. What splats leave transparent
-    /// then costs, so photos are trained to be opaque. Not with random_background or sky.
+    /// Each step adds random numbers to the background, one for each channel, from an interval of this width around 0. Transparent
+    /// pixels then cost loss, so training makes images opaque. Not with random_background or sky.
     double background_noise = 0;
     /// Learns a SkyMap in place of the background. Not with refine_poses.
     bool sky = false;
     double sky_rate = 0.02, sky_rate_final = 0.002;
     /// Device memory for decoded training images, in bytes. Images beyond it are read again for each step.
     uint64_t image_cache_bytes = uint64_t(4) << 30;
-    /// Device memory that a training takes at most, in bytes; 0: as much as it needs. Splats that do not fit stay in host
-    /// memory and are on the device while a step uses them. The result has the same bytes.
+    /// The most device memory of a training, in bytes. 0: no limit. Splats that do not fit stay in host memory and are on the
+    /// device while a step uses them. The limit does not change the result's bytes.
     uint64_t device_memory_bytes = 0;
     /// Bits of each of Adam's two moments, 16 or 32. With 16 a splat needs a third less memory.
     int moment_bits = 16;
-    RenderOptions render{};  // background and kernel of training and evaluation
+    RenderOptions render{};  // of training and evaluation
     LossWeights loss{};
 
     // Learning rates of 3DGS (arguments/__init__.py). Those of the means are per unit of scene extent.
@@ -75,24 +75,25 @@ struct TrainOptions {
     /// the end it is the square root of that (src/train/schedule.h). 0: the rates of a full run.
     double short_run_power = 0.5;
 
-    /// With so many training photos or fewer, adc and none are regularised, unless poses are refined. If such a run shows
-    /// each photo 60 times and has fewer than 30,000 steps, the rates of its splats fade.
+    /// With at most so many training images, adc and none are regularised, unless poses are refined. The rates of such a run fade
+    /// if it has fewer than 30,000 steps and uses each image 60 times or more.
     int few_photos = 16;
 
     /// Learns the appearance of each training image (docs/training_options.md).
     AppearanceModel appearance = AppearanceModel::none;
     double exposure_rate = 0.01, exposure_rate_final = 0.001;  // of affine
     double appearance_rate = 0.002;                            // of ppisp and grid, per step of a full run
-    /// ppisp starts from the exposures that points or EXIF say. A trainer that is restored needs none.
+    /// Starts ppisp from exposures that points or EXIF give. A trainer that is restored needs none.
     bool measure_exposures = true;
 
     // Cameras.
-    bool refine_poses = false;  // learns a rotation and a translation for each training camera, from none
-    bool refine_focal = false;  // with refine_poses: also a factor of its focal lengths, from 1
+    bool refine_poses =
+        false;  // learns a rotation and a translation for each training camera, which start at 0
+    bool refine_focal = false;  // with refine_poses: also a factor of its focal lengths, which starts at 1
     double pose_rate = 5e-3, pose_rate_final = 5e-5;  // radians by which a step moves the points of the image
 
-    /// A box in world units, x, y, z of its low corner and then of its high one. New splats come only from splats whose mean
-    /// is in it. Not with Strategy::none.
+    /// A box in world coordinates: x, y, z of its low corner, then of its high one. Only splats whose mean is in it are cloned, split
+    /// or copied. Not with Strategy::none.
     std::optional<std::array<double, 6>> region{};
 
     // Adaptive density control. Steps are those of a 30,000 step run; a shorter run scales them
@@ -100,12 +101,13 @@ struct TrainOptions {
     int refine_start = 500, refine_stop = 15000, refine_every = 100;
     int opacity_reset_every = 3000;  // 0: never
     int sh_degree_every = 1000;      // the SH degree rises by one this often
-    int halvings = 0;  // the images' sides are halved this often at the start; or kAutomaticHalvings
-    int resolution_every = 3000;  // the sides are doubled again this often
-    /// For a run that continues one of another number of steps: the SH degree and resolution that it reached stay.
+    /// Times that the images are halved in size at the start; or kAutomaticHalvings.
+    int halvings = 0;
+    int resolution_every = 3000;  // the steps after which width and height double
+    /// For a run that continues one of another number of steps, and keeps the SH degree and resolution that it reached.
     int least_sh_degree = 0, most_halvings = 64;
-    uint32_t least_max_splats =
-        0;                        // of a run that continues another: an automatic max_splats is at least this
+    /// An automatic max_splats of a run that continues another is at least this.
+    uint32_t least_max_splats = 0;
     double grow_gradient = 2e-4;  // mean norm of dL/d(mean in normalised device coordinates)
     /// Uses the sum of the pixels' absolute gradients, which do not cancel (AbsGS), and their own threshold.
     bool absolute_gradients = false;
@@ -118,8 +120,8 @@ struct TrainOptions {
     // and refine_every.
     int relocate_stop = 25000;
     double growth = 1.05;  // factor of the number of splats at each refinement, up to max_splats.
-    /// Distance of a copy from its source in standard deviations. It applies to a run of 0 steps and falls
-    /// linearly to 0 at 30,000 steps: long runs have time for noise to separate copies (src/train/schedule.h).
+    /// Distance of a copy from its source, in standard deviations, in the limit of a run of 0 steps. It falls linearly to 0 for runs
+    /// of 30,000 steps, in which noise has time to separate copies (src/train/schedule.h).
     double copy_spread = 1;
     double dead_opacity = 0.005;
     double noise_rate = 5e5;  // times the means' learning rate

@@ -38,38 +38,36 @@ class Trainer {
     /// train_frames: indices into dataset.frames. start: the first splats, at most options.max_splats unless that is automatic.
     /// Pass an rvalue to spare a copy of them. Throws InputError (no frame or one that the dataset lacks, no or too many
     /// splats, arrays of a wrong length, an image that cannot be read), RunError (memory).
-    /// ranks: the processes that train together. Each makes a trainer of the same arguments, and holds a share of the
-    /// splats. Rank 0 calls the functions below; all others call follow() alone. The results do not depend on the number
-    /// of ranks.
+    /// ranks: the processes that train together. Each makes a trainer with the same arguments, and stores a share of the
+    /// splats. Rank 0 calls the functions below; all others call only follow(). The results do not depend on the number of ranks.
     Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset, const std::vector<int>& train_frames,
             Gaussians start, const TrainOptions& options, std::shared_ptr<Ranks> ranks = alone());
     ~Trainer();
 
-    /// For a rank other than 0: does its part of what rank 0 calls, until the trainer of rank 0 ends. Throws what those
-    /// functions throw.
+    /// For a rank other than 0: does its part of each function that rank 0 calls, until the trainer of rank 0 ends. Throws as
+    /// those functions do.
     void follow();
-    /// Tells ranks that wait for the next call that this one is at work. Call it at least once in the time that the ranks
-    /// were opened with.
+    /// Sends a sign of life to ranks that wait for the next call. Call it at least once within the time limit of the ranks.
     void keep_waiting() const;
 
     /// Does one optimisation step, and changes the number of splats if the schedule says so. Throws InputError
     /// before the step if its image cannot be read, RunError if memory runs out (with the size needed).
-    /// After a RunError the trainer is of no more use.
+    /// After a RunError the trainer cannot be used any more.
     StepReport step();
 
     /// The state after the last step. A trainer of the same dataset, frames, options and device that restores
     /// it takes the same steps, byte for byte.
     TrainerState state() const;
-    /// Throws InputError if the state does not fit this trainer; the trainer then stays as it was.
+    /// Sets the state. Throws InputError if it does not fit this trainer, which then keeps its own.
     void restore(const TrainerState& state);
-    /// The same for checkpoints, in pieces (train/state_stream.h). If reading fails, the trainer is of no more use.
+    /// state() and restore() in pieces, for checkpoints (train/state_stream.h). If reading fails, the trainer cannot be used any more.
     void save(train::StateWriter& to) const;
     void restore(train::StateReader& from);
 
-    /// The splats, read back from the device. Their order is the trainer's own.
+    /// The splats, read back from the device, in the dataset's world frame. Their order is the trainer's own.
     Gaussians gaussians() const;
-    /// Renders of the splats as they are, without exposures: those that a Renderer of gaussians() draws. Every rank draws
-    /// some of them. Throws InputError if the splats are points.
+    /// Renders without learned appearances, as a Renderer of gaussians() draws them: RGB, one for each camera. Every rank draws some
+    /// of them. Throws InputError if the splats are points.
     std::vector<Image> render(std::span<const Camera> cameras) const;
     uint32_t splats() const;
     uint32_t max_splats() const;  // the number that was chosen if TrainOptions::max_splats is automatic
@@ -81,7 +79,7 @@ class Trainer {
     std::shared_ptr<const SkyMap> sky() const;         // null if not learned
     size_t images_on_disk() const;                     // training images that are not cached
     double extent() const;                             // the length that rates are relative to, world units
-    std::vector<PlanLine> plan() const;                // what the run skips
+    std::vector<PlanLine> plan() const;                // the work that the run skips
     StepTimes step_times() const;
     std::vector<RankFigures> rank_figures() const;      // of every rank; empty for one that is alone
     std::optional<ChunkFigures> chunk_figures() const;  // empty if all splats stay on the device

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a training needs, before it begins: splats, device memory, and what it skips.
+// The needs of a training, before it begins: splats, device memory, and the work that it skips.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -14,7 +14,8 @@
 namespace ewa {
 
 /// The options with concrete values for Strategy::automatic, kAutomaticShDegree, kAutomaticHalvings and
-/// AppearanceModel::automatic. The last one reads up to 64 images of the training frames. Throws InputError (an image that cannot be read).
+/// AppearanceModel::automatic. The last one reads up to 64 images of the training frames. Throws InputError: an image that cannot be
+/// read, frames that the dataset lacks.
 TrainOptions resolve(TrainOptions options, const Dataset& dataset, const std::vector<int>& train_frames);
 
 /// The largest number of splats of a training, and why it is that.
@@ -42,7 +43,8 @@ MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset
                                const std::vector<int>& train_frames, const Gaussians& start,
                                const TrainOptions& options);
 
-/// What a Trainer of these options skips if it has many photos. masks: some training images have pixels that do not count.
+/// The work that a Trainer with these options skips if it has many training images. masks: some training images have pixels that do
+/// not count. Throws InputError for arrays of a wrong length.
 std::vector<PlanLine> plan_lines(const Gaussians& start, const TrainOptions& options, bool masks = false);
 
 }  // namespace ewa
