@@ -27,21 +27,21 @@ struct Contradiction {
 /// The pairs with many matches that contradict their cameras. The database has the numbers of the model's images.
 std::vector<Contradiction> contradictions_in(const SparseModel& model, const FeatureDatabase& database);
 
-/// A photo's place and direction.
+/// The camera of a photo.
 struct Station {
     std::string name;
     glm::dvec3 center{0};
     glm::dmat3 rotation{1};  // world to camera
 };
 
-/// The photos that are far from those before and after them, or turned, where these two are near each other, and photos that follow
-/// each other are near each other as a rule. stations: in the order in which the photos were taken.
+/// Photos whose cameras are far from, or turned against, those of the photos before and after, if these two are near each other.
+/// Empty unless most neighbours are near each other. stations: in the order in which the photos were taken.
 std::vector<std::string> strays_among(const std::vector<Station>& stations);
 
-/// The photos, by their places, that have many matches with the next one, and are much farther from it or turned than others, where
-/// photos that follow each other are near each other as a rule. matches: of each station with the next one.
+/// Indices of photos that have many matches with the next one, but whose cameras are much farther apart or turned than others.
+/// Empty unless most neighbours are near each other. matches: of each station with the next one.
 std::vector<size_t> jumps_among(const std::vector<Station>& stations, const std::vector<size_t>& matches);
-/// Photos outside the longest part of a path of so many that no jump parts.
+/// The number of photos outside the longest part of the path without a jump.
 size_t parted_by(const std::vector<size_t>& jumps, size_t stations);
 /// The verified matches of each station with the next one.
 std::vector<size_t> matches_along(const std::vector<Station>& stations, const FeatureDatabase& database);
@@ -49,7 +49,7 @@ std::vector<size_t> matches_along(const std::vector<Station>& stations, const Fe
 /// The stations of a model's photos in the order of names.
 std::vector<Station> stations_of(const SparseModel& model);
 
-/// Lines for the user about what is probably wrong. None: nothing is known to be. jumps: texts with both photos.
+/// Lines for the user about cameras that are probably wrong. Empty: none are found. jumps: texts with both photos.
 std::vector<std::string> doubts_of(const Grade& grade, const std::vector<Contradiction>& contradictions,
                                    const std::vector<std::string>& strays,
                                    const std::vector<std::string>& jumps);

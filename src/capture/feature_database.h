@@ -62,12 +62,12 @@ class FeatureDatabase {
     /// Removes the descriptors, which are most of a file.
     void remove_descriptors();
 
-    /// Makes what was written since the last call lasting, at once.
+    /// Commits all that was written since the last call, in one transaction.
     void commit();
 
   private:
     class Statement;
-    /// px, with the image's corner at 0. scale: of the Gaussian in which COLMAP has found it; 0: not known.
+    /// x, y: px, with the image's corner at 0. scale: that of COLMAP's detector; 0: not known.
     struct Feature {
         float x = 0, y = 0, scale = 0;
     };

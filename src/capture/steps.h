@@ -89,9 +89,9 @@ std::vector<std::filesystem::path> photos_in(const std::filesystem::path& folder
 
 /// Whether the extension is a film's.
 bool is_film(const std::filesystem::path& file);
-/// The films of a folder and the folders below it, as the photos.
+/// The films of a folder and the folders below it, relative to it and sorted.
 std::vector<std::filesystem::path> films_in(const std::filesystem::path& folder);
-/// Takes out the small copies that cameras and editors write beside films, if there are other films. Returns them.
+/// Removes small copies, which cameras and editors write beside films, if there are other films. Returns the copies.
 std::vector<std::filesystem::path> take_proxies(std::vector<std::filesystem::path>& films);
 
 /// Whether the photo is of HEIF's family (HEIC, AVIF), which COLMAP does not read.
@@ -110,11 +110,11 @@ struct FoundMasks {
     std::vector<std::filesystem::path> files;  // of each photo; empty if it has none
     std::string text;                          // a line for the user; empty if there are no masks
 };
-/// The masks of photos by these names, found as those of a dataset. project: what the user named. Throws InputError.
+/// The masks of photos with these names, by the rules for datasets. project: the path that the user named. Throws InputError.
 FoundMasks find_masks(const std::filesystem::path& photos, const std::vector<std::filesystem::path>& names,
                       const std::filesystem::path& project);
-/// Copies them into a folder as COLMAP wants them: NAME.png of the photo's name and size. images: the folder with the photos by
-/// their names. Newer copies stay. Returns FoundMasks::text. Throws InputError, RunError, Stopped.
+/// Copies the masks into a folder as COLMAP wants them: NAME.png for a photo NAME, of its size. images: the folder with the photos
+/// under their names. Newer copies stay. Returns FoundMasks::text. Throws InputError, RunError, Stopped.
 std::string copy_masks(const std::filesystem::path& photos, const std::vector<std::filesystem::path>& names,
                        const std::filesystem::path& images, const std::filesystem::path& masks,
                        const std::filesystem::path& project, const ProgressFunction& progress);
@@ -143,19 +143,19 @@ using Json = nlohmann::ordered_json;  // of capture.json
 /// A line for a file: what distinguishes its content, a space, and its name. The record is JSON, which is UTF-8.
 std::string line_of(const std::filesystem::path& folder, const std::filesystem::path& name);
 
-/// What became of the photos since a search for their cameras began, or what begins it.
+/// The photos of a search for cameras, after those that changed since it began were removed.
 struct Chosen {
     std::vector<std::filesystem::path> names;  // that COLMAP gets
     std::set<std::string> gone;  // names of photos whose pictures changed: their views do not count
     std::vector<std::string> remarks;
 };
 
-/// Looks at all photos that were found, before a search. Those that cannot be used are noted in the record. Throws InputError
-/// if too few are left, Stopped.
+/// Checks all photos before a search. Those that cannot be used are noted in the record. Throws InputError if too few can be used,
+/// Stopped.
 Chosen first_choice(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& found,
                     Json& record, const ProgressFunction& progress);
 
-/// Skips what has changed since a search began. before: its record.
+/// Skips photos that have changed since a search began. before: its record.
 Chosen later_choice(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& found,
                     const Json& before);
 
