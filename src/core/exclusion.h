@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which options go together. Errors name options as the command line does, which Python's package respells.
+// Options that exclude or need each other. Errors have the names of the command line; the Python package replaces them by its own.
 #pragma once
 #include <string>
 #include <string_view>
@@ -10,7 +10,7 @@ namespace ewa::core {
 
 enum class Relation { excludes, needs };
 
-/// Why an option is refused: it is used with another one that it excludes, or without one that it needs.
+/// A rule: `option` may not be used with `other` (excludes), or not without it (needs).
 template <class Options>
 struct Exclusion {
     std::string_view option;

@@ -42,8 +42,8 @@ struct ProgressLine {
 /// bar. unicode: the bar consists of box drawing characters in place of # and -.
 std::string drawn(const ProgressLine& line, size_t columns, bool unicode);
 
-/// Progress of long work: one line that is redrawn on a terminal, or a line per tenth of the work in a file or on a terminal
-/// without cursor movement (TERM=dumb).
+/// Prints the progress of long work. On a terminal, one line is redrawn. In a file, or on a terminal without cursor movement
+/// (TERM=dumb), each tenth of the work prints a line.
 class Progress {
   public:
     /// what: a verb such as "rendered". unit: the plural of a unit of work, such as "steps". quiet: print
