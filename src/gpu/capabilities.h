@@ -31,7 +31,7 @@ struct Subgroups {
 /// version: of the instance.
 Subgroups subgroups_of(vk::PhysicalDevice device, uint32_t version = kUsedVersion);
 
-/// What a device was created with, of what ewa uses.
+/// The features that a device was created with, among those that ewa uses.
 struct Enabled {
     bool scalar_blocks = false;
     bool subgroup_sizes = false;

@@ -90,7 +90,7 @@ class Device {
 
     /// Throws RunError with the validation layer's first message since the last call.
     void check_validation();
-    /// Ignores what is not about ewa's calls.
+    /// Ignores messages that are not about ewa's calls.
     void add_validation_message(const std::string& message);
 
   private:
