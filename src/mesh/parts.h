@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of a mesh, its border, what is left of it without small parts or with fewer triangles, and its place.
+// The parts and the border of a mesh; removing small parts and reducing triangles; transforms.
 #pragma once
 #include <cstddef>
 #include <glm/mat4x4.hpp>

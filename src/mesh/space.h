@@ -18,7 +18,7 @@ struct Space {
         const double far = glm::length(x) / radius;
         return far > 1 ? (2 - 1 / far) / far * x : x;
     }
-    /// From the middle, world units. at: below 2 radius from 0.
+    /// The inverse of `contracted`, relative to the middle, world units. at: of a length below 2 radius.
     glm::dvec3 expanded(const glm::dvec3& at) const {
         const double share = glm::length(at) / radius;
         return share > 1 ? 1 / (share * (2 - share)) * at : at;
