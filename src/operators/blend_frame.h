@@ -24,7 +24,7 @@ struct BlendFrame {
     uint32_t splats = 0, channels = 0, width = 0, height = 0;
     bool whiteners = false;
     bool parts = false;  // instances count in a part of their tile
-    bool sharp = false;  // a footprint is sharper than the low-pass of the projection leaves any
+    bool sharp = false;  // a footprint is sharper than the projection's low-pass allows
     std::vector<float> background;
     std::vector<uint8_t> tile_mask;
     uint32_t mask_tile_size = 16;

@@ -16,10 +16,10 @@ struct DeviceLists {
     std::vector<uint32_t> sorted_indices, first_instances;  // each splat's places in the lists
 };
 
-/// Whether an instance must say in which part of its tile it counts: the caller's tiles cut the device's.
+/// Whether an instance needs the part of its tile in which it counts, because borders of the caller's tiles cross the device's.
 bool have_parts(const TileLists& lists, const passes::KernelConfig& config);
 
-/// A device's tile lists the splats of the caller's tiles that it overlaps, in their order, without those that end outside of it.
+/// Lists for the device's tiles: the splats of the caller's tiles that a tile overlaps, in their order, if they reach it.
 /// reserve: called with the number of instances before memory is taken for them. Throws InputError for wrong lists.
 DeviceLists device_lists(const ScreenSplats& splats, const TileLists& lists, const pipeline::Sizes& sizes,
                          const passes::KernelConfig& config, const std::function<void(uint32_t)>& reserve);
