@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What training learns of the appearance of its images beside the splats: affine maps of colours, bilateral grids of them, or
-// PPISP. An affine map is a grid of one cell.
+// The learned appearances of training images: affine maps of colours, bilateral grids of such maps, or PPISP. An affine map is a
+// grid of one cell.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -14,15 +14,15 @@ namespace ewa::pipeline {
 
 struct FrameBuffers;
 
-/// A row for each training image; with PPISP then the values of the cameras: shared/layouts.h. A slot has the gradient of the
-/// values of its view's camera.
+/// A row for each training image. With PPISP, the values of the cameras follow (shared/layouts.h), and a slot has the gradient by
+/// the values of its view's camera.
 struct Appearances : LearnedTable {
     AppearanceModel model = AppearanceModel::none;
     std::vector<uint32_t> camera_of;  // of each photo; with PPISP
     uint32_t cameras = 0;
 
     Appearances() = default;
-    /// camera_of: of each photo, from 0 without a gap. views: of a step at most.
+    /// camera_of: the camera of each image, numbered from 0 without a gap. views: the most of a step.
     Appearances(gpu::Device& device, AppearanceModel model, std::vector<uint32_t> camera_of, uint32_t views);
     uint32_t camera_at(uint32_t camera) const;  // where its values begin, in floats
     std::vector<Appearance> download() const;
@@ -39,8 +39,8 @@ struct AppearanceUse {
     uint32_t visit = 1;  // number of this image's step, from 1
 };
 
-/// With PPISP: the cameras take their step, after those of all views of the step. photos: of the views. capacity: of
-/// instances; more in frame.counts change nothing.
+/// With PPISP: updates the values of the cameras, after all views of the step. photos: the views' images. capacity: of instances;
+/// if frame.counts has more, nothing changes, because the frame is repeated.
 void record_cameras_update(const passes::Recorder& on, const Appearances& appearances,
                            const FrameBuffers& frame, std::span<const uint32_t> photos, float rate,
                            uint32_t capacity);

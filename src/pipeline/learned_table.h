@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What training learns beside the splats: tables of values with Adam's moments, on the device.
+// Values that training learns beside the splats: tables with Adam's moments, on the device.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -10,14 +10,14 @@
 
 namespace ewa::pipeline {
 
-/// Values with Adam's moments of each. A row has those of one training image alone. Values of several images come after the rows;
-/// a view of a step leaves its part of their gradient in its slot.
+/// Values, each with its moments of Adam. There is a row of values for each training image. Values that several images share come
+/// after the rows. Each view of a step writes its gradient by the shared values into its own slot.
 struct LearnedTable {
     struct Layout {
         std::string name, moments;  // of the arrays in checkpoints: moments1 is called moments + "1"
-        uint32_t row_floats = 0;    // of a training image
-        uint32_t slot_floats = 0;   // of a view of a step
-        uint32_t views = 0;         // of a step at most
+        uint32_t row_floats = 0;    // values of a training image
+        uint32_t slot_floats = 0;   // gradients by shared values, of a view
+        uint32_t views = 0;         // the most views of a step
     };
     /// An array of a checkpoint.
     struct Array {
@@ -29,7 +29,7 @@ struct LearnedTable {
     Layout layout;
     uint64_t floats = 0;
     gpu::Buffer values, moments1, moments2;
-    gpu::Buffer slots;  // without a buffer if they have no floats
+    gpu::Buffer slots;  // empty without slot_floats
 
     LearnedTable() = default;
     /// start: the first values. The moments are 0. Floats of a row and of a slot are even.
@@ -40,7 +40,7 @@ struct LearnedTable {
     std::vector<float> download() const { return values.download<float>(floats); }
     std::vector<Array> arrays();
 
-    /// What a step learns of a view, for other ranks: the row of its image with its moments, and its slot.
+    /// The results of a view for other ranks: the row of its image with its moments, and its slot. As 64-bit words, for Ranks::gather.
     size_t words_of_view() const { return (3ull * layout.row_floats + layout.slot_floats) / 2; }
     std::vector<uint64_t> words(uint32_t row, uint32_t slot) const;
     void set(uint32_t row, uint32_t slot, std::span<const uint64_t> words);

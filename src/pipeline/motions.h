@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Motions of the training cameras, learned beside the splats by the gradient of the loss.
 //
-// A rotation and a shift that compensate each other hardly change the image, and Adam's step along each value alone would
-// take very long to find how much of which. Each camera therefore has a basis in which every coordinate moves the image as
-// much as any other (CamP, Park et al. 2023). With J the derivative of a point's direction in the image by the motion, and A
-// the mean of J^T J over the points that the camera sees, the basis B has B B^T = A^-1.
+// A rotation and a shift that compensate each other hardly change the image. Adam's step along each value would take very long to
+// separate them. Each camera therefore has a basis in which a unit of every coordinate moves the image equally far (CamP, Park et
+// al. 2023). Let J be the derivative of a point's direction in the image by the motion, and A the mean of J^T J over the points
+// that the camera sees. The basis B has B B^T = A^-1.
 #pragma once
 #include <array>
 #include <vector>
@@ -63,8 +63,8 @@ struct MotionUse {
 CameraUse record_move_camera(const passes::Recorder& on, const Motions& motions, uint32_t photo,
                              const CameraUse& base);
 
-/// Adds the partial sums of the gradient that the update pass has left in frame.motion_sums. Their blocks are in
-/// frame.motion_reduced. readout: of a camera with LENSES_ROLLING.
+/// Adds the partial sums of the gradient that the update pass wrote into frame.motion_sums. frame.motion_reduced gets sums of
+/// blocks. readout: the camera has LENSES_ROLLING.
 void record_motion_sums(const passes::Recorder& on, const FrameBuffers& frame, bool readout);
 
 /// The motion takes its own step of Adam, after record_motion_sums.
