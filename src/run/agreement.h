@@ -14,10 +14,10 @@ namespace ewa::train {
 /// names the option and both values.
 void agree_on_options(RunOptions& options);
 
-/// Rank 0: tells the others the settings of its checkpoint (checkpoint_settings) and returns when all agree.
-/// Another rank: takes the options of rank 0 that decide the result, which a resumed run has from its checkpoint. Collective.
-/// fingerprint: of this rank's dataset. start: its first splats. Throws InputError on every rank, which names the first
-/// rank that has another version, dataset, first splats or kind of device than rank 0, and what differs.
+/// Rank 0 sends the settings of its checkpoint (checkpoint_settings) to the others, and returns when all agree. Another rank takes
+/// the options of rank 0 that decide the result; those of a resumed run come from its checkpoint. Collective.
+/// fingerprint: of this rank's dataset. start: its first splats. Throws InputError on every rank if one has another version, dataset,
+/// first splats or kind of device than rank 0. The text names the first such rank, and the difference.
 void agree(RunOptions& options, const nlohmann::ordered_json& settings, const std::string& fingerprint,
            const Gaussians& start, const gpu::Device& device);
 

@@ -11,8 +11,8 @@ namespace ewa::train {
 /// message says which run that is, and the ways out. A folder that does not exist is free.
 /// With options.resume, only a result without a checkpoint is refused. The splats of a run that was killed before its
 /// first checkpoint count as free. With options.force, no run is refused.
-/// Also throws InputError if the folder is a dataset, or a folder of images, or if no run has begun in it and it has files with the
-/// names of a run's.
+/// Also throws InputError if the folder is a dataset or a folder of images. So does a folder without a run that has files with the
+/// names of a run's files.
 void check_free(const std::filesystem::path& path, const RunOptions& options);
 
 }  // namespace ewa::train

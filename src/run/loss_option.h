@@ -7,10 +7,10 @@
 
 namespace ewa::train {
 
-/// Terms of colour that the text does not name have the weight 0, if it names one of them. Throws InputError.
+/// If the text names a term of colour (l1, l2, ssim), the others have the weight 0. Throws InputError.
 LossWeights parse_loss(const std::string& text);
 
-/// The weights as parse_loss reads them.
+/// The text of weights, in the form that parse_loss reads.
 std::string loss_text(const LossWeights& weights);
 
 }  // namespace ewa::train

@@ -21,8 +21,8 @@ struct Similarity {
     glm::dvec3 operator()(const glm::dvec3& x) const { return scale * (rotation * x) + shift; }
 };
 
-/// The similarity that brings cameras closest to others, which are the same ones elsewhere. It is that of Umeyama (1991) for
-/// their centres; the rotation also takes the cameras' axes into account, so that it exists for centres in one place.
+/// The similarity that maps the cameras `from` to the same cameras in `to` with the least error. It is that of Umeyama (1991) for
+/// their centres. The rotation also uses the cameras' axes, so that it exists if all centres coincide.
 Similarity similarity_between(const std::vector<Camera>& from, const std::vector<Camera>& to);
 Camera transformed(const Camera& camera, const Similarity& similarity);
 
@@ -31,7 +31,7 @@ struct RefinedCameras {
     std::vector<Camera> cameras;  // of all frames
     Similarity world;             // from the dataset's world to that of the splats
 };
-/// Training cameras are moved. The others follow by the similarity between the training cameras before and after.
+/// Training cameras have their learned motions. All others get the similarity between the training cameras before and after.
 /// motions: one for each of the frames `train`.
 RefinedCameras refined_cameras(const Dataset& dataset, const std::vector<int>& train,
                                const std::vector<CameraMotion>& motions);

@@ -11,7 +11,7 @@
 
 namespace ewa::train {
 
-/// Gives the frames of a run's input the dataset's cameras, or for a while those that belong to a trainer's splats.
+/// Sets the cameras of the frames of a run's input: those of the dataset, or for a while those that a trainer refined.
 class RunCameras {
   public:
     /// input: must outlive this.
@@ -20,7 +20,7 @@ class RunCameras {
     bool refine() const { return input_.options.train.refine_poses; }
     void use_refined(const Trainer& trainer);
     void use_given();
-    /// Moves the refined test cameras to where the splats fit their images best. before_frame: as of align_cameras.
+    /// Aligns the refined test cameras to their images, with fixed splats. before_frame: see align_cameras.
     void align_test(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
                     const std::function<void()>& before_frame);
 

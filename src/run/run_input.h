@@ -18,9 +18,9 @@ struct RunInput {
     Dataset dataset;
     Split split;
     Gaussians start;
-    bool from_points = false;  // of a cloud, which can be thinned
-    scene::KeptImages images;  // that are read already
-    // For the user and the report: what ewa chose, and what may be wrong.
+    bool from_points = false;  // `start` is a cloud of points, which can be thinned
+    scene::KeptImages images;  // images that are already read, cached
+    // For the user and the report: ewa's choices, and possible problems.
     std::vector<std::string> notes, remarks;
 
     /// The dataset says that SH degree 0 suffices, and the run uses that.
@@ -32,7 +32,7 @@ struct RunInput {
 /// Loads the dataset and the first splats. Throws InputError.
 RunInput load_run(const RunOptions& options);
 
-/// Starts from fewer points where the device has no room for a splat of each. Not for a number that the user sets.
+/// Thins the points if the device has no memory for a splat of each. Does nothing if the user set the number of splats.
 void thin_for_device(RunInput& input, const gpu::Device& device);
 
 /// Whether RunOptions::init is a word, and not a file.
@@ -45,9 +45,9 @@ enum class StartsFrom { points, depth_maps, stereo, random, file };
 struct StartSource {
     StartsFrom from = StartsFrom::file;
     size_t points = 0, images = 0;  // of stereo
-    std::string skipped;            // what of a file is skipped, and why; empty: nothing is
+    std::string skipped;            // contents of a file that are skipped, and why; empty: none
     bool cloud = false;             // the file has points
-    std::string thinned;            // what to tell of points that are too many; empty: none are
+    std::string thinned;            // a line about the thinning of points; empty: none
 };
 
 /// The first splats that the options ask for. frames: indices of the training frames. options: with a concrete
@@ -56,8 +56,8 @@ struct StartSource {
 Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames,
                          StartSource* source = nullptr);
 
-/// Throws InputError for what is wrong with the options on every dataset, the files that they name included. For use before
-/// long work makes the dataset.
+/// Throws InputError if the options, or the files that they name, are wrong for every dataset. For use before long work makes the
+/// dataset.
 void check_without_dataset(const RunOptions& options);
 
 /// Throws InputError if --downscale leaves too little of an image to learn from. factor: of --downscale. left: the part of it
