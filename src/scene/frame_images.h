@@ -20,12 +20,12 @@ inline size_t images_at_once(const std::vector<const Frame*>& frames) {
     return size_t(std::max<uint64_t>(1, kPixels / largest));
 }
 
-/// The image that is kept for the frame as it is, or else the result of load_frame_image. Throws as that does.
+/// The cached image of the frame, or else the result of load_frame_image. Throws as that does.
 std::shared_ptr<const Image> image_of(const Frame& frame);
 
 using KeptImages = std::vector<std::shared_ptr<const KeptImage>>;
-/// Reads the images of these frames, on all cores, as far as they take no more than 128 MiB as four float32 channels. image_of
-/// takes them for as long as the result lives. Throws as load_frame_image does.
+/// Reads images of these frames on all cores, the first ones that fit into 128 MiB as four float32 channels. image_of finds them
+/// while the result exists. Throws as load_frame_image does.
 KeptImages read_images(Dataset& dataset, const std::vector<int>& indices);
 
 /// The frames with these indices.

@@ -19,14 +19,13 @@ struct Segment {
     glm::dvec3 from{0}, to{0};
 };
 
-/// The frustum as lines: four edges from the camera's centre to the image's corners at that depth, the
-/// image's four sides (top, right, bottom, left), and two sides of a roof over the top one that mark the up
-/// direction. A fisheye and 360° show the middle of the image, half as wide and high. Parallel rays begin in the plane of
+/// The frustum as ten lines: four edges from the camera's centre to the image's corners at that depth, then the image's sides (top,
+/// right, bottom, left). The last two are a roof over the top side, which marks the up direction. A fisheye and 360° show the middle of the image, half as wide and high. Parallel rays begin in the plane of
 /// the camera. depth > 0.
 std::array<Segment, 10> frustum_segments(const Camera& camera, double depth);
 
-/// The part of a segment in front of the camera's near plane, in px. Empty if there is none. Through a fisheye or 360° it is straight
-/// between the pixels of its ends, and empty where one of these is not shown or the seam lies between them.
+/// The part of a segment in front of the camera's near plane, in px. Empty if there is none. For a fisheye or 360°, it is the straight
+/// line between the pixels of its ends. It is then empty if the lens does not show an end, or if the seam is between them.
 std::optional<std::array<glm::dvec2, 2>> projected(const Segment& segment, const Camera& camera);
 /// The pixel of a point through the camera's lens. Empty behind the near plane and where the lens does not show it.
 std::optional<glm::dvec2> projected(const glm::dvec3& point, const Camera& camera);

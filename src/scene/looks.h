@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The words for how a scene is drawn or read, and which of the options of a render go together.
+// The words of options for rendering and reading a scene, and the options of a render that exclude each other.
 #pragma once
 #include "core/words.h"
 #include "ewa/dataset.h"
@@ -22,7 +22,7 @@ inline const core::Words<MaskUse> kMaskWords{{"auto", MaskUse::automatic},
 inline const core::Words<LensUse> kLensWords{
     {"auto", LensUse::automatic}, {"native", LensUse::native}, {"undistort", LensUse::undistort}};
 
-/// The options of a render, and which of them are given, be it with the usual value.
+/// The options of a render. nearest, samples: whether the user gave them, even with the default value.
 struct Look {
     RenderOptions render = {};
     bool nearest = false, samples = false;
@@ -31,7 +31,7 @@ struct Look {
 /// Throws InputError for options that exclude each other, or need another one.
 void check_look(const Look& look);
 
-/// Throws InputError where splats cannot be drawn so through the camera's lens, and what check() of the options throws.
+/// Throws InputError if these options cannot draw through the camera's lens, and what check() of the options throws.
 void check_lens(const RenderOptions& render, const Camera& camera);
 
 }  // namespace ewa::scene

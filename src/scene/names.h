@@ -14,7 +14,7 @@ namespace ewa::scene {
 /// folder and its extension if no other frame is meant. A name goes before a range. Throws InputError.
 std::vector<int> frames_named(const Dataset& dataset, const std::string& list);
 
-/// The index of this name, or -1. Without its folder or its extension, only one of the names may be meant.
+/// The index of this name, or -1. A name without its folder or extension is found if it fits one name only.
 int index_of_name(const std::vector<std::string>& names, const std::string& name);
 
 /// The folder's name that a dataset is known by. For a file, and for a COLMAP model (sparse, or sparse/0): the

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The views of which pictures with depth of field and motion blur consist. Cameras in the OpenCV convention.
+// The views that are averaged for depth of field and motion blur. Cameras in the OpenCV convention.
 #pragma once
 #include <glm/vec2.hpp>
 
@@ -18,7 +18,8 @@ Camera moved_eye(Camera camera, const glm::dvec2& offset, double focus);
 /// sunflower head"). 0 <= i < count.
 glm::dvec2 disc_point(int i, int count);
 
-/// Element i >= 0 of van der Corput's sequence in base 2: in [0, 1), evenly for each count, and without relation to disc_point.
+/// Element i >= 0 of van der Corput's sequence in base 2, in [0, 1). The first elements are evenly spread for every count, and not
+/// correlated with disc_point.
 double even_share(int i);
 
 }  // namespace ewa::scene

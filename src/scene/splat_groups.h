@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which splats belong together, and how many cameras see each: what cleaning a scene needs to know.
+// Groups of splats that touch, and the number of cameras that see each splat. Cleaning a scene uses both.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -16,12 +16,13 @@ struct SplatGroups {
 };
 
 /// Groups of splats that touch. Two splats touch if their largest standard deviations differ by less than a factor of 2, and
-/// d' (Σa + Σb)^-1 d < 9 for the difference d of their means: 3 standard deviations of the difference of a point of each. The
-/// limit on sizes keeps a huge splat in the background from joining all that floats in it. Each splat is compared
-/// with its 32 nearest of about its size. The first of several at one place in an octave of sizes is compared for all. A splat that is not drawable is a group of its own. O(n log n).
+/// d' (Σa + Σb)^-1 d < 9 for the difference d of their means: 3 standard deviations of the difference of a point of each. The limit on
+/// sizes keeps a huge splat in the background from joining small groups that float in it. Each splat is compared with its 32 nearest
+/// of about its size. If several of an octave of sizes have one mean, only the first is compared. A splat that is not drawable is a
+/// group of its own. O(n log n).
 SplatGroups touching_groups(const Gaussians& gaussians);
 
-/// How many of the cameras have the splat's mean in their image, in front of the near plane. What hides it does not count.
+/// For each splat, the number of cameras with its mean in their image, in front of the near plane. Splats in front do not hide it.
 /// Lenses must be native (is_native).
 std::vector<uint32_t> views_of_splats(const Gaussians& gaussians, const std::vector<Camera>& cameras);
 
