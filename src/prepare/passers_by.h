@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What one training image shows and the others do not: people who pass by, cars, a hand. A model of all images shows it faintly.
-// Its render then differs from that image by far more than elsewhere, and the difference ends abruptly.
+// Finds objects that a single training image shows: people who pass by, cars, a hand. A model of all images shows them faintly. So
+// its render differs from that image by far more there than elsewhere, and the difference has sharp borders.
 #pragma once
 #include <vector>
 
@@ -8,7 +8,7 @@
 
 namespace ewa::train {
 
-/// How far a render is from its training image, in cells of some pixels.
+/// Differences between a render and its training image, in cells of some pixels.
 struct Residual {
     int columns = 0, rows = 0;  // pixels
     int width = 0, height = 0;  // cells
@@ -17,12 +17,12 @@ struct Residual {
     double median = 0;          // of the errors that count; 0 if none does
 };
 
-/// The gain and offset of each channel that fit the render to the image are taken out, since images may differ in exposure.
+/// The render is first fitted to the image by a gain and an offset of each channel, since images may differ in exposure.
 /// weights: of the image's pixels, one channel; empty: all count. The images have one size.
 Residual residual_of(const Image& image, const Image& weights, const Image& render);
 
-/// A mask for each training image, of one channel and the size of the compared images: 0 where the image shows what the others do not,
-/// else 1. Without pixels where there is nothing such.
+/// A mask for each training image, of one channel and the size of the compared images: 0 at objects that only this image shows, else
+/// 1. An image without such objects has an empty mask.
 std::vector<Image> passers_by(const std::vector<Residual>& residuals);
 
 }  // namespace ewa::train

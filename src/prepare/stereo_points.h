@@ -14,11 +14,11 @@ struct StereoPoints {
     size_t images = 0;  // that show them
 };
 
-/// About `count` points in the world: scene::sweep_planes of at most 96 frames, each with up to four others that see the same
-/// from 2 to 30 degrees beside. A depth counts where two of them agree with it to 1.5 %, or one if there is but one. Masked
-/// and transparent pixels do not count. No points where fewer than 1,000 depths count: the images show too little texture, are
-/// smaller than 64 px, or are not those of pinholes with a global shutter, or all cameras are in one place. frames: of these.
-/// background: behind transparent images. The seed decides which pixels. The result does not depend on the number of cores.
+/// About `count` points in world coordinates, by scene::sweep_planes for at most 96 frames. Each frame is compared with up to four
+/// others that see the same part of the scene from 2 to 30 degrees to the side. A depth counts if two of them agree with it to
+/// 1.5 %, or one if there is only one. Masked and transparent pixels do not count. Empty if fewer than 1,000 depths count. So it is
+/// for images without texture, below 64 px, of other cameras than pinholes with a global shutter, or all from one position.
+/// frames: indices. background: behind transparent images. The seed chooses the pixels. The number of cores does not change it.
 /// Throws InputError (an image that cannot be read).
 StereoPoints points_by_stereo(const Dataset& dataset, const std::vector<int>& frames,
                               const std::array<float, 3>& background, uint32_t count, uint64_t seed);
