@@ -44,9 +44,9 @@ Image quadratic_corrected(const Image& a, const Image& b, const Image& weights);
 /// Mean of LDR-FLIP's error map (Andersson et al. 2020) at 67.02 pixels a degree, as flip-evaluator.
 double flip(const Image& a, const Image& b, const Image& weights);
 
-/// The difference is the sum of parts: part k < 4 is the image of means over squares of 2^k px minus that over squares of
-/// 2^(k+1) px; the last is the mean over squares of 16 px. Squares start at the top left corner. The parts are
-/// orthogonal, so that their mean squares add up to the MSE. These are their PSNRs.
+/// The PSNR of each frequency band of the difference image. Let D_k be its means over squares of 2^k px, from the top left corner.
+/// Band k < 4 is D_k - D_(k+1), and the last is D_4. The bands are orthogonal and add up to the difference, so their mean squares add
+/// up to the MSE.
 constexpr size_t kBands = 5;
 std::array<double, kBands> band_psnr(const Image& a, const Image& b, const Image& weights);
 
