@@ -22,16 +22,16 @@ class Companions {
     /// The file of an image, which the model may name; empty if there is none. Throws InputError for a link out of the dataset.
     std::filesystem::path find(const ImageRecord& image);
 
-    /// A file that is alone there, and of none of the images: it is for all of them. Empty if there is none.
+    /// The file for all images: the only one there, if its name is that of no image. Empty if there is none.
     std::filesystem::path of_all();
 
-    /// What was found, and is used. bare: names of images without a file.
+    /// The numbers of files that were found and that are used. bare: names of images without a file.
     UsedOf used(const std::vector<std::string>& bare) const;
 
   private:
     struct File {
         std::filesystem::path folder, name;  // name: relative to the folder
-        int rank = 0;                        // of the folder: the least counts
+        int rank = 0;                        // of the folder: the lowest has precedence
         std::string above = {};              // the key of the folder of its image, if it has that one
         std::string fault = {};              // why it cannot be used, after its name
     };
@@ -40,10 +40,10 @@ class Companions {
     void list_folders(int downscale);
     void list_loose(int rank);
     void list_beside(const std::vector<ImageRecord>& images);
-    /// Finds what cannot be used.
+    /// Finds files that cannot be used.
     void examine();
     std::string why_unused(const File& file) const;
-    /// A folder that is not looked into, by its name.
+    /// Names a folder that is not searched.
     void note_folder(UsedOf& result) const;
     /// The file of an image in a folder of rank `from` to `to`.
     const File* look(const std::filesystem::path& image, int from, int to) const;

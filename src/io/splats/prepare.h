@@ -8,15 +8,15 @@
 
 namespace ewa::io {
 
-/// Makes the scene one that the format can hold: with float32 positions, opacities of 3DGS's kernel and drawable splats alone, but
-/// for what the format keeps.
+/// Changes the scene to what the format can store: float32 positions, opacities of 3DGS's kernel, and drawable splats only, unless
+/// the row says that the format keeps more.
 std::vector<std::string> prepare(Gaussians& gaussians, const FormatRow& row);
 
 /// Whether prepare would leave the scene as it is.
 bool is_prepared(const Gaussians& gaussians, const FormatRow& row);
 
-/// Leaves the splats that the file will have, in its order, so that a file that is read back can be compared splat by splat. Their
-/// positions and opacities stay as they are.
+/// Keeps the splats that the file will have, in its order, so that a file that is read back can be compared splat by splat. Positions
+/// and opacities do not change.
 std::vector<std::string> match_file(Gaussians& gaussians, const FormatRow& row);
 
 /// The comments and the mark that the format drops.

@@ -31,16 +31,16 @@ class ImageFinder {
     /// names without a path that exists are searched in other folders of the place.
     void settle(const std::vector<std::string>& names) const;
 
-    /// Adds the folders of the dataset whose pictures usually are those of a workspace.
+    /// Adds folders of the dataset that usually have the images of a workspace. They are searched last.
     void add_last(const std::filesystem::path& dataset);
 
     struct Found {
         std::filesystem::path path;
         std::string name;  // relative to the place
     };
-    /// A missing image is a path at which no file is. Among several images with the name, the one
-    /// counts whose path has most in common. Throws InputError that begins with `where` if that is not one image, if the name is no file's,
-    /// or if the image is a link out of the dataset, or if there are more than 200,000 images.
+    /// Returns a path without a file if the image is missing. Among several images with the name, the one with most of the path in common
+    /// is taken. Throws InputError that begins with `where`: several such images, no name of a file, a link out of the dataset, or more
+    /// than 200,000 images.
     Found find(const std::string& name, const std::string& where) const;
 
     /// All images of the place, relative to it and sorted. Without one that is chosen, those of the likeliest place.

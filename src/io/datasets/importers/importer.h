@@ -63,8 +63,8 @@ bool is_imported(const std::filesystem::path& entry, const std::function<std::st
 std::filesystem::path other_cameras(const std::filesystem::path& dataset, const FoundImporter& found,
                                     const std::vector<std::filesystem::path>& read);
 
-/// What to export, for a folder or file with the cameras of a program in a form that is not read, such as its own project. Or why
-/// a file is not the one that its name promises. Empty if there is nothing to say.
+/// Advice on what to export, for a folder or file with a program's cameras in a form that ewa does not read, such as its project. Or
+/// the reason why a file has not the format of its name. Empty: no advice.
 std::string export_advice(const std::filesystem::path& path);
 
 /// Whether a file may be a transforms.json by its name: one that begins with "transforms", in any case.
