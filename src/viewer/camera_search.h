@@ -14,8 +14,8 @@
 
 namespace ewa::viewer {
 
-/// The folder of the run that `ewa train` of this input would write, or the first with a number behind it that does not
-/// exist. or_own_photos: or whose folder `dataset` was made, or begun, of these photos.
+/// The folder of the run that `ewa train` would write for this input. If it exists, the first free one with a number appended.
+/// or_own_photos: also takes an existing one whose folder `dataset` was made, or begun, from these photos.
 std::filesystem::path free_run_folder(const std::filesystem::path& input, bool or_own_photos = false);
 
 class CameraSearch {

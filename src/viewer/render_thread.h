@@ -38,7 +38,7 @@ struct RenderRequest {
     std::filesystem::path file;  // written as by `ewa render` with this extension; empty: no file
 };
 
-/// What a point under a pixel is asked for.
+/// The use of a point under a pixel.
 enum class PointUse { look_at, measure };
 
 /// The point on the surface under a pixel.
@@ -83,7 +83,7 @@ class RenderThread {
     /// measure are all answered, at full resolution, which takes a frame's time. A point to look at replaces a waiting one.
     uint64_t ask_point(const Camera& camera, const glm::dvec2& pixel, PointUse use);
 
-    /// Points that wait are not answered. That which is read just now is.
+    /// Drops waiting requests for points. The one in progress is still answered.
     void forget_points();
 
     /// Asks for the colours of a camera at its own size. News::full has them once its number is the returned one. Only

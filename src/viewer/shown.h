@@ -21,14 +21,14 @@ class Shown {
     Shown(ViewState& state, Navigation& navigation);
 
     void enter_scene();
-    /// Takes what the threads report. Throws what a script, or the first frame, cannot do without.
+    /// Takes the results of the threads. Throws their errors in a script, and for the first frame.
     void take_renders();
     void take_comparison(Presenter& presenter);
-    /// Asks for the view, unless the window is minimised, or a film has cameras of its own.
+    /// Asks for a render of the view, unless the window is minimised, or a film sets the cameras.
     void ask();
     /// Looks at the point, or makes it one of `measurement`.
     void ask_point(const glm::dvec2& pixel, PointUse use);
-    /// Forgets what was measured, and what is still asked for, where measuring ends.
+    /// Turns measuring on or off. Off: drops the points, and requests that still wait.
     void set_measuring(bool on);
     /// Writes the render alone, in floating point.
     void write_exr();
@@ -53,7 +53,7 @@ class Shown {
     void change_comparison();
     Arrangement arrangement() const;
     Camera camera() const;  // of the size of the render's place
-    /// The look of the settings, without what is drawn through pinholes only if the camera is none.
+    /// The look of the settings. For other cameras than pinholes, without modes that need a pinhole.
     Look look_for(const Camera& camera) const;
     std::string image_failure() const;    // why the camera has no image; else empty
     const std::optional<double>& psnr();  // for the panel, dB

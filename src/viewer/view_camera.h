@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the window looks from: the first view of a scene, and the camera that mouse and keys move around a
-// pivot, towards it, or freely. Independent of the window.
+// The camera of the window: the first view of a scene, and motions by mouse and keys around a pivot, towards it, or freely.
+// Independent of the window.
 #pragma once
 #include <glm/geometric.hpp>
 
@@ -11,7 +11,7 @@
 
 namespace ewa::viewer {
 
-/// A place to look from, and the point to orbit.
+/// A camera, and the point that it orbits.
 struct Viewpoint {
     Camera camera;
     glm::dvec3 pivot{0, 0, 1};  // world; the centre of orbiting

@@ -30,7 +30,7 @@ class ViewQuality {
     /// wake: called on a thread when psnr() may have changed.
     explicit ViewQuality(std::function<void()> wake) : measurements_(quality_of, std::move(wake)) {}
 
-    /// Starts to measure this frame of the dataset, unless that is under way or done.
+    /// Starts to measure this frame of the dataset, unless that has begun already.
     void measure(Renders& renders, int index, const Frame& frame, const Look& look,
                  const Appearance& appearance = kIdentityExposure);
     /// rendering: the last one of the renders, or null.
