@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// COLMAP and GLOMAP as programs: their log, their options, and what their lines say.
+// COLMAP and GLOMAP as programs: their log, their options, and the meaning of their lines.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -25,7 +25,7 @@ class Colmap {
     /// Whether the help of a command has an option: their names differ between releases.
     bool has_option(const std::string& command, const std::string& option) const;
 
-    /// What the options of a matcher begin with, which COLMAP 3.13 has renamed.
+    /// The prefix of a matcher's options, which COLMAP 3.13 has renamed.
     std::string options_of_matching(const std::string& command) const;
 
     /// Runs a program. done(line): the number of finished units after this line of the output, if it says so. Throws RunError,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Films: what ffprobe or ffmpeg says of one, and the colours of films of high dynamic range.
+// Films: their properties by ffprobe or ffmpeg, and the colours of films of high dynamic range.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -11,7 +11,7 @@
 
 namespace ewa::capture {
 
-/// What is known of a film before its frames are read. Numbers that are not known are 0, and names are empty.
+/// Properties of a film that are known before its frames are read. Unknown numbers are 0, and unknown names empty.
 struct FilmInfo {
     int stream = -1;  // of the largest pictures; -1: not known
     int width = 0, height = 0;

@@ -14,7 +14,7 @@ namespace ewa::capture {
 /// Why no lens of a camera is like this; empty if one may be. expected: the focal length by EXIF, px; 0: not known.
 std::string lens_fault(const Camera& lens, double expected);
 
-/// What a model is worth.
+/// The quality of a model.
 struct Grade {
     int placed = 0;  // photos
     int sound = 0;   // of them: no fault of the lens, points in front of the camera

@@ -34,7 +34,7 @@ struct Way {
     bool neighbours = false;           // only matches of photos that follow each other
 };
 
-/// What the matches and the photos allow.
+/// Facts about the matches and photos that decide which ways can be tried.
 struct WayFacts {
     bool exif = false;    // most photos have a focal length by EXIF
     bool shared = false;  // photos share a lens, and may have their own
@@ -42,12 +42,12 @@ struct WayFacts {
 
 /// The ways after the first one, in the order in which they are tried: first what costs least and places most.
 std::vector<Way> other_ways(const WayFacts& facts);
-/// The way with what `more` adds.
+/// The way with the options of `more` added.
 Way with(const Way& way, const Way& more);
 /// Whether two ways are one, whatever their names.
 bool is_same(const Way& first, const Way& second);
 
-/// What a way has given.
+/// The result of a way.
 struct Placing {
     Way way;
     std::vector<MappedModel> models{};  // the largest first
@@ -71,10 +71,10 @@ class Mapping {
     void join(Placing& placing) const;
     /// Adds photos with fewer matches to the largest model, where no more matches contradict their cameras.
     void extend(Placing& placing) const;
-    /// What there is in a folder.
+    /// The models in a folder.
     Placing placed_in(const Way& way, const std::filesystem::path& folder) const;
 
-    /// Tells the user what a way has given, and how long it took.
+    /// Prints the result and the time of a way for the user.
     void say(const Placing& placing) const;
     const std::map<std::string, double>& expected() const { return expected_; }
 

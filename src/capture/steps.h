@@ -140,7 +140,7 @@ void require_photos(const std::filesystem::path& folder, size_t count, const std
 
 using Json = nlohmann::ordered_json;  // of capture.json
 
-/// A line for a file: what distinguishes its content, a space, and its name. The record is JSON, which is UTF-8.
+/// A line for a file: a hash of its content, a space, and its name. The record is JSON, which is UTF-8.
 std::string line_of(const std::filesystem::path& folder, const std::filesystem::path& name);
 
 /// The photos of a search for cameras, after those that changed since it began were removed.
@@ -180,7 +180,7 @@ enum class Pairing {
     all
 };
 
-/// What COLMAP has to place.
+/// The photos or views that COLMAP has to place.
 struct Photos {
     std::filesystem::path folder;              // of the images
     std::vector<std::filesystem::path> names;  // relative to it
@@ -189,7 +189,7 @@ struct Photos {
     bool level = true;                 // as CaptureOptions::level
 };
 
-/// What the user gets to know of the cameras that were found.
+/// The lines for the user about the cameras that were found.
 struct Found {
     std::vector<std::string> remarks;
     std::string axes;  // as Capture::axes

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a path names: the one answer for all commands, the window and the Python package.
+// The kind of input that a path names. All commands, the window and the Python package use it.
 #pragma once
 #include <filesystem>
 #include <string_view>
@@ -18,7 +18,7 @@ enum class What {
     splats,  // any other file: the reader of splats says what is wrong with it
 };
 
-/// What the path names. A folder that is a dataset and a run is a dataset. Throws InputError if it cannot be read.
+/// The kind of the path. A folder that is a dataset and a run is a dataset. Throws InputError if it cannot be read.
 What what_is(const std::filesystem::path& path);
 
 /// Whether ewa makes a dataset of it by a search for cameras: photos, a video or an archive.

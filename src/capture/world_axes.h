@@ -14,7 +14,7 @@
 
 namespace ewa::capture {
 
-/// What a photo's file says of its camera.
+/// Properties of a photo's camera by its file.
 struct PhotoFacts {
     int orientation = 1;  // by EXIF, of the camera's pixels: 1 where these are upright
     std::optional<image::GpsFix> gps;
@@ -26,7 +26,7 @@ struct WorldAxes {
     glm::dmat3 rotation{1};
     glm::dvec3 shift{0};
     std::optional<io::Place> place;  // of the new origin
-    std::string text;                // what has been done, for the user; empty: nothing, and the axes stay
+    std::string text;                // a line for the user; empty: the axes did not change
 };
 
 /// facts: by the names of the photos. Those without are upright and have no GPS. The same input gives the same axes.
