@@ -8,12 +8,12 @@ namespace ewa::core {
 
 struct Plugin {
     const char* file;     // "libewa_mpi.so"
-    const char* entry;    // the name of what it exports
+    const char* entry;    // the name of the table of functions that it exports
     const char* purpose;  // for messages: "which lets processes train together"
     const char* help;     // for messages: what to install
 };
 
-/// Throws RunError: the library cannot be loaded, why, and what would help.
+/// Throws RunError: the library cannot be loaded, with the reason and a remedy.
 [[noreturn]] void cannot_load(const Plugin& plugin, const std::string& reason);
 
 /// Loads the library from its folder beside the program or libewa, and returns what it exports. That begins with the

@@ -31,7 +31,7 @@ class Pace {
     std::vector<Mark> marks_;
 };
 
-/// What a terminal shows of the work.
+/// The progress that a terminal shows.
 struct ProgressLine {
     double share = 0;            // of the time, 0 to 1
     std::optional<double> left;  // s
@@ -57,7 +57,7 @@ class Progress {
     void set_total(int total);
     /// This part's units up to `done` were done before it began.
     void skip(int done);
-    /// Seconds that this part still takes, in place of what its pace says. They count down until the next call. Empty: nobody knows.
+    /// Seconds that this part still takes, in place of the estimate by its pace. They count down until the next call. Empty: unknown.
     void set_left(std::optional<double> seconds);
     /// Seconds that the parts after this one take.
     void set_rest(double seconds) { rest_ = seconds; }

@@ -33,7 +33,7 @@ std::string lower(std::string_view text);
 /// The number with commas: "40,715".
 std::string grouped(uint64_t number);
 
-/// What to throw where an array of the caller has a wrong length: "means has 3 values; 40,715 splats need 122,145".
+/// The error for a caller's array of a wrong length: "means has 3 values; 40,715 splats need 122,145".
 InputError wrong_length(std::string_view array, uint64_t values, std::string_view who_needs, uint64_t needed);
 
 /// Seconds as "12 s", "3 min 05 s" or "2 h 10 min".

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What people type: counts such as 7k, colours by name, words out of a set, and suggestions for mistyped words.
+// Values of options as people type them: counts such as 7k, colours by name, words of a set. Suggestions for mistyped words.
 // No function needs a library, so that the parsers of all programs can share them.
 #pragma once
 #include <array>
@@ -81,10 +81,10 @@ std::optional<std::array<float, 3>> parse_colour(std::string_view text);
 /// A box from "x,y,z,X,Y,Z", finite numbers with the lower corner first. Empty for other text.
 std::optional<std::array<double, 6>> parse_box(std::string_view text);
 
-/// What a message says of text that parse_box does not read.
+/// The error text for a box that parse_box does not read.
 std::string not_a_box(std::string_view text);
 
-/// What a message says of text that parse_colour does not read.
+/// The error text for a colour that parse_colour does not read.
 std::string not_a_colour(std::string_view text);
 
 /// "1 image", "2 images".
