@@ -30,7 +30,7 @@ std::vector<bool> grounded_splats(const Gaussians& gaussians);
 /// The splat is in the largest group of such splats.
 std::vector<bool> largest_cluster(const Gaussians& gaussians);
 
-/// The scene in grey, with what `left` lacks in red. left: numbers of splats of `all`, in ascending order.
+/// The scene in grey, with splats that are not in `left` in red. left: ascending indices into `all`.
 Gaussians with_removed_in_red(const Gaussians& all, const std::vector<uint32_t>& left);
 
 }  // namespace ewa::edit
