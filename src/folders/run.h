@@ -42,7 +42,7 @@ std::optional<Run> find_run(const std::filesystem::path& folder);
 /// The runs in this folder, such as "out/a, out/b and 3 more". Empty if there are none.
 std::string runs_in(const std::filesystem::path& folder);
 
-/// The run that wrote this splat file: it is splats.ply, or one that --keep keeps, and config.json is beside it. Empty for any other path.
+/// The run that wrote this splat file: splats.ply, or one that --keep stores, with config.json beside it. Empty for any other path.
 std::optional<Run> run_of_splats(const std::filesystem::path& splats);
 
 /// The folder of the run that this path is a file of, also through symbolic links: it has the name of such a file, and a

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The folder of a training run: the names of its files, and what is in it.
+// The folder of a training run: the names and contents of its files.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -32,13 +32,13 @@ inline constexpr const char* kLiveFile = "live.json";
 
 /// The renders of held-out and of training images.
 inline constexpr const char *kTestFolder = "test", *kTrainFolder = "train";
-/// With --robust: a mask for each training image that shows what the others do not.
+/// With --robust: masks of objects that single training images show.
 inline constexpr const char* kPassersByFolder = "passers_by";
 /// With --inria: the files of INRIA's trainer.
 inline constexpr const char* kInriaFolder = "inria";
 /// The dataset that the run makes of a mesh scene, photos or a video.
 inline constexpr const char* kMadeDataset = "dataset";
-/// In a dataset that ewa makes of photos or a video: what it makes it of.
+/// In a dataset that ewa makes of photos or a video: its record of input and options.
 inline constexpr const char* kCaptureFile = "capture.json";
 
 inline constexpr uint64_t kMostConfigBytes = 1u << 20;  // of config.json and capture.json
@@ -48,7 +48,7 @@ inline constexpr const char *kCamerasFolder = "cameras", *kCameraModel = "camera
 inline constexpr std::array kCameraModelFiles{"cameras/sparse/0/cameras.bin", "cameras/sparse/0/images.bin",
                                               "cameras/sparse/0/points3D.bin"};
 
-/// The step of splats that --keep keeps, such as splats_007000.ply. Empty for other names.
+/// The step in the name of splats that --keep stores, such as splats_007000.ply. Empty for other names.
 std::optional<int> step_of_kept_splats(std::string_view name);
 std::string name_of_kept_splats(int step);
 
@@ -69,12 +69,12 @@ class RunFolder {
     /// Whether the folder has this file.
     bool has(std::string_view name) const { return core::is_file(path_ / name); }
 
-    /// Whether a run has begun here, finished or not: the folder has config.json, and beside it what a run has that has begun.
+    /// Whether a run has begun here, finished or not: the folder has config.json, and another file of a run that has begun.
     /// Other programs also write a config.json.
     bool is_run() const;
     /// The options of the run by their present names. Empty if config.json cannot be read.
     nlohmann::json options() const;
-    /// The splats that --keep kept, by their steps.
+    /// The splats that --keep stored, by their steps.
     std::map<int, std::filesystem::path> kept_splats() const;
 
     /// Creates the folder and locks it. Throws RunError if it cannot be created, or another process uses it.
@@ -91,7 +91,7 @@ class RunFolder {
 /// RunFolder::is_run().
 bool is_run(const std::filesystem::path& folder);
 
-/// Whether ewa has made the folder: a training run, or a dataset of photos. Its pictures are no photos.
+/// Whether ewa has made the folder: a training run, or a dataset of photos. Images in it are not used as photos.
 bool is_made_by_ewa(const std::filesystem::path& folder);
 
 }  // namespace ewa::folders
