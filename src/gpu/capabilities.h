@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a physical device has: what kernels need, and what ewa uses where there is it.
+// The features of a physical device: those that kernels need, and those that ewa uses if present.
 #pragma once
 #include <compare>
 #include <cstdint>
@@ -44,7 +44,7 @@ Enabled enabled_by(const VkDeviceCreateInfo& info);
 /// desktop's do not wait for each other.
 std::optional<uint32_t> compute_family(std::span<const vk::QueueFamilyProperties> families, bool own_queue);
 
-/// What kernels can ask of 32-bit floats.
+/// Properties of 32-bit floats that kernels can request.
 struct FloatModes {
     bool special_values = false;  // signed zeros, infinities and NaN are kept: comparisons with NaN fail
     bool denormals = false;       // numbers below 1.2e-38 are kept
@@ -52,7 +52,7 @@ struct FloatModes {
 };
 FloatModes float_modes_of(const vk::PhysicalDeviceFloatControlsProperties& properties);
 
-/// What a usable device may have or not.
+/// Optional features of a usable device.
 struct OptionalParts {
     bool cpu = false;
     Subgroups subgroups;
@@ -62,7 +62,7 @@ struct OptionalParts {
     bool own_queue = false;      // a compute queue without graphics
     bool cached_memory = false;  // that the host can map
 };
-/// What is not there, each with what follows from it. Ballots and a queue of its own have no
+/// The missing features, each with its consequence. Ballots and a queue of its own have no
 /// consequence on a CPU device.
 std::vector<std::string> lacks_of(const OptionalParts& parts);
 

@@ -14,7 +14,7 @@ class CompileThreads {
   public:
     /// most: threads at one time.
     explicit CompileThreads(size_t most) : most_(most) {}
-    /// Waits for the threads. What none of them has begun is not done.
+    /// Waits for the threads. Jobs that have not begun are dropped.
     ~CompileThreads();
     CompileThreads(const CompileThreads&) = delete;
 

@@ -47,7 +47,7 @@ class Device {
   public:
     /// own_queue: as in DeviceOptions. instance: of which `info` is a device, without validation. Null: it gets one of its own.
     Device(const DeviceInfo& info, bool validation, bool own_queue = true, vk::UniqueInstance instance = {});
-    /// Uses a caller's device, which stays the caller's. Throws what borrow_device throws.
+    /// Uses a caller's device, which the caller destroys. Throws as borrow_device does.
     explicit Device(const VulkanDevice& borrowed);
     ~Device();
     Device(const Device&) = delete;
@@ -65,7 +65,7 @@ class Device {
     /// Submits to the queue. Calls may come from any thread.
     void submit(const vk::SubmitInfo& info, vk::Fence fence);
 
-    /// What pipelines ask of 32-bit floats: what there is. A CPU device is asked for nothing: lavapipe keeps NaN
+    /// The properties of 32-bit floats that pipelines request: those of the device. None of a CPU device: lavapipe keeps NaN
     /// anyway, and computes other bytes when asked.
     FloatModes float_modes() const { return limits_.exact_floats ? float_modes_ : FloatModes{}; }
 
@@ -96,7 +96,7 @@ class Device {
   private:
     void create_instance(bool validation);
     void create_device(bool own_queue);
-    /// What ewa knows and needs of device_, which was created with `enabled`.
+    /// Reads the properties of device_, which was created with `enabled`.
     void use_device(const Enabled& enabled);
 
     DeviceInfo info_;

@@ -50,7 +50,7 @@ class Executor {
     const std::vector<PassTime>& timings() const { return timings_; }
 
   private:
-    /// What a submission needs until it is done.
+    /// Objects that a submission needs until it is done.
     struct Slot {
         vk::UniqueCommandBuffer commands;
         vk::UniqueFence fence;

@@ -27,7 +27,7 @@ struct BufferPart {
     uint64_t bytes = 0;  // 0: the rest of the buffer
 };
 
-/// A buffer part and what a command does with it.
+/// A buffer part and how a command accesses it.
 struct Use {
     BufferPart part;
     Access access;
