@@ -39,7 +39,7 @@ std::string panorama_xmp(int width, int height);
 /// The values as bytes: clamped to [0, 1], rounded, NaN as 0.
 std::vector<uint8_t> eight_bit_values(const Image& image);
 
-/// What the file's first bytes say: png, jpeg, tiff, openexr, webp, bmp, pnm or hdr. Throws InputError for
+/// The format by the file's first bytes: png, jpeg, tiff, openexr, webp, bmp, pnm or hdr. Throws InputError for
 /// any other file.
 std::string_view format_name(const std::filesystem::path& path);
 
@@ -61,7 +61,7 @@ struct GpsFix {
     std::optional<double> altitude;  // m above the sea
 };
 
-/// What a JPEG's EXIF says of how it was taken. Empty for other files.
+/// The settings of the camera by a JPEG's EXIF. Empty for other files.
 struct Shot {
     std::string lens;  // text for the camera and its focal length: equal for photos of one lens at one zoom
     std::optional<double> exposure;  // log2(time * ISO / f-number^2), stops
@@ -116,7 +116,7 @@ struct StoredImage {
 StoredImage read_png(std::FILE* file, uint64_t file_bytes, bool pixels);
 StoredImage read_jpeg(std::FILE* file, uint64_t file_bytes, bool pixels);
 
-/// Decodes at an eighth of the size and keeps nothing.
+/// Decodes at an eighth of the size, only to check the data.
 void check_jpeg(std::FILE* file, uint64_t file_bytes);
 Shot jpeg_shot(std::FILE* file);
 
@@ -157,7 +157,7 @@ void probe_pnm(core::FileReader& reader);
 // two hundred libraries, whose start takes longer than most commands. A machine without it still has PNG and
 // JPEG.
 
-/// What the module exports under the name kModuleEntry. The functions may run on several threads at once.
+/// The functions that the module exports under the name kModuleEntry. They may run on several threads at once.
 /// They throw std::runtime_error with OpenImageIO's reason, without the file's name, and std::bad_alloc.
 struct OpenImageIO {
     const char* version;  // EWA_VERSION; the loader reads it before it calls a function
