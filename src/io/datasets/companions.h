@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that belong to images by their names: masks and depth maps. Also what of a dataset's files is used.
+// Files that belong to images by their names: masks and depth maps. Also counts of a dataset's files that are used.
 #pragma once
 #include <filesystem>
 #include <map>
@@ -62,7 +62,7 @@ class Companions {
     bool for_all_ = false;
 };
 
-/// What the photos are of which there is a file, or a camera. dataset: with its frames.
+/// Counts the images with a file, and those with a camera. dataset: with its frames.
 UsedOf used_photos(const ImageRecords& model, const Dataset& dataset);
 
 }  // namespace ewa::io

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The table of the splat formats: their names, the functions that read and write them, and what a file keeps of a scene.
+// The table of the splat formats: names, functions that read and write them, and the contents of a scene that a file keeps.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -29,7 +29,7 @@ struct FormatRow {
     /// The name has precedence over the first bytes if the file's size is a multiple of this. 0: it never has.
     uint64_t named_multiple = 0;
 
-    // What a file keeps of the scene besides its usual values.
+    // Contents of a scene that a file keeps besides the usual values.
     bool comments = false;
     bool mark = false;        // that the scene was trained anti-aliased
     bool world = false;       // positions far from the origin, which float32 would round
@@ -38,7 +38,7 @@ struct FormatRow {
     bool place = false;       // on the globe
     bool morton = false;      // it has the splats in morton_order, else as they come
 
-    // What a user may choose.
+    // Options of a user that apply.
     bool levels = false, spz_version = false, holds_spz = false;
     std::string_view unchecked = {};  // why --check is refused, and what to check instead; empty: it is not
     std::string_view unread = {};     // the error of reading; empty where ewa reads it
@@ -55,7 +55,7 @@ struct FormatRow {
     // Files beside the one that names them.
     /// Those that exist and belong to an existing file.
     Paths (*values)(const std::filesystem::path& naming) = nullptr;
-    /// What writing does to them.
+    /// The changes that writing makes to them.
     ValueFiles (*beside)(const std::filesystem::path& naming) = nullptr;
     /// Whether writing makes folders of such a name.
     bool (*names_part)(std::string_view folder) = nullptr;

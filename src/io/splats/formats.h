@@ -65,7 +65,7 @@ SplatScene read_spz(core::FileReader& reader);
 std::vector<std::string> write_spz(const std::filesystem::path& path, const Gaussians& gaussians,
                                    const SaveOptions& options);
 
-/// What packing as SPZ cost.
+/// The loss of packing as SPZ.
 struct SpzLoss {
     int version = 0, sh_degree = 0;
     int fractional_bits = 24;  // of positions
@@ -90,7 +90,7 @@ SplatScene read_gltf_splats(const std::filesystem::path& path);
 /// The files that hold the values of an existing .gltf. Empty if it holds them itself or cannot be read.
 std::vector<std::filesystem::path> gltf_values(const std::filesystem::path& gltf);
 
-/// What write_gltf_splats does beside a .gltf. The usual name of the values is STEM.bin.
+/// The files that write_gltf_splats writes and removes beside a .gltf. The usual name of the values is STEM.bin.
 ValueFiles gltf_value_files(const std::filesystem::path& gltf);
 
 /// Writes float32 throughout and sRGB colours. The extension .glb makes one file, any other one a .gltf and the
@@ -128,7 +128,7 @@ std::vector<std::string> write_sog_rows(const std::filesystem::path& path, const
 /// The images that an existing meta.json names. Empty if it cannot be read.
 std::vector<std::filesystem::path> sog_images(const std::filesystem::path& meta);
 
-/// What write_sog_meta does beside a meta.json. The usual names are means_l.webp and so on.
+/// The files that write_sog_meta writes and removes beside a meta.json. The usual names are means_l.webp and so on.
 ValueFiles sog_value_files(const std::filesystem::path& meta);
 
 /// Streamed SOG, a lod-meta.json. read_levels reads level 0. Splats come in the order of the chunks and their rows. Errors name the

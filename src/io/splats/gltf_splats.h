@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the reader and the writer of splats in glTF share. gltf_splats.cpp describes the layout.
+// Names and values that the reader and the writer of splats in glTF share. gltf_splats.cpp describes the layout.
 #pragma once
 #include <filesystem>
 #include <string>

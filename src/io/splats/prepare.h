@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What becomes of a scene in a file of a format (format_table.h). All functions return lines on what the format does not keep.
+// The scene as a file of a format stores it (format_table.h). All functions return lines on contents that the format loses.
 #pragma once
 #include <string>
 #include <vector>

@@ -16,7 +16,7 @@ namespace ewa::io {
 
 using Paths = std::vector<std::filesystem::path>;
 
-/// What writing a naming file does beside it.
+/// The files that writing a naming file writes and removes beside it.
 struct ValueFiles {
     Paths usual;
     Paths written;
