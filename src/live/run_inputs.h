@@ -35,7 +35,7 @@ std::filesystem::path dataset_of(const folders::Run& run);
 /// is missing.
 std::filesystem::path refined_cameras_of(const folders::Run& run);
 
-/// How the run reads its images. What its config.json does not have is as usual.
+/// The options by which the run reads its images. Those that its config.json lacks have their defaults.
 DatasetOptions dataset_options_of(const folders::Run& run);
 
 }  // namespace ewa::live

@@ -63,7 +63,7 @@ class Server {
 
     // For the training loop.
 
-    /// What /status answers from now on. Members run, commands and metrics are ignored.
+    /// Sets the answer of /status. Members run, commands and metrics are ignored.
     void report(const Status& status);
     void add_metrics(const report::MetricsLine& line);
     /// Whether splats of this step should be taken: somebody asked since the last ones, and taking them
