@@ -25,7 +25,7 @@ inline constexpr double kCoarsestPixel = 2;
 struct FusionOptions {
     double voxel = 0;           // world units, in the middle; 0: usual_voxel
     double coarser = 1;         // times usual_voxel
-    bool unbounded = false;     // what is far from the middle gets larger voxels: space_of_views
+    bool unbounded = false;     // surfaces far from the middle get larger voxels: space_of_views
     bool closed = false;        // a surface has a back within the truncation, where no view sees it
     double least_part = 0;      // voxels; parts whose box has a smaller diagonal are dropped
     size_t most_triangles = 0;  // as simplify has it; 0: all

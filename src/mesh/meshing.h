@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What libewa_meshing.so does for this module: a sparse volume and its surface by OpenVDB, fewer triangles by meshoptimizer.
+// The functions of libewa_meshing.so for this module: a sparse volume and its surface by OpenVDB, fewer triangles by meshoptimizer.
 // Both libraries with all that is behind them take longer to load than a short command runs.
 #pragma once
 #include <array>
@@ -39,7 +39,7 @@ class Volume {
     virtual IndexedTriangles surface() = 0;
 };
 
-/// What the module exports under the name kMeshingEntry.
+/// The functions that the module exports under the name kMeshingEntry.
 struct Meshing {
     const char* version;  // EWA_VERSION
     std::unique_ptr<Volume> (*make_volume)();

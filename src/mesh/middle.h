@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the cameras of a scene look at.
+// The middle of a scene by its cameras.
 #pragma once
 #include <span>
 

@@ -20,7 +20,7 @@ struct Topology {
 };
 Topology topology_of(const scene::TriangleMesh& mesh);
 
-/// "watertight", or what keeps the surface from being so.
+/// "watertight", or the reason why the surface is not.
 std::string watertight_text(const Topology& topology);
 
 /// Drops parts whose box has a diagonal below `least`, triangles with two equal corners, and vertices without triangles.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pinholes that see what the cameras of a dataset see.
+// Pinholes that together see the views of a dataset's cameras.
 #pragma once
 #include <span>
 #include <vector>
@@ -19,7 +19,7 @@ class Pinholes {
 
     std::span<const Camera> cameras() const { return cameras_; }
 
-    /// Sets to 0 what the fisheye of view i does not show.
+    /// Sets pixels to 0 that the fisheye of view i does not show.
     void cut(size_t i, Image& image) const;
 
   private:
