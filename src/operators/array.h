@@ -12,7 +12,7 @@
 
 namespace ewa::operators {
 
-/// A buffer that is kept from call to call and grows as needed. A large array of the host takes its place for one call where
+/// A buffer that later calls use again, and that grows as needed. A large array of the host takes its place for one call where
 /// the device can read it as it is.
 class Array {
   public:

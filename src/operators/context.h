@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What all operators of a device share. Buffers are kept from call to call.
+// The state that all operators of a device share. Buffers are used again in later calls.
 #pragma once
 #include <memory>
 #include <mutex>
