@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What all passes share. A pass is a struct that describes one shader (passes.h). It has
+// The common parts of all passes. A pass is a struct that describes one shader (passes.h). It has
 // - shader: the file in shaders/passes without extension, which is also the name of the timing;
 // - Work: the push constants (Push), the invocations of a workgroup (group_size), and the workgroups
 //   (groups);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// All passes. pass.h says what each member means.
+// All passes. pass.h explains the members.
 #pragma once
 #include "passes/pass.h"
 
@@ -7,7 +7,7 @@ namespace ewa::passes {
 
 // Projection, and its gradient with the optimiser's step.
 
-/// What the projections read and write. They add to Counts.skipped_nonfinite.
+/// The buffers of the projections. They add to Counts.skipped_nonfinite.
 struct ProjectBuffers {
     using Work = PerElement<&shared::ProjectPush::splats>;
     gpu::BufferPart params, camera, records, depth_keys, tile_counts, counts;
@@ -25,7 +25,7 @@ struct ProjectRays : ProjectBuffers {
     gpu::BufferPart rays;
 };
 
-/// What the gradient of a projection, fused with Adam, reads and writes.
+/// The buffers of a projection's gradient, fused with Adam.
 struct UpdateBuffers {
     using Work = PerElement<&shared::UpdatePush::splats>;
     gpu::BufferPart params, camera, records, slots, moments1, moments2, tile_counts, first_instances, counts,
@@ -169,7 +169,7 @@ struct RadixCount {
     gpu::BufferPart keys, counters, counts;
 };
 
-/// What moving the pairs of a radix pass reads and writes.
+/// The buffers of moving the pairs in a radix pass.
 struct ScatterBuffers {
     gpu::BufferPart keys, values, counters, bases, counts, keys_out, values_out, indices, indices_out;
 };
@@ -218,13 +218,13 @@ struct TileStarts {
 
 // Blending of splats into image planes, and its gradient.
 
-/// What blending reads and writes.
+/// The buffers of blending.
 struct BlendBuffers {
     using Work = PerTile;
     gpu::BufferPart records, splats, tile_starts, planes;
 };
 
-/// What the gradients of blending read and write: planes, and the slot of every (splat, tile) instance.
+/// The buffers of blending's gradients: planes, and the slot of every (splat, tile) instance.
 struct BlendBackwardBuffers : BlendBuffers {
     gpu::BufferPart image_gradient, slots;
 };
@@ -265,7 +265,7 @@ struct BlendPointsBackward : BlendBackwardBuffers {
     static constexpr char shader[] = "blend_points_backward";
 };
 
-/// What the passes along rays read and write. They add to Counts.unfinished.
+/// The buffers of the passes along rays. They add to Counts.unfinished.
 struct AlongRays : BlendBuffers {
     using Work = PerStrip;
     gpu::BufferPart rays, camera, counts;
@@ -589,7 +589,7 @@ struct TracePaths {
     gpu::BufferPart lights, view, sums, counts, pixel_rays;
 };
 
-/// What the centre of each pixel sees.
+/// The surface at the centre of each pixel.
 struct TraceDepth {
     static constexpr char shader[] = "trace_depth";
     using Work = ElementGroup<shared::TracePush>;
