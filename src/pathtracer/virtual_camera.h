@@ -25,7 +25,7 @@ Camera pinhole_of(const scene::FileCamera& camera, int width, int height);
 /// sRGB's curve over min(1, value). NaN and negative values become 0.
 float developed(double value);
 
-/// Puts the sky behind what covers the pixels. `radiance` is as in develop; afterwards all pixels are fully covered.
+/// Composites the pixels over the sky. `radiance` is as in develop; afterwards all pixels are fully covered.
 void show_sky(Image& radiance, const Camera& camera, const scene::Sky& sky);
 
 /// Applies `factor` and sRGB's curve. `radiance` is RGBA: radiance times coverage, and coverage. The result
