@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the loss and the backward passes of FramePasses read besides a frame.
+// Inputs of the loss and the backward passes of FramePasses besides a frame.
 #pragma once
 #include <cstdint>
 
