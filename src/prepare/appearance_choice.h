@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the training images say of their own exposures before any splat is trained: how far they disagree on the colours of
-// the points that they show, or what their EXIF says.
+// The exposures of training images before any splat is trained: by their colours of the points that they show, or by EXIF.
 #pragma once
 #include <string>
 #include <vector>
@@ -11,7 +10,7 @@
 
 namespace ewa::train {
 
-/// How far images disagree on the colours of the points that they show, beyond what chance explains.
+/// The difference between images in the colours of the points that they show, minus the difference that is expected by chance.
 struct Disagreement {
     int images = 0;       // that were compared; 0: they have neither points nor EXIF
     double exposure = 0;  // root mean square over the images, stops of the stored values

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the cameras of a dataset look at.
+// The sphere that the cameras of a dataset look at.
 #pragma once
 #include <glm/vec3.hpp>
 #include <vector>
