@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the environment says of the launcher (mpirun, srun) that started this process.
+// The launcher (mpirun, srun) that started this process, by the environment.
 #pragma once
 #include <functional>
 #include <string>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The ranks that share a machine, and what each of them gets of its cores.
+// The ranks that share a machine, and the cores of each.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -9,7 +9,7 @@
 
 namespace ewa::ranks {
 
-/// What a process may use.
+/// The cores that a process may use.
 struct Allowed {
     uint64_t machine = 0;              // a number of its own for each machine
     std::vector<uint64_t> cores = {};  // a bit for each core of the machine

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What libewa_mpi.so exports. It alone links MPI, and is loaded under a launcher alone.
+// The functions of libewa_mpi.so. It alone links MPI, and it is loaded only under a launcher.
 #pragma once
 #include <chrono>
 #include <cstddef>
