@@ -12,12 +12,12 @@
 
 namespace ewa::report {
 
-/// What holds a photo's camera: CameraSupport.
+/// The points that determine an image's camera: CameraSupport.
 struct CameraRow {
     std::string name;
     size_t points = 0;
     double error = 0;      // px; 0: not known
-    std::string together;  // the photos that see most of the same points
+    std::string together;  // the images that see most of the same points
 };
 
 struct ReportData {

@@ -33,10 +33,10 @@ std::vector<StageTime> stages_of(const StepTime& time);
 /// The stages as a table, with the single passes below; empty without a step. earlier: steps before the measured ones.
 std::string step_time_html(const StepTime& time, int earlier = 0);
 
-/// What the ranks of a run exchanged, as a table; empty without ranks.
+/// Data that the ranks of a run exchanged, as a table; empty without ranks.
 std::string ranks_html(const std::vector<RankFigures>& ranks);
 
-/// What a training in chunks copied, as a paragraph; empty without chunks.
+/// Data that a training in chunks copied, as a paragraph; empty without chunks.
 std::string chunks_html(const std::optional<ChunkFigures>& chunks);
 
 }  // namespace ewa::report
