@@ -40,7 +40,7 @@ NewViewAppearance new_view_appearance(const std::vector<Appearance>& learned, co
 std::vector<Appearance> for_new_views(const NewViewAppearance& appearance, const Dataset& dataset,
                                       const std::vector<int>& frames);
 
-/// What the options of a run measure. Throws InputError (an unknown metric).
+/// The metrics that the options of a run ask for. Throws InputError (an unknown metric).
 Measures measures_of(const RunOptions& options);
 
 /// As ewa::evaluate. on_view: called after each view that counts, with its place in `frames`. The next view is drawn before.

@@ -26,7 +26,7 @@ size_t evaluated_views(const Split& split);
 /// The files of the renders that it saves, by frame.
 std::map<int, std::filesystem::path> saved_renders(const RunInput& input);
 
-/// What a run has trained, and how to draw it.
+/// The trained scene of a run, and how to draw it.
 struct TrainedScene {
     std::shared_ptr<gpu::Device> device;
     Gaussians gaussians;

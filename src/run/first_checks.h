@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What makes a training useless, or stops it at its end: found before its first step, and by ewa info.
+// Problems that make a training useless, or stop it at its end. They are found before its first step, and by ewa info.
 #pragma once
 #include <functional>
 #include <glm/vec3.hpp>

@@ -10,7 +10,7 @@
 
 namespace ewa::train {
 
-/// What decides how long a training takes, besides the device.
+/// Properties of a training that decide its time, besides the device.
 struct ForecastScene {
     double pixels = 0;        // of a training image
     size_t photos = 0;        // to train on

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The colour that photos without transparency are trained and shown over.
+// The background of training images without transparency, in training and renders.
 #pragma once
 #include <vector>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a checkpoint says about its run, and whether a run may continue from it.
+// The settings in a checkpoint, and whether a run may continue from it.
 #pragma once
 #include <chrono>
 #include <filesystem>

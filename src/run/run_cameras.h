@@ -36,7 +36,7 @@ class RunCameras {
     double extent_ = 1;          // Trainer::extent
 };
 
-/// What the reconstruction says of each photo, for the report: the largest error first. Empty: nothing.
+/// Points and errors of each image by the reconstruction, for the report: the largest error first. Empty: unknown.
 std::vector<report::CameraRow> camera_rows(const Dataset& dataset);
 
 }  // namespace ewa::train

@@ -25,7 +25,7 @@ struct RunInput;
 /// Where on the globe a run's splats are; empty if the dataset does not say, or --level off leaves it out.
 std::optional<io::Place> place_of(const RunInput& input);
 
-/// Writes splats with comments that say what made them, and where on the globe they are. Throws RunError.
+/// Writes splats with comments on the program, the run and the position on the globe. Throws RunError.
 void write_splats(const std::filesystem::path& file, const Gaussians& gaussians, int step,
                   const RenderOptions& render, const std::optional<io::Place>& place);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a training run begins with: its dataset and its first splats.
+// The inputs of a training run: its dataset and its first splats.
 #pragma once
 #include <cstdint>
 #include <string>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a run saves while it trains: checkpoint, times, splats, refined cameras.
+// Files that a run saves while it trains: checkpoint, times, splats, refined cameras.
 #pragma once
 #include <chrono>
 #include <nlohmann/json.hpp>
@@ -26,7 +26,7 @@ struct RunProgress {
     void take_later(const MetricsLine& line, double checkpoint_seconds);
 };
 
-/// Saves what a trainer has reached. All of its functions throw RunError.
+/// Saves the state of a trainer. All of its functions throw RunError.
 class RunSaves {
   public:
     /// What is passed must outlive this.

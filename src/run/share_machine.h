@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a process gets of a machine that several processes of one training share.
+// The part of a machine for one of several processes that train together.
 #pragma once
 #include "ewa/device.h"
 #include "ewa/ranks.h"
