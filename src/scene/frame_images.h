@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The images of frames: how many may be decoded at once, and those that are kept to be decoded once.
+// The images of frames: how many may be decoded at once, and a cache, so that each is decoded once.
 #pragma once
 #include <algorithm>
 #include <cstddef>

@@ -18,7 +18,7 @@ struct Framing {
     double radius = 1;        // half the diagonal of the framed box, above zero
 };
 
-/// What is known about a scene besides its splats. Directions are in the world, of any length above zero.
+/// Facts about a scene besides its splats. Directions are in the world, of any length above zero.
 struct FramingHints {
     std::optional<glm::dvec3> up;       // empty: guessed_up
     std::optional<glm::dvec3> forward;  // of the view, made horizontal; empty: see frame_scene

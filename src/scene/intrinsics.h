@@ -7,7 +7,7 @@
 
 namespace ewa::scene {
 
-/// What is wrong with intrinsics that no camera has: a focal length or a distortion of 1e30, or a principal point a long way outside
+/// The reason why intrinsics are those of no camera: a focal length or a distortion of 1e30, or a principal point a long way outside
 /// the image. Empty for others. The camera has a size.
 std::string intrinsics_fault(const Camera& camera, const Distortion& lens);
 
