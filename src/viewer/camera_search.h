@@ -22,7 +22,7 @@ class CameraSearch {
   public:
     /// wake: called on a thread when progress() has changed, and at the end.
     explicit CameraSearch(std::function<void()> wake) : wake_(std::move(wake)) {}
-    /// Stops the search. What is done is kept.
+    /// Stops the search. Finished steps stay on disk.
     ~CameraSearch() { cancel(); }
     CameraSearch(const CameraSearch&) = delete;
     CameraSearch& operator=(const CameraSearch&) = delete;
