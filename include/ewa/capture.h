@@ -103,9 +103,9 @@ void check_training_input(const std::filesystem::path& path);
 ///   With `level`, y of its world points down where the photos determine that. With GPS in the photos, x points east, z north, and
 ///   a unit is a metre.
 /// - place.json: the place of the world's origin on the globe, where GPS says it.
-/// - colmap/: what COLMAP needs to continue, and log.txt with what the programs print.
-/// - capture.json: input, options, and what distinguishes the contents of the photos or the video. A folder with the
-///   same ones is continued; what is done is kept.
+/// - colmap/: files with which COLMAP continues, and log.txt with the output of the programs.
+/// - capture.json: input, options, and hashes of the photos or the video. If they are the same, the folder is continued,
+///   and finished steps are not repeated.
 ///
 /// progress is called at least every tenth of a second; false ends the run. Throws InputError: no such input, a folder
 /// of something else, too few photos, HEIC that no program converts, a video that ffmpeg cannot read. It also throws InputError if

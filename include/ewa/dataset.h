@@ -42,7 +42,7 @@ struct KeptImage {
     std::shared_ptr<const Image> left_out;
 };
 
-/// An entry of a dataset: an image, its camera, and what belongs to it.
+/// An entry of a dataset: an image, its camera, mask and depth map.
 struct Frame {
     std::string name;                  // in the dataset, e.g. "0001.jpg"
     std::filesystem::path image_path;  // may not exist: see image_exists

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vulkan devices: what is there, and opening one.
+// Vulkan devices: listing and opening them.
 #pragma once
 #include <cstdint>
 #include <memory>

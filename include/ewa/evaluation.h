@@ -30,7 +30,7 @@ enum class Protocol {
     inria  // as the evaluation of 3D Gaussian Splatting by INRIA: 8-bit values, images resized as Pillow does
 };
 
-/// What an evaluation measures beside PSNR and SSIM.
+/// The protocol of an evaluation, and its metrics beside PSNR and SSIM.
 struct Measures {
     Protocol protocol = Protocol::ewa;
     Meter meter;

@@ -10,7 +10,7 @@ namespace ewa {
 
 struct Metric {
     std::string name;  // as in JSON, e.g. "cc_psnr"
-    std::string text;  // what it is
+    std::string text;  // a description
     int decimals = 4;  // that a table shows
 };
 
@@ -39,7 +39,7 @@ class Meter {
     /// The names of the figures.
     const std::vector<std::string>& names() const { return names_; }
     /// One figure for each of names(), in their order. Runs on all cores; the result does not depend on their number. image:
-    /// the one that is judged. reference: what it should be. Both have 3 or 4 channels; alpha is not used. Values are clamped
+    /// the render. reference: the image that it should equal. Both have 3 or 4 channels; alpha is not used. Values are clamped
     /// to [0, 1]. weights: as in psnr and ssim. Throws InputError if the sizes differ.
     std::vector<Figure> measure(const Image& image, const Image& reference, const Image& weights = {}) const;
 

@@ -129,10 +129,10 @@ struct BlendOptions {
     /// One value for each tile, row by row. 0: the tile's pixels show the background and have alpha 0. Empty: all tiles are drawn.
     std::span<const uint8_t> tile_mask{};
     uint32_t mask_tile_size = 16;  // px
-    bool gradients = true;         // keep what blend_backward needs
+    bool gradients = true;         // make a BlendRecord for blend_backward
 };
 
-/// What blend_backward of the same operators needs. It holds memory of the device until it is destroyed.
+/// The state of a blend, for blend_backward of the same operators. It holds memory of the device until it is destroyed.
 class BlendRecord {
   public:
     ~BlendRecord();

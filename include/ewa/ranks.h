@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The processes that train one scene together, and what they exchange. A process that runs alone is rank 0 of 1.
+// The processes that train one scene together, and their messages. A process that runs alone is rank 0 of 1.
 #pragma once
 #include <cstddef>
 #include <cstdint>

@@ -94,7 +94,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                            bool alpha_is_weight = false, const LossWeights& weights = {},
                            const Image& depths = {});
 
-/// What a Renderer of this scene skips, in colour images with these options. Throws InputError as the renderer does.
+/// The work that a Renderer of this scene skips, in colour images with these options. Throws InputError as the renderer does.
 std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options);
 
 }  // namespace ewa

@@ -23,7 +23,7 @@ struct RunResult {
 /// - checkpoint.ewa, times.json: the state to resume from, and the times up to it.
 /// - splats.ply: the splats.
 /// - cameras.json and the COLMAP model cameras/sparse/0, with TrainOptions::refine_poses: the refined cameras.
-/// - passers_by/*.png, with `robust`: the masks of what single training images show.
+/// - passers_by/*.png, with `robust`: masks of objects that single training images show.
 /// - splats_007000.ply and so on, with `keep`: the splats after these steps.
 /// - inria/, with `inria`: cfg_args, cameras.json, input.ply, point_cloud/iteration_N/point_cloud.ply.
 /// - test/*.png: renders of some test views (train/*.png without a test set).
