@@ -13,7 +13,7 @@
 
 namespace ewa::capture {
 
-/// Whether matches of two photos do not fit their cameras: most lie far from where they could be. matches: px in both.
+/// Whether the matches of two photos contradict their cameras: most are far from their epipolar lines. matches: px in both.
 bool contradict(const Camera& first, const Camera& second,
                 const std::vector<std::pair<glm::dvec2, glm::dvec2>>& matches);
 

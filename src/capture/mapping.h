@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ways to place photos by the same matches, and which of them is taken.
+// Finds the cameras of photos by the same matches in several ways, that is with several settings of COLMAP, and takes the best.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -26,7 +26,7 @@ struct MappedModel {
 /// The models in a folder, the largest first.
 std::vector<MappedModel> models_in(const std::filesystem::path& folder);
 
-/// A way to place photos.
+/// A way to find the cameras of photos: settings of COLMAP's mapper.
 struct Way {
     std::string name;                  // for the user, after "placed" and a count; empty: the first way
     std::vector<std::string> words{};  // of COLMAP's mapper
@@ -58,18 +58,18 @@ struct Placing {
 /// Places photos by the matches in the database of a folder.
 class Mapping {
   public:
-    /// views: the photos are such, whose lens is known; null: they are none.
+    /// views: not null if the photos are views of panoramas, whose lens is known.
     Mapping(const Colmap& colmap, const Photos& photos, const PanoramaViews* views,
             std::filesystem::path work);
 
-    /// By one way. The models are in `folder`. None where the mapper finds no pair of images to begin with.
+    /// Runs one way. The models are in `folder`. There is none if the mapper finds no first pair of images.
     Placing place(const Way& way, const std::filesystem::path& folder) const;
     /// By this way, then by the others until enough photos are placed, then by the best way with other random numbers. The models
     /// are in work/models. seconds: what the search has taken before; all ways together take about as long.
     Placing place_enough(const Way& first, double seconds) const;
-    /// Joins the largest model with others that share photos, where that is sound.
+    /// Joins the largest model with others that share photos, if the joined cameras are possible.
     void join(Placing& placing) const;
-    /// Adds photos with fewer matches to the largest model, where no more matches contradict their cameras.
+    /// Adds photos with fewer matches to the largest model, if that adds no contradiction to its cameras.
     void extend(Placing& placing) const;
     /// The models in a folder.
     Placing placed_in(const Way& way, const std::filesystem::path& folder) const;

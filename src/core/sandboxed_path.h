@@ -7,12 +7,12 @@
 
 namespace ewa::core {
 
-/// The normalised name with / between its parts. Empty if the name is empty, a folder's, absolute, has a
+/// The normalised name with / between its parts. Empty if the name is empty, absolute or that of a folder. Also empty if it has a
 /// drive or a zero byte, or leaves the starting folder.
 std::optional<std::filesystem::path> name_inside(std::string_view name);
 
 /// Whether this name (from name_inside) is still below the folder after links are followed. The folder itself
-/// may be a link. A missing file counts as being where it would be.
+/// may be a link. A missing file counts by the path that it would have.
 bool links_stay_inside(const std::filesystem::path& folder, const std::filesystem::path& name);
 
 /// Advice for errors about links that lead out.

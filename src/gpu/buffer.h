@@ -31,8 +31,8 @@ class Buffer {
     /// The memory stays as long as a buffer in it.
     Buffer(const Buffer& memory, uint64_t offset, std::string name, uint64_t bytes, Texel texel);
     static constexpr uint64_t kPlacement = 4096;  // bytes
-    /// A buffer whose bytes are these bytes of the host: nothing is copied. They must stay until the device has done with the
-    /// buffer. Empty if the device cannot do that with them.
+    /// A buffer on these bytes of host memory, without a copy. They must exist until the device is done with the buffer. Empty if the
+    /// device cannot use them.
     static std::optional<Buffer> in_host_memory(Device& device, std::string name,
                                                 std::span<const std::byte> bytes);
     Buffer(Buffer&& other) noexcept { *this = std::move(other); }
@@ -46,7 +46,7 @@ class Buffer {
     /// Differs between all buffers of a process; 0 for none.
     uint64_t serial() const { return buffer_ ? serial_ : 0; }
     vk::BufferView view() const { return *view_; }
-    /// Bytes of the handle in front of the buffer's own: an address of the host decides where it begins.
+    /// Offset of the buffer in its handle, bytes. It is not 0 if an address of the host has to be aligned.
     uint64_t begin() const { return begin_; }
     explicit operator bool() const { return bool(buffer_); }
     /// Whether the buffer was made of this memory, from byte `offset` on, for that many bytes.

@@ -55,7 +55,7 @@ bool reads_heif();
 /// As OpenImageIO::jpeg_of_heif. Returns whether it has written the JPEG.
 bool write_jpeg_of_heif(const std::filesystem::path& heif, const std::filesystem::path& jpeg);
 
-/// A place by a satellite receiver: WGS 84, degrees. Finite, and within the ranges of the globe.
+/// A position by a satellite receiver: WGS 84, degrees. Finite, and within the ranges of the globe.
 struct GpsFix {
     double latitude = 0, longitude = 0;
     std::optional<double> altitude;  // m above the sea

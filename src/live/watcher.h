@@ -99,7 +99,7 @@ class Watcher {
 
     Update update() const;
     uint64_t number() const;  // of the update
-    /// pause, resume or save. update().problem says a refusal. A pause lasts while this watcher lives, and 10
+    /// name: pause, resume or save. update().problem has the reason of a refusal. A pause lasts while this watcher exists, and 10
     /// seconds longer.
     void command(const std::string& name);
 

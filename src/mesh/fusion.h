@@ -17,9 +17,9 @@
 
 namespace ewa::mesh {
 
-/// The truncation in voxels: wider than the depths of neighbouring views disagree, narrower than most things are thick.
+/// The truncation in voxels. It is larger than differences in depth between neighbouring views, and smaller than most objects.
 inline constexpr double kTruncation = 4;
-/// A pixel that covers more voxels than this from side to side is too coarse to say where the surface is.
+/// Pixels that cover more voxels than this from side to side are too coarse to locate the surface.
 inline constexpr double kCoarsestPixel = 2;
 
 struct FusionOptions {

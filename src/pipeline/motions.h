@@ -21,7 +21,7 @@ using MotionBasis = std::array<float, shared::MOTION_BASIS_FLOATS>;
 
 /// focal: the focal lengths move too. extent: of the scene, world units.
 MotionBasis motion_basis(const Camera& camera, const Gaussians& gaussians, bool focal, double extent);
-/// The same of what is learned of the motion during a readout: it moves a point by its time from the middle of the readout.
+/// The same for the learned motion during a readout, which is proportional to a point's time from the middle of the readout.
 MotionBasis readout_basis(const Camera& camera, const Gaussians& gaussians, double extent);
 
 /// The bases of photos' cameras.

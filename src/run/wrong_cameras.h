@@ -15,11 +15,11 @@ struct ViewFigure {
     double psnr = 0;
 };
 
-/// The views, at most three, whose PSNR is far below the median of all and below that of the training views: the worst first. None of
+/// At most three views whose PSNR is far below the median of all and below that of the training views, the worst first. Empty for
 /// fewer than three views.
 std::vector<ViewFigure> far_below(std::vector<ViewFigure> views, double train_psnr);
 
-/// A view that is far below others, and what it has when its camera moves to where the splats fit its image best.
+/// A view with a PSNR far below the others, and its PSNR after its camera was aligned to its image.
 struct DoubtfulView {
     std::string name;
     double psnr = 0, moved_psnr = 0;  // dB

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The opacity of a density that is shown by 3DGS's kernel.
+// Conversion between opacities of densities and of 3DGS's kernel.
 //
-// A density has the alpha 1 - exp(-x G) in its footprint, on average over all directions, and 3DGS's kernel has o G. Both
-// have the same sum over the footprint, to second order in x = softplus(logit), if o = x - x^2 / 4 + ..., which
-// 1 - exp(-(x + x^2 / 4)) is. So softplus(shown logit) = x + x^2 / 4. It has an inverse, and no opacity reaches 1.
+// On average over all directions, a density has the alpha 1 - exp(-x G) in its footprint, with x = softplus(logit). 3DGS's kernel
+// has o G. Their sums over the footprint agree to second order in x if o = x - x^2 / 4 + .... The function 1 - exp(-(x + x^2 / 4))
+// has that expansion. So softplus(shown logit) = x + x^2 / 4. This has an inverse, and no opacity reaches 1.
 #pragma once
 
 namespace ewa::scene {
 
-/// The logit with which 3DGS's kernel shows about the same. Values that are not finite stay.
+/// The logit with which 3DGS's kernel has about the same image. Values that are not finite stay.
 float shown_logit(float density_logit);
 
 /// The inverse.

@@ -20,7 +20,7 @@ T quantile(std::vector<T>& values, double share) {
     return *at;
 }
 
-/// The middle of values, and how far they are from it.
+/// A robust centre of values, and their spread.
 struct Center {
     double median = 0;
     /// The standard deviation of a normal distribution with the same median absolute deviation.

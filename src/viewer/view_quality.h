@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The PSNR of a view against its image, at the image's size: what `ewa eval` says of it.
+// The PSNR of a view against its image, at the image's size, as `ewa eval` prints it.
 #pragma once
 #include <optional>
 

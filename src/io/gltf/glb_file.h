@@ -13,8 +13,8 @@ namespace ewa::io {
 
 using ValueWriter = std::function<void(core::AtomicFile&)>;
 
-/// Writes a temporary file and renames it. bytes: of the buffer, a multiple of 4, which write_values writes. Throws InputError beyond 4 GiB;
-/// `advice` says what to write instead.
+/// Writes a temporary file and renames it. bytes: size of the buffer, a multiple of 4. write_values writes its contents.
+/// Throws InputError beyond 4 GiB, with `advice` on another format.
 void write_glb(const std::filesystem::path& path, std::string json, uint64_t bytes, std::string_view advice,
                const ValueWriter& write_values);
 

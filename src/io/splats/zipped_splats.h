@@ -8,7 +8,7 @@
 
 namespace ewa::io {
 
-/// Whether an archive has splats that read_splats reads, be it a SOG itself. Those of several files count too.
+/// Whether an archive has splats that read_splats reads: one or several files, or the parts of a SOG.
 bool has_splats(const ZipFiles& zip);
 
 /// The entry of the splats. Throws InputError that says what to do if there is none or more than one.
