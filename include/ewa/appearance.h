@@ -14,6 +14,7 @@
 
 namespace ewa {
 
+/// Models of a training image's appearance.
 enum class AppearanceModel {
     none,
     affine,    // an affine map of colours for each image, as 3DGS learns exposures: Exposure
@@ -36,6 +37,7 @@ struct Ppisp {
     /// factors of r^2, r^4 and r^6. The response has toe, shoulder, gamma and middle, before softplus and sigmoid.
     std::array<float, 27> camera = neutral_camera();
 
+    /// The values of `camera` that change no colour.
     static std::array<float, 27> neutral_camera();
     bool operator==(const Ppisp&) const = default;
 };
@@ -44,6 +46,7 @@ struct Ppisp {
 struct ColorGrid {
     std::vector<float> cells = identity_cells();
 
+    /// GRID_CELLS identity maps.
     static std::vector<float> identity_cells();
     bool operator==(const ColorGrid&) const = default;
 };

@@ -27,6 +27,7 @@ struct CameraDistance {
     double length = 0;   // between their centres, world units
     double focal = 1;    // factor of the focal length
 };
+/// focal: that of `to` divided by that of `from`, by fx.
 CameraDistance distance_between(const Camera& from, const Camera& to);
 
 }  // namespace ewa

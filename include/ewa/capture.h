@@ -22,6 +22,7 @@ enum class Matching {
 /// Limits of CaptureOptions::frames.
 inline constexpr int kFewestVideoFrames = 3, kMostVideoFrames = 100000;
 
+/// Options of make_dataset.
 struct CaptureOptions {
     int frames =
         300;  // of a video, about: it is divided into as many equal parts, and each gives its sharpest frame
@@ -32,6 +33,7 @@ struct CaptureOptions {
 /// The work, in this order. Without a video there are no frames.
 enum class CapturePhase { photos, frames, features, matches, cameras };
 
+/// The progress of make_dataset.
 struct CaptureProgress {
     CapturePhase phase = CapturePhase::photos;
     std::string what;  // a verb, such as "placed"
@@ -42,6 +44,7 @@ struct CaptureProgress {
     double photo_seconds = 0;  // that COLMAP takes to search one; 0: not known
 };
 
+/// The outcome of make_dataset.
 struct Capture {
     int images = 0;                       // that COLMAP got
     int placed = 0;                       // that have a camera
@@ -59,6 +62,7 @@ bool is_capture(const std::filesystem::path& path);
 /// Whether the dataset is made of frames: the path is a video by its extension, or a folder with videos and no photos.
 bool has_videos(const std::filesystem::path& path);
 
+/// Lines for the user about an input.
 struct CaptureContents {
     std::string text;   // "8 photos"
     std::string masks;  // a line on the photos' masks; empty if there are none

@@ -77,6 +77,7 @@ struct Frame {
     bool alpha_weighs() const { return left_out || masks == MaskUse::ignore; }
 };
 
+/// Points of a reconstruction, with their colours.
 struct PointCloud {
     std::vector<glm::dvec3> positions;           // world
     std::vector<std::array<uint8_t, 3>> colors;  // sRGB
@@ -91,8 +92,9 @@ struct UsedOf {
     std::string why = {};  // the first that is not used, and why; empty: all are
 };
 
+/// A dataset: cameras, image files and points. Images are not decoded.
 struct Dataset {
-    std::filesystem::path root;
+    std::filesystem::path root;                // its folder
     std::vector<std::filesystem::path> files;  // of cameras and points; the frames name images and masks
     std::vector<Frame> frames;                 // sorted by name
     PointCloud points;                         // may be empty
@@ -112,6 +114,7 @@ struct Dataset {
 /// One line on Dataset::used: "8 of 8 photos, 0 of 8 masks (masks/0.png matches no photo), 200 points".
 std::string used_text(const Dataset& dataset);
 
+/// Options of load_dataset.
 struct DatasetOptions {
     int downscale = 1;  // >= 1
     MaskUse masks = MaskUse::automatic;

@@ -12,6 +12,7 @@ namespace gpu {
 class Device;
 }
 
+/// A Vulkan device of this machine.
 struct DeviceInfo {
     int index = 0;                   // the N of --device N
     std::string name;                // as the driver names it
@@ -28,6 +29,7 @@ struct DeviceInfo {
 /// loader/driver.
 std::vector<DeviceInfo> list_devices();
 
+/// Options of open_device.
 struct DeviceOptions {
     /// Empty: the first usable discrete, integrated, virtual, then CPU device. A number: that index. Else a case-insensitive part
     /// of the name.

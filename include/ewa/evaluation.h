@@ -36,6 +36,7 @@ struct Measures {
     Meter meter;
 };
 
+/// The figures of an evaluation.
 struct Evaluation {
     double psnr = 0, ssim = 0;    // dB and 1; means over `frames`, NaN without any
     std::vector<Figure> figures;  // means; NaN if a frame has NaN

@@ -35,6 +35,7 @@ struct Gaussians {
     }
     /// The number of SH values of a splat.
     size_t sh_stride() const { return size_t(sh_coefficients(sh_degree)) * 3; }
+    /// Sets the length of each array for n splats. New values are 0.
     void resize(size_t n) {
         means.resize(3 * n);
         quaternions.resize(4 * n);

@@ -6,6 +6,7 @@
 
 namespace ewa {
 
+/// The importance of a message.
 enum class LogLevel { warning };
 
 /// text: one line without an end of line, valid during the call.

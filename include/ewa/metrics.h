@@ -8,6 +8,7 @@
 
 namespace ewa {
 
+/// A metric of two images.
 struct Metric {
     std::string name;  // as in JSON, e.g. "cc_psnr"
     std::string text;  // a description

@@ -42,6 +42,7 @@ struct ViewArrays {
     size_t size() const { return view_matrices.size() / 16; }
 };
 
+/// Options of Operators::project and project_backward.
 struct ProjectionOptions {
     uint32_t width = 0, height = 0;   // px
     float low_pass = 0.3f;            // added to both diagonal entries of the 2D covariance (px^2)
@@ -123,6 +124,7 @@ struct TileLists {
     std::span<const int32_t> splats;  // the lists, one after another
 };
 
+/// Options of Operators::blend.
 struct BlendOptions {
     uint32_t width = 0, height = 0;       // px
     std::span<const float> background{};  // [D]; empty: 0

@@ -21,6 +21,7 @@ enum class Integrator {
 
 inline constexpr int kMostSamples = 4096, kMostNearest = 1000;
 
+/// Options that a scene is rendered and trained with.
 struct RenderOptions {
     std::array<float, 3> background{0, 0, 0};  // RGB, as the pixels of Image
     Footprint kernel = Footprint::peak;

@@ -55,6 +55,7 @@ struct PageOptions {
     std::array<float, 3> background{};
 };
 
+/// Options of save_splats. Each format uses its own.
 struct SaveOptions {
     std::vector<std::string> comments = {};  // one line each; kept by the formats that can store them
     bool antialiased = false;
