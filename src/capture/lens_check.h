@@ -11,30 +11,31 @@
 
 namespace ewa::capture {
 
-/// Why no lens of a camera is like this; empty if one may be. expected: the focal length by EXIF, px; 0: not known.
+/// The reason why a lens is impossible; empty if it is possible. expected: the focal length by EXIF, px; 0: not known.
 std::string lens_fault(const Camera& lens, double expected);
 
 /// The quality of a model.
 struct Grade {
     int placed = 0;  // photos
-    int sound = 0;   // of them: no fault of the lens, points in front of the camera
-    int parted = 0;  // photos beyond a jump of the path: right, or they and those before the jump are not
-    size_t contradictions = 0;                    // pairs of photos whose matches do not fit their cameras
-    double error = 0;                             // of the points, px, the mean over their observations
-    std::map<std::string, std::string> faults{};  // of the others, by name
+    int sound = 0;   // of these: the lens is possible, and the points are in front of the camera
+    int parted = 0;  // photos beyond a jump of the path: the jump is real, or one side of it is wrong
+    size_t contradictions = 0;                    // pairs of photos whose matches contradict their cameras
+    double error = 0;                             // mean reprojection error over all observations, px
+    std::map<std::string, std::string> faults{};  // of photos that are not sound, by name
 
     int credible() const { return sound - parted; }
     bool is_sound() const { return placed > 0 && sound == placed; }
 };
 
-/// Without contradictions and parted photos, which the model does not know. expected: focal lengths by EXIF by the photos' names, px.
+/// The grade of a model, without contradictions and parted photos, which it does not contain. expected: focal lengths by EXIF, px, by
+/// the photos' names.
 Grade grade_of(const SparseModel& model, const std::map<std::string, double>& expected);
 
-/// Whether the first model is worth more: it has more sound photos, or more credible ones if the other has nearly as many, else more photos, else fewer contradictions, else a smaller
-/// error. More observations say nothing: those of a photo in a wrong place count, too.
+/// Whether the first model is better: it has more sound photos, or more credible ones if the other has nearly as many. Else it has more
+/// photos, fewer contradictions or a smaller error. The number of observations is no criterion: wrongly placed photos have some, too.
 bool is_better(const Grade& first, const Grade& second);
 
-/// Whether so many photos are so many that no other way is tried.
+/// Whether enough of the photos are placed, so that no other way is tried.
 bool is_enough(const Grade& grade, size_t photos);
 
 }  // namespace ewa::capture

@@ -32,7 +32,7 @@ Image panorama_view(const Image& photo, int k);
 std::filesystem::path view_name(int k, const std::filesystem::path& photo);
 std::pair<int, std::string> photo_of_view(const std::string& view);
 
-/// The views of panoramas, which COLMAP gets in their place. One camera is one view of the photos of one width.
+/// Pinhole views of panoramas, which COLMAP gets instead of these. All photos of one width share a camera for their view k.
 struct PanoramaViews {
     Photos photos;
     /// By width of the views, px, and k.
@@ -47,14 +47,14 @@ PanoramaViews views_of_panoramas(const Photos& photos, const std::filesystem::pa
 /// in no pair.
 std::vector<ImagePair> pairs_of_views(const std::vector<ImagePair>& photos);
 
-/// The place and the direction of a photo.
+/// The pose of a photo.
 struct Pose {
     glm::dquat rotation{1, 0, 0, 0};  // world to camera
     glm::dvec3 center{0};
 };
 
-/// The pose that most of the poses agree with: turned by at most a degree or so, and centres near its own. scale: a length of the
-/// model. Returns the number of those that agree.
+/// The pose that most of the poses agree with: rotations within about a degree, and near centres. scale: a length of the model.
+/// Returns the number of poses that agree.
 int agreed(const std::vector<Pose>& poses, double scale, Pose& pose);
 
 /// The photos' poses that follow from a model of their views. A photo whose views all disagree has none.

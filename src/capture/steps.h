@@ -76,7 +76,7 @@ constexpr size_t kNamed = 8;  // photos that a line names
 /// The size of the frames. 0 x 0 where it is not known. Throws as film_info.
 ImageSize video_size(const std::filesystem::path& video);
 
-/// The pictures of a folder, relative to it and sorted. Folders below it that ewa has made do not count.
+/// The images of a folder, relative to it and sorted. Folders below it that ewa has made are skipped.
 struct Pictures {
     std::vector<std::filesystem::path> photos;
     std::vector<std::filesystem::path> others;  // masks, depth maps and their like, by their names
@@ -98,7 +98,7 @@ std::vector<std::filesystem::path> take_proxies(std::vector<std::filesystem::pat
 bool is_heif(const std::filesystem::path& file);
 /// Whether a program is here that converts such photos.
 bool converts_heif();
-/// The name of a photo among those that COLMAP gets.
+/// The name that a photo has for COLMAP.
 std::filesystem::path converted_name(const std::filesystem::path& name);
 /// Makes a folder of the photos by those names: HEIF as JPEG, and links to the others' files, or copies. A photo that cannot be
 /// converted is skipped. Throws RunError, Stopped.

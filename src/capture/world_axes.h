@@ -31,12 +31,12 @@ struct WorldAxes {
 
 /// facts: by the names of the photos. Those without are upright and have no GPS. The same input gives the same axes.
 ///
-/// - Up: the direction that is square to the horizontal axes of the cameras, which people and gimbals hold level. Else their mean up
-///   direction, or against the mean view for photos straight down.
+/// - Up: the direction perpendicular to the horizontal axes of the cameras, which people and gimbals hold level. Else their mean up
+///   direction. For photos straight down, the opposite of their mean view.
 /// - The ground: the plane with the most points, if most cameras are above it and its normal is near that direction. Without GPS it
 ///   levels the scene, since photos are tilted by some degrees.
-/// - GPS: scale, heading and place by a similarity of the horizontal plane, which few photos with wrong places do not change.
-///   Altitudes level the scene where they determine that better than the cameras do.
+/// - GPS: scale, heading and position by a robust fit of a similarity of the horizontal plane. A few photos with wrong GPS do not change it.
+///   Altitudes level the scene if they determine that better than the cameras.
 WorldAxes world_axes(const SparseModel& model, const std::map<std::string, PhotoFacts>& facts);
 
 /// Moves the model in a folder into these axes, and writes the place into a file if it is known. photos: their folder, with the

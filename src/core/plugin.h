@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Libraries of ewa that are loaded when they are needed: each alone links a large library behind it.
+// Small libraries of ewa that are loaded when they are needed. Each links a large library, which the programs do not.
 #pragma once
 #include <functional>
 #include <string>

@@ -64,12 +64,12 @@ struct LiveFile {
     uint16_t port = 0;
     std::string token;
 };
-/// Nothing if the folder has none that can be read.
+/// Reads the live file of a run's folder. Empty if there is none that can be read.
 std::optional<LiveFile> read_live_file(const std::filesystem::path& folder);
 /// The token that was given, else that of the file, which is a live file or the token alone, else that of the variable
 /// EWA_TOKEN. Empty if there is none of these. Throws InputError for a file without a token.
 std::string find_token(const std::string& given, const std::filesystem::path& file);
-/// Throws RunError.
+/// Writes it. Throws RunError.
 void write_live_file(const std::filesystem::path& folder, const LiveFile& live);
 
 struct WhatToWatch {

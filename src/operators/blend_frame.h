@@ -18,7 +18,7 @@ struct Context;
 struct BlendFrame {
     std::shared_ptr<gpu::Device> device;  // outlives the buffers below
     std::weak_ptr<Context> context;       // takes the frame back
-    bool gradients = false;               // its buffers overlay each other, in all images that it has
+    bool gradients = false;               // for images with gradients; then its buffers share memory
 
     // The image.
     uint32_t splats = 0, channels = 0, width = 0, height = 0;

@@ -17,12 +17,12 @@ struct ImageWithDepths {
     const Image& image;
     const Image& depths;
 };
-/// Adds at most `count` points in the world, spread over the pixels with a depth, with their colours. seed, index: decide which.
+/// Adds at most `count` points in world coordinates, spread over the pixels with a depth, with their colours. seed, index: choose them.
 void add_points(const ImageWithDepths& from, uint32_t count, uint64_t seed, uint32_t index,
                 PointCloud& points);
 
-/// About `count` points in the world: as many of each frame with a depth map, spread over its pixels with a depth, with the image's
-/// colours. Frames without one have none, nor do those whose lens has no depth maps. The seed decides which pixels. Throws InputError.
+/// About `count` points in world coordinates, with colours. Each frame with a depth map gives the same number, spread over its pixels
+/// with a depth. Frames whose lens allows no depth maps give none. The seed chooses the pixels. Throws InputError.
 PointCloud points_of_depth_maps(const Dataset& dataset, const std::vector<int>& frames, uint32_t count,
                                 uint64_t seed);
 

@@ -32,7 +32,7 @@ size_t add_full_size(ReportView& view, const Image& photo, const Image& renderin
 /// Sorts by PSNR, worst first.
 void sort_views(std::vector<ReportView>& views);
 
-/// The places of sorted views in the order in which they get images at full size: the worst, the best, then ever finer
+/// Indices of sorted views in the order in which they get images at full size: the worst, the best, then the middle of each gap
 /// between them.
 std::vector<size_t> full_size_order(size_t count);
 

@@ -28,7 +28,7 @@ struct RenderedView {
     Image photo, weights, rendering;  // weights: see psnr
 };
 
-/// rendering: through the frame's camera. appearance: applied to it; null: none. Throws InputError (an image that cannot be
+/// Pairs a render with the frame's image. rendering: through the frame's camera. appearance: applied to it; null: none. Throws InputError (an image that cannot be
 /// read or changed its size).
 RenderedView with_photo(Image rendering, const Frame& frame, const RenderOptions& options,
                         const Appearance* appearance);
@@ -36,7 +36,7 @@ RenderedView with_photo(Image rendering, const Frame& frame, const RenderOptions
 /// The appearances of views that training has not seen. learned: of the frames `train` of the dataset.
 NewViewAppearance new_view_appearance(const std::vector<Appearance>& learned, const Dataset& dataset,
                                       const std::vector<int>& train);
-/// For evaluate_views: those of frames that training has not seen.
+/// The appearances of frames that training has not seen, for evaluate_views.
 std::vector<Appearance> for_new_views(const NewViewAppearance& appearance, const Dataset& dataset,
                                       const std::vector<int>& frames);
 

@@ -36,8 +36,7 @@ struct RefinedCameras {
 RefinedCameras refined_cameras(const Dataset& dataset, const std::vector<int>& train,
                                const std::vector<CameraMotion>& motions);
 
-/// The motions that bring renders of fixed splats through these frames' cameras closest to their images, by the gradient that
-/// training uses. extent: Trainer::extent. before_frame: called before each frame; an exception from it ends the work.
+/// Aligns these frames' cameras to their images with fixed splats, by the gradient that training uses. Returns the motions. extent: Trainer::extent. before_frame: called before each frame; an exception from it ends the work.
 /// Throws InputError (an image that cannot be read), RunError (device).
 std::vector<CameraMotion> align_cameras(const std::shared_ptr<gpu::Device>& device,
                                         const Gaussians& gaussians, const Dataset& dataset,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Held-out views that a run shows far worse than others, since their cameras may be wrong.
+// Held-out views with a PSNR far below the others, whose cameras may be wrong.
 #pragma once
 #include <functional>
 #include <string>

@@ -12,8 +12,8 @@
 
 namespace ewa::scene {
 
-/// Takes points one by one, and keeps memory for a few times `most` of them. Cells are cubes whose sides are powers of two. The first
-/// point of a cell stays. The same points in the same order give the same result.
+/// Thins points that come one by one, with memory for a few times `most` of them. Cells are cubes whose sides are powers of two. The
+/// first point of a cell is kept. The same points in the same order give the same result.
 class PointThinner {
   public:
     explicit PointThinner(size_t most);
@@ -21,7 +21,7 @@ class PointThinner {
     /// Must be finite in float32.
     void add(const glm::dvec3& position, const std::array<uint8_t, 3>& color);
 
-    /// All points, if they are at most `most`; else exactly so many. They stay in order. Call it last, once.
+    /// All points if they are at most `most`, else exactly `most`, in their order. Call it once, at the end.
     PointCloud take();
 
   private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the window remembers from one session to the next, in a file of the user's.
+// Settings that the window stores from one session to the next, in a file of the user.
 #pragma once
 #include <filesystem>
 #include <optional>

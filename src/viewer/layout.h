@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the window shows what: the panel at the left, the pictures beside it. Sizes are in px of the framebuffer,
+// The layout of the window: the panel at the left, the render and the image beside it. Sizes are in px of the framebuffer,
 // unless stated otherwise. Independent of the window.
 #pragma once
 #include "viewer/byte_image.h"

@@ -67,7 +67,7 @@ bool add_point(PointCloud& points, DroppedPoints& dropped, const glm::dvec3& pos
 
 /// Reads the vertices of a PLY: x y z, in the frame of the file. Colours are red green blue, as integers
 /// 0..255 or floating-point numbers 0..1. Without colours, points are mid-grey. Throws InputError that names
-/// the file and the byte or property. most: of more points, so many are taken evenly, in memory for a few times as many.
+/// the file and the byte or property. most: a larger cloud is thinned evenly to so many, with memory for a few times as many.
 PlyPoints read_points_ply(const std::filesystem::path& path, size_t most = SIZE_MAX / 8);
 
 /// Whether the file is a PLY of points: vertices with x y z, which are not splats, and no faces. Throws InputError

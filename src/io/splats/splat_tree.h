@@ -44,7 +44,7 @@ struct TreeLimits {
 /// root.
 std::vector<TreeNode> build_tree(const Gaussians& gaussians, const TreeLimits& limits);
 
-/// The node at this depth that has the place, or the leaf above it. mean: three coordinates.
+/// The node at this depth whose box has the mean, or the leaf above it. mean: three coordinates.
 size_t node_of(const std::vector<TreeNode>& nodes, const float* mean, int depth = 64);
 
 /// These splats of the scene. rows: below size().
