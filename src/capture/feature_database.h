@@ -30,8 +30,8 @@ class FeatureDatabase {
     std::map<std::string, std::int64_t> images() const;
     /// The descriptors of an image, in the order of its features; empty if it has none.
     Descriptors descriptors(std::int64_t image) const;
-    /// Sets to zero the descriptors of features so near the right or the lower border that VLFeat writes none. COLMAP keeps what
-    /// its memory had in their place, which another search has not. Zeros match nothing. Only with plain images.
+    /// Sets descriptors to zero for features so near the right or lower border that VLFeat writes none. COLMAP stores uninitialised
+    /// memory for them, which differs between searches. Zeros match nothing. Only with plain images.
     void clear_unwritten_descriptors();
     /// Those of the features with the largest scales, at most so many.
     Descriptors prominent(std::int64_t image, size_t most) const;

@@ -60,7 +60,7 @@ int agreed(const std::vector<Pose>& poses, double scale, Pose& pose);
 /// The photos' poses that follow from a model of their views. A photo whose views all disagree has none.
 struct RigPoses {
     std::map<std::string, Pose> photos;  // by name
-    int views = 0, dropped = 0;          // placed ones, and those that disagree with others of their photo
+    int views = 0, dropped = 0;  // with a pose; of these, those that disagree with others of their photo
 };
 RigPoses rig_poses(const std::filesystem::path& model);
 

@@ -46,7 +46,7 @@ struct Applied {
     std::vector<std::string> remarks;  // of steps
     bool moved = false;
     std::vector<uint32_t>
-        left;  // the numbers of the splats that filters have left, if nothing merges or sorts splats
+        left;  // indices of the splats that filters have kept; only if no edit merges or sorts splats
 };
 
 /// Applies the edits in order. Steps that follow one another move the scene once. cameras: of the run, whose splats have not moved.

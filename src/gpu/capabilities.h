@@ -26,7 +26,7 @@ uint32_t subgroup_lanes(uint32_t natural, uint32_t least, uint32_t most);
 struct Subgroups {
     uint32_t lanes = 0;
     bool controlled = false;  // a pipeline can ask for this size
-    bool extension = false;   // what asks for it is no part of the device's version of Vulkan
+    bool extension = false;   // it needs an extension, because the device's version of Vulkan lacks it
 };
 /// version: of the instance.
 Subgroups subgroups_of(vk::PhysicalDevice device, uint32_t version = kUsedVersion);

@@ -34,7 +34,7 @@ struct AppearanceChoice {
     AppearanceModel model = AppearanceModel::none;
     std::string reason;  // with figures, for the user
 };
-/// The model that AppearanceModel::automatic stands for with these options, which have it.
+/// The model that replaces AppearanceModel::automatic in these options.
 AppearanceChoice choose_appearance(const TrainOptions& options, const Dataset& dataset,
                                    const std::vector<int>& frames);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points where the images of a dataset agree on the depth, for datasets that have cameras alone.
+// Points on whose depth the images of a dataset agree, for datasets with only cameras.
 #pragma once
 #include <array>
 #include <cstdint>

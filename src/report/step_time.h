@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the time of a training step goes, in words.
+// The time of a training step by its stages, as text.
 #pragma once
 #include <optional>
 #include <string>

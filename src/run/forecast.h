@@ -57,7 +57,7 @@ class Forecast {
     std::vector<double> added_;  // by the last refinements of adc
 };
 
-/// Seconds of a whole run on a usual device of its kind, before a step is timed. scene: without max_splats.
+/// Seconds of a whole run on a usual device of the same kind, before any step is timed. scene: without max_splats.
 double usual_seconds(ForecastScene scene, TrainOptions options, bool on_cpu);
 
 }  // namespace ewa::train

@@ -10,7 +10,7 @@ RunOption refine_poses_option();
 RunOption refine_focal_option();
 RunOption rolling_shutter_option();
 
-/// With --rolling-shutter the rows of an image must stay rows: `auto` means native then.
+/// The LensUse of a run. With --rolling-shutter `auto` becomes native, because undistortion bends the rows of an image.
 LensUse lens_use(const RunOptions& options);
 
 /// With --rolling-shutter: gives frames without a readout one in which their cameras are at rest. Throws InputError.

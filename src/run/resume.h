@@ -20,7 +20,7 @@ std::string dataset_fingerprint(const Dataset& dataset, const Split& split, bool
 /// The run adds the device.
 nlohmann::ordered_json checkpoint_settings(const RunOptions& options, const std::string& fingerprint);
 
-/// Lets a run continue from the checkpoint at `path`. What was automatic becomes the checkpoint's strategy, appearance and background. If the
+/// Lets a run continue from the checkpoint at `path`. Automatic options get the checkpoint's strategy, appearance and background. If the
 /// checkpoint's run has another number of steps, the options keep what it has reached (TrainOptions::least_sh_degree,
 /// most_halvings). An automatic cap of splats does not fall below the checkpoint's. Returns that run's number of steps. Throws InputError if the checkpoint lies behind the last step.
 /// asked: the options before resolve().

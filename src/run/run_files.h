@@ -22,7 +22,7 @@ namespace ewa::train {
 
 struct RunInput;
 
-/// Where on the globe a run's splats are; empty if the dataset does not say, or --level off leaves it out.
+/// The position of a run's splats on the globe. Empty if the dataset has none, or with --level off.
 std::optional<io::Place> place_of(const RunInput& input);
 
 /// Writes splats with comments on the program, the run and the position on the globe. Throws RunError.

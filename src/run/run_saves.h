@@ -42,7 +42,7 @@ class RunSaves {
     void checkpoint(const Trainer& trainer);
     /// A checkpoint, unless the clock says that it is too early.
     void checkpoint_if_due(const Trainer& trainer);
-    /// A checkpoint after the last step. If the disk is full, the smaller splats, before the error is thrown.
+    /// Saves a checkpoint after the last step. If the disk is full, saves the smaller splats.ply before the error is thrown.
     void last_checkpoint(const Trainer& trainer);
     void splats(const Gaussians& gaussians);
     /// The splats as those of a step that --keep counts.

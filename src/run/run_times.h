@@ -37,7 +37,7 @@ std::vector<TimesAt> times_of(const std::vector<MetricsLine>& metrics);
 /// The metrics without their times, which become 0.
 std::vector<MetricsLine> without_times(std::vector<MetricsLine> metrics);
 
-/// Gives metrics the times of the lines that have their place and their step.
+/// Sets the times of metrics lines from stored lines with the same index and step.
 void take_times(std::vector<MetricsLine>& metrics, const RunTimes& times);
 
 /// Replaces the file as a whole. Throws RunError.

@@ -52,7 +52,7 @@ Distortion for_longer_focal(Distortion distortion, double factor);
 /// Throws InputError if no such rectangle exists because the model folds over.
 Camera undistorted_camera(const Camera& source, const Distortion& distortion);
 
-/// Where the pixel of `camera`, an undistorted image of `source`, lies in the image of `source`.
+/// The pixel in the image of `source` for a pixel of `camera`, whose image is the undistorted one.
 glm::dvec2 source_pixel(const Camera& source, const Distortion& distortion, const Camera& camera,
                         const glm::dvec2& pixel);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The arrays of a splat scene, for what treats them alike.
+// The arrays of a splat scene, for functions that treat all of them alike.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -49,8 +49,8 @@ std::string undrawable_text(const Gaussians& gaussians);
 /// and its footprint stays below FOOTPRINT_MAX.
 inline constexpr float kOpaqueLogit = 17.328680f, kLargestLogScale = 27.631f;
 
-/// The value that is computed with in place of a stored one: an infinite opacity, a flat scale, and one that is larger than
-/// any view would become finite and look the same.
+/// Finite values to compute with, in place of stored ones: for infinite opacities, flat scales, and scales larger than any view. The
+/// image is the same.
 inline float computable_logit(float logit) {
     return std::isinf(logit) ? std::copysign(kOpaqueLogit, logit) : logit;
 }

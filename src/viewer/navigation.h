@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the camera of the window is, the keys that move it, and the places that it returns to.
+// The camera of the window, the keys that move it, and saved views.
 #pragma once
 #include <cstdint>
 #include <filesystem>

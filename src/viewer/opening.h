@@ -31,10 +31,10 @@ struct OpenedScene {
     std::shared_ptr<const Dataset> dataset;  // null: no cameras
     std::vector<CameraSupport> supports;     // of the dataset's frames; empty: not known
     std::filesystem::path run;               // folder of the run; empty: no run
-    std::filesystem::path cameras;           // what gave the dataset, if not `path`
-    /// Of the run's splats.ply.
+    std::filesystem::path cameras;           // the path of the dataset, if not `path`
+    /// The time of the run's splats.ply.
     std::filesystem::file_time_type splats_time = std::filesystem::file_time_type::min();
-    /// Those of the dataset's frames, by name, as the run learned them.
+    /// The learned appearances of the dataset's frames, by name.
     std::map<std::string, Appearance> appearances;
     NewViewAppearance of_new_views;
     Look look;           // as the file or the run asks for

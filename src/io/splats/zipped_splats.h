@@ -11,7 +11,7 @@ namespace ewa::io {
 /// Whether an archive has splats that read_splats reads: one or several files, or the parts of a SOG.
 bool has_splats(const ZipFiles& zip);
 
-/// The entry of the splats. Throws InputError that says what to do if there is none or more than one.
+/// The entry of the splats. Throws InputError with a remedy if there is none or more than one.
 ZipFiles::Entry zipped_splats(const std::filesystem::path& path, const ZipFiles& zip);
 
 /// Unpacks the splats into a temporary folder, where `read` reads them. Throws as zipped_splats and `read` do, and RunError (disk).
