@@ -52,9 +52,9 @@ void check(const SyntheticOptions& o) {
     within("--size: the height", o.height, 1, 16384);
     within("--samples", o.samples, 1, 65536);
     within("--points", o.points, 0, 10000000);
-    if (!scene::is_native(o.lens)) throw InputError("--lens: splats cannot be rendered through it");
+    if (!scene::is_native(o.lens)) throw InputError("--through: splats cannot be rendered through it");
     if (!(o.fisheye_degrees > 0 && o.fisheye_degrees <= 360))
-        throw InputError("--lens: the angle is not in 0 .. 360");
+        throw InputError("--through: the angle is not in 0 .. 360");
     if (o.lens.lens == Lens::equirectangular && o.width != 2 * o.height)
         throw InputError(
             "--through equirectangular: a 360 degree image is twice as wide as high, as with --size 512x256");
