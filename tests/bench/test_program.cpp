@@ -91,6 +91,20 @@ TEST(BenchProgram, ATinyCaseIsMeasuredCheckedAndComparedWithItself) {
     EXPECT_EQ(compared.output.find("SLOWER"), std::string::npos) << compared.output;
 }
 
+TEST(BenchProgram, OptionsOfACaseAreTaken) {
+    EXPECT_EQ(run(kProgram + " --version").output.rfind("ewa ", 0), 0u);
+    const Ended device = run(kProgram + " --cases capture_2k --device nosuchdevice");
+    EXPECT_EQ(device.status, 2);
+    EXPECT_NE(device.output.find("no usable Vulkan device matches 'nosuchdevice'"), std::string::npos)
+        << device.output;
+    const Ended kernels = run(kProgram + " --cases capture_2k --kernels tile=3x3");
+    EXPECT_EQ(kernels.status, 2);
+    EXPECT_NE(kernels.output.find("'tile=3x3' is not a tile"), std::string::npos) << kernels.output;
+    const Ended large = run(kProgram + " --large --list");
+    EXPECT_EQ(large.status, 0) << large.output;
+    EXPECT_NE(large.output.find("_train  (--large)"), std::string::npos) << large.output;
+}
+
 TEST(BenchProgram, WrongUseIsToldInOneLine) {
     const TempFolder folder;
     folder.write("other.json", "{}\n");

@@ -73,6 +73,19 @@ TEST(Doctor, EndsWithOneWithoutADriver) {
     }
 }
 
+TEST(Doctor, EndsWithOneOnADeviceOrWithALayerThatIsNotThere) {
+    const Folder folder;
+    const Outcome device = run_ewa({"doctor", "-o", folder / "out", "--device", "nosuchdevice"});
+    EXPECT_EQ(device.status, 1);
+    EXPECT_NE(device.out.find("no usable Vulkan device matches 'nosuchdevice'"), std::string::npos)
+        << device.out;
+    const Outcome layer = run_ewa({"doctor", "-o", folder / "out", "--validation"},
+                                  {.environment = {{"VK_LAYER_PATH", folder / "nothing"}}});
+    EXPECT_EQ(layer.status, 1);
+    EXPECT_NE(layer.out.find("the Khronos validation layer is not installed"), std::string::npos)
+        << layer.out;
+}
+
 TEST(Doctor, EndsWithOneWhereNothingCanBeWritten) {
     const Outcome outcome = run_ewa({"doctor", "-o", "/proc/out"});
     EXPECT_EQ(outcome.status, 1);

@@ -77,6 +77,18 @@ TEST(Mesh, SignalsEndItInTheMiddleOfAStep) {
     }
 }
 
+TEST(Mesh, IsAnotherOfSmallerImages) {
+    const Prepared folder;
+    const auto made = [&](std::vector<std::string> more) {
+        more.insert(more.end(), {"--voxel", "0.08"});
+        expect_success(mesh(folder, "m.ply", more));
+        return read_file(folder / "m.ply");
+    };
+    const std::string whole = made({}), half = made({"--downscale", "2"});
+    EXPECT_NE(half, whole);
+    EXPECT_EQ(made({"--max-width", "24"}), half);  // of 48
+}
+
 TEST(Mesh, OfAllFormatsAndTheSameTwice) {
     const Prepared folder;
     expect_success(mesh(folder, "a.ply", {"--voxel", "0.08"}));

@@ -23,17 +23,22 @@ class Training : public SessionTest {
     static Image lower_part(const Image& image) {
         return rows(image, 2 * image.height / 5, image.height * 3 / 5);
     }
+    /// A training that goes on until a signal ends it, and may be watched.
+    pid_t start_trainer() {
+        const pid_t trainer = fork();
+        if (trainer == 0) {
+            execl(EWA_PROGRAM, EWA_PROGRAM, "train", cameras_.c_str(), "-o", run_.c_str(), "--init",
+                  splats_.c_str(), "--steps", "1000000", "--strategy", "none", "--serve", "0", "--quiet",
+                  nullptr);
+            _exit(127);
+        }
+        return trainer;
+    }
     const std::string run_ = folder_ / "run";
 };
 
 TEST_F(Training, OfAnotherProcessIsSeenAsItGoes) {
-    const pid_t trainer = fork();
-    if (trainer == 0) {
-        execl(EWA_PROGRAM, EWA_PROGRAM, "train", cameras_.c_str(), "-o", run_.c_str(), "--init",
-              splats_.c_str(), "--steps", "1000000", "--strategy", "none", "--serve", "0", "--quiet",
-              nullptr);
-        _exit(127);
-    }
+    const pid_t trainer = start_trainer();
     ASSERT_TRUE(soon([&] { return std::filesystem::exists(run_ + "/live.json"); }));
     Session session(shots_, {run_, "--size", "96x64"});
     ASSERT_TRUE(session.found());
@@ -46,6 +51,20 @@ TEST_F(Training, OfAnotherProcessIsSeenAsItGoes) {
     act(session, {"key 2", "key 1"});
     EXPECT_NE(session.screenshot(), "") << "it does not answer once the training has gone";
     expect_silent(session.quit());
+}
+
+TEST_F(Training, OfAnotherProcessRefusesAWrongToken) {
+    const pid_t trainer = start_trainer();
+    ASSERT_TRUE(soon([&] { return std::filesystem::exists(run_ + "/live.json"); }));
+    const std::string port = read_json(run_ + "/live.json")["port"].dump();
+    Session session(shots_, {"--connect", "127.0.0.1:" + port, "--token", "wrong", "--size", "300x200"});
+    ASSERT_TRUE(session.found());
+    EXPECT_TRUE(soon([&] { return !read_file(shots_ + "/err.txt").empty(); }));
+    EXPECT_EQ(session.quit().err, "ewa-view: the trainer refuses: this is not the run's token\n");
+    kill(trainer, SIGINT);
+    int status = 0;
+    waitpid(trainer, &status, 0);
+    EXPECT_EQ(WEXITSTATUS(status), 130);
 }
 
 TEST_F(Training, OfItsOwnGoesOnUntilItsEnd) {

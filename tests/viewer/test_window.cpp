@@ -138,6 +138,25 @@ TEST_F(Window, WhatCannotBeMendedIsOneLine) {
     EXPECT_FALSE(std::filesystem::exists(folder_ / "shown.png"));
 }
 
+TEST_F(Window, VerboseTellsTheTimesAtTheEnd) {
+    const Outcome outcome =
+        run_view({splats_, "--size", "48x32", "--screenshot", folder_ / "shown.png", "--verbose"});
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(outcome.err.find("first picture after "), std::string::npos) << outcome.err;
+    EXPECT_NE(outcome.err.find("last picture: 48 x 32 px"), std::string::npos) << outcome.err;
+}
+
+/// A budget is for views that change. What stays has all splats.
+TEST_F(Window, ABudgetLeavesTheLastPictureWhole) {
+    const std::string levels = folder_ / "l/lod-meta.json", part = folder_ / "part.png",
+                      whole = folder_ / "whole.png";
+    expect_success(run_ewa({"convert", splats_, levels, "--levels", "3", "--quiet"}));
+    expect_silent(run_view({levels, "--size", "48x32", "--screenshot", whole}));
+    expect_silent(run_view({levels, "--size", "48x32", "--screenshot", part, "--budget", "5"}));
+    EXPECT_EQ(load_image(part).pixels, load_image(whole).pixels);
+    expect_failure(run_view({levels, "--budget", "0"}), 2, "--budget: '0' is not a whole number from 1");
+}
+
 TEST_F(Window, APictureThatCannotBeWrittenIsAFailure) {
     write_file(folder_ / "file", "in the way");
     expect_failure(run_view({splats_, "--screenshot", folder_ / "file/shown.png"}), 1, "file");
@@ -216,6 +235,7 @@ TEST(WithoutWindow, NoPictureTakesTheNameOfAnInput) {
 
 TEST(WithoutWindow, WrongUseIsOneLine) {
     const Folder folder;
+    EXPECT_TRUE(run_view({"--version"}).out.starts_with("ewa-view "));
     make_splats(folder / "splats.ply");
     make_dataset(folder / "views");
     const std::string splats = folder / "splats.ply";
