@@ -10,13 +10,13 @@ A block without a language is bash, "python" is Python; others are skipped. Comm
     <!-- not run: `TEXT`: REASON -->       nor are its commands that have this text
     <!-- first: COMMAND -->                runs before the block, in the block's language: what the document takes for granted
 
---fast leaves out what builds or installs. The commands of a document share a shell, and its Python blocks a process. The script
-expects the function `document` and those of scripts/check-docs that it calls.
+--fast leaves out what builds, installs or needs a clone. The commands of a document share a shell, and its Python blocks a
+process. The script expects the function `document` and those of scripts/check-docs that it calls.
 """
 import pathlib, re, shlex, sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-BUILDS = re.compile(r"^(scripts/|cmake |cpack |apt|pip |python3 -m venv|build/|PYTHONPATH=)|/pip install")
+BUILDS = re.compile(r"^(scripts/|tests/|cmake |cpack |apt|pip |python3 -m venv|build/|PYTHONPATH=)|/pip install")
 COMMENT = re.compile(r"<!-- (not run|first): (?:`([^`]*)`: )?(.*?) -->", re.S)
 
 
@@ -87,7 +87,7 @@ def script_of(path, fast):
             place = f"{name}:{number + 1 + offset}"
             reason = whole or next((reason for text, reason in skips if text and text in command), None)
             if not reason and fast and not python and BUILDS.search(command):
-                reason = "--fast: it builds or installs"
+                reason = "--fast: it builds, installs or needs a clone"
             shown = command.split("  #")[0].strip() if not python else "Python"
             if reason:
                 needed.append(call("skipped", place, shown, reason))

@@ -50,7 +50,7 @@ class Commands(unittest.TestCase):
         ])
 
     def test_fast_builds_nothing(self):
-        self.assertIn("skipped docs/sample.md:17 scripts/build '--fast: it builds or installs'", self.script(fast=True))
+        self.assertIn("skipped docs/sample.md:17 scripts/build '--fast: it builds, installs or needs a clone'", self.script(fast=True))
 
     def test_every_comment_of_the_documents_is_understood(self):
         for path in [commands.ROOT / "README.md", *(commands.ROOT / "docs").glob("*.md")]:
