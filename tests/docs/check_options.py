@@ -19,6 +19,11 @@ import collections, pathlib, re, subprocess, sys
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 OPTION = re.compile(r"(?<![\w-])(?:--[a-z][a-z0-9-]*|-[a-z](?![\w-]))")
 STRING = re.compile(r'"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\'')
+# A constant of a file, a function or a test, and a lambda with a name.
+CONSTANT = re.compile(r"^(?:inline )?const(?:expr)? [\w:<>\[\] ]+?\b(k[A-Z]\w*)(?:\[\])?( ?(?:= )?\{[^;]*\});", re.M)
+FUNCTION = re.compile(r"(?:^ *|[\w>&*] )(\w+)(\((?:[^(){};]|\{[^{}]*\}|\((?:[^()]|\([^()]*\))*\))*\))\s*"
+                      r"(?:const|override|:[^{};]*)?\s*\{", re.M)
+LAMBDA = re.compile(r"\b(\w+) = \[[^\]]*\]\s*(?:\((?:[^()]|\([^()]*\))*\))?[^;{}]*\{")
 # What starts another program than ewa.
 PROGRAMS = {"run_view": "ewa-view", "Session": "ewa-view", "EWA_VIEW_PROGRAM": "ewa-view", "kProgram": "ewa-bench",
             "EWA_BENCH_PROGRAM": "ewa-bench"}
@@ -60,8 +65,7 @@ class Code:
 
     def read(self, text, shared):
         """text: of a file; shared: of the headers that it includes."""
-        constants = dict(re.findall(r"^(?:inline )?const(?:expr)? [\w:<>\[\] ]+?\b(k[A-Z]\w*)(?:\[\])?( ?(?:= )?\{[^;]*\});", text, re.M))
-        for name, value in constants.items():
+        for name, value in CONSTANT.findall(text):
             text = re.sub(rf"(?<!\w){name}\b(?! ?(?:= ?)?\{{)", lambda _: value.lstrip(" ="), text)
         bodies = list(self.bodies(text))
         helpers = self.helpers(bodies + list(self.bodies(shared)))
@@ -75,7 +79,7 @@ class Code:
             for found in re.finditer(r"^ *def (\w+)\(.*?(?=^ *def |\Z)|^(?=\S)(?!def |class |@)(\w+).*?$", text, re.M | re.S):
                 yield found[1] or "", found[0]
             return
-        for found in re.finditer(r"(?:^ *|[\w>&*] )(\w+)(\((?:[^(){};]|\{[^{}]*\}|\((?:[^()]|\([^()]*\))*\))*\))\s*(?:const|override|:[^{};]*)?\s*\{", text, re.M):
+        for found in FUNCTION.finditer(text):
             if found[1] not in ("if", "for", "while", "switch", "catch"):
                 yield found[1], text[found.end() - 1 : close_of(text, found.end() - 1)]
 
@@ -98,11 +102,11 @@ class Code:
 
     @staticmethod
     def called(body, helpers):
-        return {word for word in re.findall(r"\b(\w+)(?: \w+)?\(", body) if word in helpers} | PROGRAMS.keys() & set(re.findall(r"\w+", body))
+        calls = set(re.findall(r"\b(\w+)(?: \w+)?\(", body))
+        return (calls & helpers.keys()) | (PROGRAMS.keys() & set(re.findall(r"\w+", body)))
 
     def read_body(self, body, helpers):
-        lambdas = [(found[1], body[found.end() - 1 : close_of(body, found.end() - 1)])
-                   for found in re.finditer(r"\b(\w+) = \[[^\]]*\]\s*(?:\((?:[^()]|\([^()]*\))*\))?[^;{}]*\{", body)]
+        lambdas = [(found[1], body[found.end() - 1 : close_of(body, found.end() - 1)]) for found in LAMBDA.finditer(body)]
         if lambdas:
             helpers = self.helpers(lambdas, helpers)
         started = set(self.begins.findall(body))
@@ -159,11 +163,16 @@ def without_comments(text):
     return re.sub(r"^\s*(?://|#(?!include|define|if|endif)).*$|\s//[^\"\n]*$", "", text, flags=re.M)
 
 
-def main():
-    build = pathlib.Path(sys.argv[1])
-    commands = {name: [build / "ewa", name] for name in re.findall(r"^  (\w+)  ", subprocess.run(
-        [build / "ewa", "--help"], check=True, capture_output=True, text=True).stdout.partition("Subcommands:")[2], re.M)}
+def commands_of(build):
+    """name -> the words that start it"""
+    shown = subprocess.run([build / "ewa", "--help"], check=True, capture_output=True, text=True).stdout
+    commands = {name: [build / "ewa", name] for name in re.findall(r"^  (\w+)  ", shown.partition("Subcommands:")[2], re.M)}
     commands.update({name: [build / name] for name in ("ewa-view", "ewa-bench") if (build / name).exists()})
+    return commands
+
+
+def read_tests(commands):
+    """(command, option) -> the files that type it"""
     where = collections.defaultdict(set)
     for path in sorted(p for folder in ("tests", "python/tests") for p in (ROOT / folder).rglob("*") if p.is_file()):
         code = Code([*commands])
@@ -175,6 +184,12 @@ def main():
         for command, options in code.typed.items():
             for option in options:
                 where[command, option].add(str(path.relative_to(ROOT)))
+    return where
+
+
+def main():
+    commands = commands_of(pathlib.Path(sys.argv[1]))
+    where = read_tests(commands)
     missing = count = 0
     for command, words in commands.items():
         same = SAME.get(command, command)
@@ -187,7 +202,7 @@ def main():
                 print(command, ", ".join(names) + ":", *files)
             if not files:
                 missing += 1
-                print(f"{'' if command.startswith('ewa') else 'ewa '}{command} {', '.join(names)}: no test types it", file=sys.stderr)
+                print(f"{command} {', '.join(names)}: no test types it", file=sys.stderr)
     if missing:
         sys.exit(f"{missing} of {count} options have no test")
     print(f"{count} options, each typed by a test of its command")
