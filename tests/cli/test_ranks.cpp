@@ -86,6 +86,13 @@ class TrainRanks : public testing::Test {
         const Names program = arguments_of(folder / "data", out, more);
         return mpirun(std::vector<Names>(count, program), options, std::move(circumstances));
     }
+    /// Status 2 and these words, and the run has no splats.
+    void expect_refused(const Outcome& outcome, const std::vector<std::string>& parts) {
+        EXPECT_EQ(outcome.status, 2) << outcome.err;
+        for (const std::string& part : parts)
+            EXPECT_NE(outcome.err.find(part), std::string::npos) << part << "\n" << outcome.err;
+        EXPECT_FALSE(fs::exists(folder / "o/splats.ply"));
+    }
     std::string splats(const std::string& out) { return read_file(folder / (out + "/splats.ply")); }
     /// The splats and the checkpoint are those of another run.
     void expect_same(const std::string& out, const std::string& other) {
@@ -286,35 +293,24 @@ TEST_F(RankFaults, ANetworkThatIsCutEndsTheJob) {
 
 TEST_F(TrainRanks, AreRefusedWithDifferentInputs) {
     make_dataset(folder / "other", {"0.png", "1.png", "2.png", "9.png"});
-    const Names here = arguments_of(folder / "data", "o", {}),
-                there = arguments_of(folder / "other", "o", {});
-    const Outcome outcome = mpirun({here, there});
-    EXPECT_EQ(outcome.status, 2) << outcome.err;
-    EXPECT_NE(outcome.err.find("has another dataset, or other images or cameras in it than rank 0"),
-              std::string::npos)
-        << outcome.err;
-    EXPECT_FALSE(fs::exists(folder / "o/splats.ply"));
+    const Names there = arguments_of(folder / "other", "o", {});
+    expect_refused(mpirun({arguments_of(folder / "data", "o", {}), there}),
+                   {"has another dataset, or other images or cameras in it than rank 0"});
 }
 
 TEST_F(TrainRanks, AreRefusedWithOtherOptions) {
-    const auto refused = [&](const Names& more, const std::string& expected) {
-        const Outcome outcome =
-            mpirun({arguments_of(folder / "data", "o", {}), arguments_of(folder / "data", "o", more)});
-        EXPECT_EQ(outcome.status, 2) << outcome.err;
-        EXPECT_NE(outcome.err.find(expected + " on rank 0 (" + node_name() + ")"), std::string::npos)
-            << expected << "\n"
-            << outcome.err;
-        EXPECT_FALSE(fs::exists(folder / "o/splats.ply")) << expected;
+    const Names here = arguments_of(folder / "data", "o", {});
+    const std::string there = " on rank 1 (" + node_name() + "), and ",
+                      first = " on rank 0 (" + node_name() + ")";
+    const auto refused = [&](const Names& other, const std::string& expected) {
+        expect_refused(mpirun({here, other}), {expected + first});
     };
-    const std::string there = " on rank 1 (" + node_name() + "), and ";
-    refused({"--sh-degree", "1"}, "--sh-degree is 1" + there + "auto");
+    refused(arguments_of(folder / "data", "o", {"--sh-degree", "1"}), "--sh-degree is 1" + there + "auto");
     std::ofstream(folder / "other.json") << R"({"dense-start": "on"})";
-    refused({"--config", folder / "other.json"}, "--dense-start is on" + there + "auto");
-    Names fewer = arguments_of(folder / "data", "o", {});
-    fewer.back() = "60";  // --steps
-    const Outcome outcome = mpirun({arguments_of(folder / "data", "o", {}), fewer});
-    EXPECT_EQ(outcome.status, 2) << outcome.err;
-    EXPECT_NE(outcome.err.find("--steps is 60" + there + "120"), std::string::npos) << outcome.err;
+    refused(arguments_of(folder / "data", "o", {"--config", folder / "other.json"}),
+            "--dense-start is on" + there + "auto");
+    steps = "60";
+    refused(arguments_of(folder / "data", "o", {}), "--steps is 60" + there + "120");
 }
 
 TEST_F(TrainRanks, AreRefusedWithOtherFirstSplats) {
@@ -323,14 +319,9 @@ TEST_F(TrainRanks, AreRefusedWithOtherFirstSplats) {
     make_splats(folder / "n1/start.ply", 40);
     Names each = arguments_of(folder / "data", "o", {});
     each[5] = "start.ply";
-    const auto at = [&](const char* node) { return Names{"--wdir", folder / node}; };
-    prefixes = {{0, at("n0")}, {1, at("n1")}};
-    const Outcome outcome = mpirun({each, each});
-    EXPECT_EQ(outcome.status, 2) << outcome.err;
-    EXPECT_NE(outcome.err.find("has other first splats (--init, or the dataset's points) than rank 0"),
-              std::string::npos)
-        << outcome.err;
-    EXPECT_FALSE(fs::exists(folder / "o/splats.ply"));
+    prefixes = {{0, {"--wdir", folder / "n0"}}, {1, {"--wdir", folder / "n1"}}};
+    expect_refused(mpirun({each, each}),
+                   {"has other first splats (--init, or the dataset's points) than rank 0"});
     fs::copy_file(folder / "n0/start.ply", folder / "n1/start.ply", fs::copy_options::overwrite_existing);
     expect_success(mpirun({each, each}));
 }
@@ -364,14 +355,9 @@ TEST_F(TrainRanks, DoNotWaitForeverForOneThatNeverJoins) {
 TEST_F(TrainRanks, SayWhichOneFailed) {
     Names missing = arguments_of(folder / "data", "o", {});
     missing[1] = folder / "nowhere";
-    const Outcome outcome = mpirun({arguments_of(folder / "data", "o", {}), missing});
-    EXPECT_EQ(outcome.status, 2) << outcome.err;
-    EXPECT_NE(outcome.err.find("ewa train: rank 1 ("), std::string::npos) << outcome.err;
-    EXPECT_NE(outcome.err.find("nowhere"), std::string::npos) << outcome.err;
-
-    const Outcome refused = ranks(2, "o", {"--refine-poses"});
-    EXPECT_EQ(refused.status, 2) << refused.err;
-    EXPECT_NE(refused.err.find("and --refine-poses exclude each other"), std::string::npos) << refused.err;
+    expect_refused(mpirun({arguments_of(folder / "data", "o", {}), missing}),
+                   {"ewa train: rank 1 (", "nowhere"});
+    expect_refused(ranks(2, "o", {"--refine-poses"}), {"and --refine-poses exclude each other"});
 }
 
 #endif
