@@ -163,21 +163,11 @@ std::string percent_encoded(const std::string& text) {
     return encoded;
 }
 
-/// Both files are on disk before either is renamed. The new values have another name than the old ones. The rename of
-/// the .gltf thus replaces all of it at once.
 void write_pair(const std::filesystem::path& path, Json root, const ValueWriter& write_values) {
-    const ValueFiles before = gltf_value_files(path);
-    std::vector<std::unique_ptr<core::AtomicFile>> values;
-    values.push_back(std::make_unique<core::AtomicFile>(before.written[0]));
-    write_values(*values[0]);
-    const Paths names = claim_names(values, before.usual);
-    root["buffers"][0]["uri"] = percent_encoded(names[0].filename().string());
-    core::AtomicFile file(path);
-    file.write(root.dump(1) + "\n");
-    values[0]->commit();
-    const ValueFiles beside = gltf_value_files(path);
-    file.commit();
-    remove_values(beside);
+    NewValues values(path, gltf_value_files);
+    write_values(values.add());
+    root["buffers"][0]["uri"] = percent_encoded(values.claim()[0].filename().string());
+    values.replace(root.dump(1) + "\n");
 }
 
 void write_document(const std::filesystem::path& path, const Json& root, uint64_t bytes,

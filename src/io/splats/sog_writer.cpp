@@ -242,19 +242,9 @@ namespace {
 std::vector<std::string> write_meta(const std::filesystem::path& path, const Gaussians& gaussians,
                                     const SaveOptions& options, bool morton) {
     SogPacker packer = packer_for(path, gaussians, options, morton);
-    const ValueFiles before = sog_value_files(path);
-    std::vector<std::unique_ptr<core::AtomicFile>> images;
-    for (const std::string& bytes : packer.images()) {
-        images.push_back(std::make_unique<core::AtomicFile>(before.written[images.size()]));
-        images.back()->write(bytes);
-    }
-    // All files are on disk before any is renamed, and meta.json comes last. Its rename replaces the SOG at once.
-    core::AtomicFile meta(path);
-    meta.write(packer.meta(claim_names(images, before.usual)));
-    for (const auto& image : images) image->commit();
-    const ValueFiles beside = sog_value_files(path);
-    meta.commit();
-    remove_values(beside);
+    NewValues values(path, sog_value_files);
+    for (const std::string& bytes : packer.images()) values.add().write(bytes);
+    values.replace(packer.meta(values.claim()));
     return remarks_of(gaussians, packer.palette());
 }
 

@@ -85,15 +85,36 @@ ValueFiles value_files(const std::filesystem::path& naming, const Paths& usual,
     return files;
 }
 
-Paths claim_names(const std::vector<std::unique_ptr<core::AtomicFile>>& files, const Paths& usual) {
+NewValues::NewValues(const std::filesystem::path& naming, ValueFiles (*beside)(const std::filesystem::path&))
+    : naming_(naming), beside_(beside), before_(beside(naming)) {}
+
+NewValues::~NewValues() = default;
+
+core::AtomicFile& NewValues::add() {
+    files_.push_back(std::make_unique<core::AtomicFile>(before_.written[files_.size()]));
+    return *files_.back();
+}
+
+Paths NewValues::claim() {
     for (int number = 1;; ++number) {
         Paths names;
-        for (const std::filesystem::path& name : usual) names.push_back(numbered(name, number));
+        for (const std::filesystem::path& name : before_.usual) names.push_back(numbered(name, number));
         if (!std::ranges::all_of(names, is_free)) continue;
         size_t claimed = 0;
-        while (claimed < files.size() && files[claimed]->claim(names[claimed])) ++claimed;
-        if (claimed == files.size()) return names;
+        while (claimed < files_.size() && files_[claimed]->claim(names[claimed])) ++claimed;
+        if (claimed == files_.size()) return names;
     }
+}
+
+void NewValues::replace(std::string_view text) {
+    // All files are on disk before any is renamed.
+    core::AtomicFile naming(naming_);
+    naming.write(text);
+    for (const auto& file : files_) file->commit();
+    const ValueFiles beside = beside_(naming_);
+    naming.commit();
+    std::error_code ignored;  // older values are of no use, and no harm
+    for (const std::filesystem::path& file : beside.removed) std::filesystem::remove(file, ignored);
 }
 
 bool written_by_ewa(const std::filesystem::path& file) {
@@ -105,11 +126,6 @@ bool written_by_ewa(const std::filesystem::path& file) {
     constexpr std::string_view kGenerator = R"("generator":"ewa)";
     const size_t at = head.find(kGenerator);
     return at != std::string::npos && is_digits(std::string_view(head).substr(at + kGenerator.size(), 1));
-}
-
-void remove_values(const ValueFiles& files) {
-    std::error_code ignored;
-    for (const std::filesystem::path& file : files.removed) std::filesystem::remove(file, ignored);
 }
 
 }  // namespace ewa::io

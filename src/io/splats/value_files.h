@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace ewa::core {
@@ -29,12 +30,30 @@ struct ValueFiles {
 ValueFiles value_files(const std::filesystem::path& naming, const Paths& usual,
                        Paths (*named_by)(const std::filesystem::path&));
 
-/// Gives files that are still to be committed the names of `usual`, or those with the first number that all of them can have.
-/// Files of other processes keep theirs.
-Paths claim_names(const std::vector<std::unique_ptr<core::AtomicFile>>& files, const Paths& usual);
+/// A naming file and its values, replaced at once.
+class NewValues {
+  public:
+    /// beside: the ValueFiles of the naming file.
+    NewValues(const std::filesystem::path& naming, ValueFiles (*beside)(const std::filesystem::path&));
+    /// Without replace(), no new file stays.
+    ~NewValues();
+    NewValues(const NewValues&) = delete;
+    NewValues& operator=(const NewValues&) = delete;
 
-/// Failures are ignored: the values are of no use, and no harm.
-void remove_values(const ValueFiles& files);
+    /// The next value, to be written.
+    core::AtomicFile& add();
+    /// Gives the values their usual names, or those with the first number that all of them can have. Files of other processes
+    /// keep theirs.
+    Paths claim();
+    /// Puts all in place, the naming file last, and removes the older values.
+    void replace(std::string_view text);
+
+  private:
+    std::filesystem::path naming_;
+    ValueFiles (*beside_)(const std::filesystem::path&);
+    ValueFiles before_;
+    std::vector<std::unique_ptr<core::AtomicFile>> files_;
+};
 
 /// a.bin, a-2.bin, a-3.bin and so on.
 std::filesystem::path numbered(const std::filesystem::path& usual, int number);
