@@ -41,12 +41,11 @@ RollingShutter shutter_of(const std::string& text) {
         throw fail("'" + text.substr(0, colon) +
                    "' is not top-to-bottom, bottom-to-top, left-to-right or right-to-left");
     const std::string numbers = colon == std::string::npos ? "" : text.substr(colon + 1);
-    const size_t comma = numbers.find(',');
-    const auto degrees = core::parse_number(numbers.substr(0, comma));
-    const auto percent =
-        comma == std::string::npos ? std::optional(0.0) : core::parse_number(numbers.substr(comma + 1));
-    if (!degrees || !percent) throw fail("'" + numbers + "' is not a number, or two with a comma");
-    return {*from, *degrees, *percent};
+    std::vector<double> values = core::parse_list(numbers).value_or(std::vector<double>());
+    if (values.empty() || values.size() > 2)
+        throw fail("'" + numbers + "' is not a number, or two with a comma");
+    values.resize(2);
+    return {*from, values[0], values[1]};
 }
 
 int run(const DatasetArguments& arguments) {

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/lens_argument.h"
 
-#include <cmath>
-#include <sstream>
+#include <string_view>
 #include <vector>
 
-#include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 
 namespace ewa::cli {
@@ -15,13 +14,12 @@ LensArgument lens_of(const std::string& text) {
     const size_t colon = text.find(':');
     const std::string name = text.substr(0, colon);
     std::vector<double> numbers;
-    std::stringstream list(colon == std::string::npos ? "" : text.substr(colon + 1));
-    for (std::string word; std::getline(list, word, ',');) {
-        const auto number = core::parse_number(word);
-        if (!number || !std::isfinite(*number))
-            throw InputError("--through: '" + word.substr(0, kShown) + "' is not a number; expected " +
-                             kLensForms);
-        numbers.push_back(*number);
+    if (colon != std::string::npos) {
+        const auto list = core::parse_list(std::string_view(text).substr(colon + 1));
+        if (!list)
+            throw InputError("--through: '" + text.substr(colon + 1, kShown) +
+                             "' is not a list of numbers; expected " + kLensForms);
+        numbers = *list;
     }
     const size_t most = name == "fisheye" ? 1 : name == "opencv" ? 4 : 0;
     const bool good = name == "fisheye" || name == "equirectangular" || name == "orthographic" ||

@@ -3,7 +3,6 @@
 #include <array>
 #include <limits>
 #include <set>
-#include <sstream>
 #include <string_view>
 
 #include "core/parallel.h"
@@ -55,8 +54,8 @@ std::vector<std::string> metrics_named(const std::string& list) {
     std::vector<std::string> words = {"all", "bands"};
     for (const Metric& metric : all_metrics()) words.push_back(metric.name);
     std::set<std::string> wanted;
-    std::istringstream stream(list + ",");
-    for (std::string word; std::getline(stream, word, ',');) {
+    for (const std::string_view part : core::split_list(list)) {
+        std::string word(part);
         if (const std::string problem = core::settle_word(word, words); !problem.empty())
             throw InputError(problem);
         for (const std::string& name : named_by(word)) wanted.insert(name);

@@ -65,9 +65,8 @@ int index_of_name(const std::vector<std::string>& names, const std::string& name
 
 std::vector<int> frames_named(const Dataset& dataset, const std::string& list) {
     std::vector<int> frames;
-    for (size_t begin = 0, end = 0; begin <= list.size(); begin = end + 1) {
-        end = std::min(list.find(',', begin), list.size());
-        const auto [first, last] = range_of(dataset, list.substr(begin, end - begin), list);
+    for (const std::string_view part : core::split_list(list)) {
+        const auto [first, last] = range_of(dataset, std::string(part), list);
         for (int index = first; index <= last; ++index)
             if (std::find(frames.begin(), frames.end(), index) == frames.end()) frames.push_back(index);
     }
