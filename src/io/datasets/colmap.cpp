@@ -168,11 +168,7 @@ void find_images(const ImageFinder& finder, const std::string& where, ImageRecor
     for (const ImageRecord& image : records.images) names.push_back(image.name);
     finder.settle(names);
     records.folder = finder.folder();
-    for (ImageRecord& image : records.images) {
-        ImageFinder::Found found = finder.find(image.name, where);
-        image.name = std::move(found.name);
-        image.path = std::move(found.path);
-    }
+    for (ImageRecord& image : records.images) finder.find(image.name, where, image);
 }
 
 constexpr size_t kMaxName = 4096;

@@ -259,9 +259,7 @@ ImageFinder image_finder(const json& frames, const Bases& bases) {
 void find_image(const Entry& entry, const ImageFinder& finder, ImageRecord& image) {
     const std::string name = entry.text("file_path");
     if (name.empty()) entry.fail("\"file_path\" is missing");
-    ImageFinder::Found found = finder.find(name, entry.where());
-    image.name = std::move(found.name);
-    image.path = std::move(found.path);
+    finder.find(name, entry.where(), image);
 }
 
 void read_depth(const Entry& entry, const Bases& bases, ImageRecord& image) {

@@ -128,9 +128,7 @@ ImageRecords import_bundler(const ImportSource& source) {
     const uint64_t cameras = numbers.count("the number of cameras", kMostListed),
                    points = numbers.count("the number of points", kMostPoints);
     const ImageFinder images(source.dataset, {"images"});
-    ImageRecords records;
-    records.files = {source.file};
-    records.folder = images.folder();
+    ImageRecords records = begin_records(source, {}, images.folder());
     const std::vector<std::string> names = names_of(source, images, cameras, records);
     std::vector<size_t> places(cameras, SIZE_MAX);  // of a camera in records.images
     size_t unplaced = 0;
@@ -140,11 +138,9 @@ ImageRecords import_bundler(const ImportSource& source) {
             ++unplaced;
             continue;
         }
-        const auto found = images.find(names[i], numbers.where());
-        record->name = found.name;
-        record->path = found.path;
-        if (core::is_file(found.path)) {
-            const ImageSize size = read_image_size(found.path);
+        images.find(names[i], numbers.where(), *record);
+        if (core::is_file(record->path)) {
+            const ImageSize size = read_image_size(record->path);
             record->camera.width = size.width;
             record->camera.height = size.height;
             record->camera.cx = 0.5 * size.width;

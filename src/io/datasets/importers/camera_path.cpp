@@ -59,10 +59,7 @@ ImageRecords import_camera_path(const ImportSource& source) {
     if (path.empty())
         top.fail("\"camera_path\" is empty; add keyframes in the viewer, and save the path again");
     if (path.size() > kMostCameras) top.fail("\"camera_path\" has more than 100000 cameras");
-    ImageRecords records;
-    records.program = "nerfstudio";
-    records.files = {source.file};
-    records.folder = source.dataset / "images";
+    ImageRecords records = begin_records(source, "nerfstudio", source.dataset / "images");
     for (size_t i = 0; i < path.size(); ++i) {
         const std::string number = std::to_string(i);
         const core::JsonField field(path[i], name + ": camera " + number);

@@ -11,6 +11,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "folders/run_folder.h"
+#include "io/datasets/image_records.h"
 
 namespace ewa::io {
 
@@ -271,17 +272,20 @@ std::optional<ImageFinder::Found> ImageFinder::find_in(size_t place, const fs::p
     return Found{folder / chosen, chosen.string()};
 }
 
-ImageFinder::Found ImageFinder::find(const std::string& text, const std::string& where) const {
+void ImageFinder::find(const std::string& text, const std::string& where, ImageRecord& record) const {
     const std::string shown = where + ": the image \"" + core::one_line(text.substr(0, kShownName)) + "\" ";
     const fs::path name = named_path(text);
     if (name.empty()) throw InputError(shown + "has no file's name");
     for (size_t place = place_.value_or(0); place < (place_ ? *place_ + 1 : places_.size()); ++place)
         if (auto found = find_in(place, name, shown)) {
             place_ = place;
-            return *found;
+            record.path = std::move(found->path);
+            record.name = std::move(found->name);
+            return;
         }
     const fs::path inside = core::name_inside(text).value_or(name.filename());
-    return {settled().folder / inside, inside.string()};
+    record.path = settled().folder / inside;
+    record.name = inside.string();
 }
 
 }  // namespace ewa::io

@@ -12,6 +12,8 @@
 
 namespace ewa::io {
 
+struct ImageRecord;
+
 class ImageFinder {
   public:
     /// A folder that may hold the images.
@@ -34,14 +36,10 @@ class ImageFinder {
     /// Adds folders of the dataset that usually have the images of a workspace. They are searched last.
     void add_last(const std::filesystem::path& dataset);
 
-    struct Found {
-        std::filesystem::path path;
-        std::string name;  // relative to the place
-    };
-    /// Returns a path without a file if the image is missing. Among several images with the name, the one with most of the path in common
-    /// is taken. Throws InputError that begins with `where`: several such images, no name of a file, a link out of the dataset, or more
-    /// than 200,000 images.
-    Found find(const std::string& name, const std::string& where) const;
+    /// Sets the record's path and its name relative to the place. A missing image has a path without a file. Among several images
+    /// with the name, the one with most of the path in common is taken. Throws InputError that begins with `where`: several such
+    /// images, no name of a file, a link out of the dataset, or more than 200,000 images.
+    void find(const std::string& name, const std::string& where, ImageRecord& record) const;
 
     /// All images of the place, relative to it and sorted. Without one that is chosen, those of the likeliest place.
     const std::vector<std::filesystem::path>& names() const { return listing(place_.value_or(0)).names; }
@@ -49,6 +47,10 @@ class ImageFinder {
     std::filesystem::path folder() const;
 
   private:
+    struct Found {
+        std::filesystem::path path;
+        std::string name;
+    };
     struct Listing {
         std::vector<std::filesystem::path> names;                     // relative to the place, sorted
         std::map<std::string, std::vector<size_t>> by_name, by_stem;  // by their keys

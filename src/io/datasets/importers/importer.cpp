@@ -306,11 +306,17 @@ std::vector<fs::path> files_of_folder(const fs::path& folder) {
     return files;
 }
 
+ImageRecords begin_records(const ImportSource& source, std::string_view program, const fs::path& folder) {
+    ImageRecords records;
+    records.program = program;
+    records.files = {source.file};
+    records.folder = folder;
+    return records;
+}
+
 ImageRecord begin_record(const ImageFinder& images, const std::string& name, const core::JsonField& camera) {
     ImageRecord record;
-    const auto found = images.find(name, camera.where());
-    record.name = found.name;
-    record.path = found.path;
+    images.find(name, camera.where(), record);
     record.camera.width = camera.side("width");
     record.camera.height = camera.side("height");
     record.camera.fx = camera.number("fx");

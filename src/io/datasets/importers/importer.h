@@ -79,6 +79,10 @@ std::string head_of(const std::filesystem::path& file);
 /// The folder's files in the order of names.
 std::vector<std::filesystem::path> files_of_folder(const std::filesystem::path& folder);
 
+/// The records of one file. folder: of the images.
+ImageRecords begin_records(const ImportSource& source, std::string_view program,
+                           const std::filesystem::path& folder);
+
 /// The record of an image, with the "width", "height" (px), "fx" and "fy" of its camera.
 ImageRecord begin_record(const ImageFinder& images, const std::string& name, const core::JsonField& camera);
 

@@ -23,10 +23,8 @@ ImageRecords import_inria(const ImportSource& source) {
     const auto document = core::read_json_file<nlohmann::json>(source.file, {.not_finite = true});
     if (!document.is_array()) throw InputError(name + ": is not a list of cameras");
     const ImageFinder images(source.dataset, {"images", "input"});
-    ImageRecords records;
-    records.program = "INRIA's trainer, or another one in its layout";
-    records.files = {source.file};
-    records.folder = images.folder();
+    ImageRecords records =
+        begin_records(source, "INRIA's trainer, or another one in its layout", images.folder());
     for (size_t i = 0; i < document.size(); ++i) {
         const std::string where = name + ": camera " + std::to_string(i);
         const core::JsonField field(document[i], where);

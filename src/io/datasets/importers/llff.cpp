@@ -76,16 +76,12 @@ ImageRecords import_llff(const ImportSource& source) {
         throw InputError(name + ": has " + core::counted(rows.size(), "pose") + ", and " +
                          core::one_line(images.folder().string()) + " has " +
                          core::counted(names.size(), "image") + "; keep only the images that have poses");
-    ImageRecords records;
-    records.files = {source.file};
-    records.folder = images.folder();
+    ImageRecords records = begin_records(source, {}, images.folder());
     for (size_t i = 0; i < rows.size(); ++i) {
         const auto at = [&](int row, int column) { return rows[i][size_t(5 * row + column)]; };
         const std::string where = name + ": image " + std::to_string(i);
         ImageRecord record;
-        const auto found = images.find(names[i].string(), where);
-        record.name = found.name;
-        record.path = found.path;
+        images.find(names[i].string(), where, record);
         Camera& camera = record.camera;
         camera.height = llff_side(at(0, 4), where);
         camera.width = llff_side(at(1, 4), where);

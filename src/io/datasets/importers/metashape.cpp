@@ -164,9 +164,7 @@ ImageRecords import_metashape(const ImportSource& source) {
         if (!sensor->second) camera.fail("its sensor has no calibration; align the photos, and export again");
         const auto component = components.find(camera.attribute("component_id"));
         ImageRecord record = *sensor->second;
-        const auto found = images.find(label, name);
-        record.name = found.name;
-        record.path = found.path;
+        images.find(label, name, record);
         read_metashape_pose(*transform, component == components.end() ? Component() : component->second,
                             record.camera);
         finish_record(record, camera.where());

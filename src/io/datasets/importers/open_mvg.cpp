@@ -145,11 +145,8 @@ ImageRecords import_open_mvg(const ImportSource& source) {
     }
     const Keyed poses = keyed(top, "extrinsics", "extrinsic");
 
-    ImageRecords records;
-    records.program = "OpenMVG";
-    records.files = {source.file};
     const ImageFinder images(source.dataset, {"images"});
-    records.folder = images.folder();
+    ImageRecords records = begin_records(source, "OpenMVG", images.folder());
     size_t unplaced = 0;
     number = 0;
     for (const json& entry : top.list("views")) {
@@ -163,9 +160,7 @@ ImageRecords import_open_mvg(const ImportSource& source) {
         const auto camera = cameras.find(view.index("id_intrinsic"));
         if (camera == cameras.end()) view.fail("its intrinsic is not in the list \"intrinsics\"");
         ImageRecord record = camera->second;
-        const auto found = images.find(view.text("filename"), where);
-        record.name = found.name;
-        record.path = found.path;
+        images.find(view.text("filename"), where, record);
         read_extrinsic(pose->second, record.camera);
         finish_record(record, where);
         records.images.push_back(std::move(record));

@@ -174,9 +174,7 @@ ImageRecords import_open_sfm(const ImportSource& source) {
         const auto camera = cameras.find(shot.text("camera"));
         if (camera == cameras.end()) shot.fail("its camera is not in the list of cameras");
         ImageRecord record = camera->second;
-        const auto found = images.find(key, core::one_line(name));
-        record.name = found.name;
-        record.path = found.path;
+        images.find(key, core::one_line(name), record);
         const std::vector<double> r = shot.numbers("rotation", 3), t = shot.numbers("translation", 3);
         record.camera.rotation = rotation_by({r[0], r[1], r[2]});
         record.camera.translation = {t[0], t[1], t[2]};

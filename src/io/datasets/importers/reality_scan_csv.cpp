@@ -78,9 +78,7 @@ glm::dmat3 turned(const glm::dvec3& axis, double degrees) {
 ImageRecord record_of(const CsvRow& row, const ImageFinder& images) {
     ImageRecord record;
     const std::string& name = row.cells[row.columns.at("name")];
-    const auto found = images.find(name, row.where);
-    record.name = found.name;
-    record.path = found.path;
+    images.find(name, row.where, record);
     set_calibration(record,
                     {.focal = row.number("f"),
                      .u = row.number("px", 0),
@@ -128,11 +126,8 @@ ImageRecords import_reality_scan_csv(const ImportSource& source) {
     CsvColumns columns;
     size_t width = 0;
     char separator = ',';
-    ImageRecords records;
-    records.program = "RealityScan";
-    records.files = {source.file};
     const ImageFinder images(source.dataset, {"images"});
-    records.folder = images.folder();
+    ImageRecords records = begin_records(source, "RealityScan", images.folder());
     for (size_t number = 1; reader.read_line(line, kLongestRow); ++number) {
         const std::string where = reader.name() + ":" + std::to_string(number);
         if (core::trim(line).empty()) continue;

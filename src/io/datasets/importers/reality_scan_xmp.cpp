@@ -103,9 +103,7 @@ std::optional<ImageRecord> read_xmp(const fs::path& path, const ImageFinder& ima
     xcr->field = with_rotation(*xcr, xcr->field, kDepth);
     if (xcr->text("Rotation").empty() || xcr->text("Position").empty()) return std::nullopt;
     ImageRecord record;
-    const auto found = images.find(path.stem().string(), name);
-    record.name = found.name;
-    record.path = found.path;
+    images.find(path.stem().string(), name, record);
     set_calibration(record, calibration_in(*xcr), name);
     const std::vector<double> r = xcr->numbers("Rotation", 9), c = xcr->numbers("Position", 3);
     glm::dmat3 axes;  // the rows are the camera's axes in the world

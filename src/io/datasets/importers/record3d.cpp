@@ -72,15 +72,10 @@ ImageRecords import_record3d(const ImportSource& source) {
     if (per_frame && top.value()["perFrameIntrinsicCoeffs"].size() != poses)
         top.fail("\"perFrameIntrinsicCoeffs\" and \"poses\" differ in length");
     const ImageFinder images(source.dataset, {"rgb", "rgbd", "images"});
-    ImageRecords records;
-    records.program = "Record3D";
-    records.files = {source.file};
-    records.folder = images.folder();
+    ImageRecords records = begin_records(source, "Record3D", images.folder());
     for (size_t i = 0; i < poses; ++i) {
         ImageRecord record;
-        const auto found = images.find(std::to_string(i), name);
-        record.name = found.name;
-        record.path = found.path;
+        images.find(std::to_string(i), name, record);
         set_record3d_intrinsics(top, i, per_frame, record.camera);
         set_record3d_pose(top, i, record.camera);
         finish_record(record, name + ": image " + std::to_string(i));
