@@ -13,12 +13,17 @@
 // A bound is the box of the leaf's ellipsoids at one standard deviation, over all levels. The frame is that of an INRIA PLY.
 #pragma once
 #include <cstddef>
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace ewa::io {
 
 inline constexpr const char* kLevelsName = "lod-meta.json";
 inline constexpr size_t kMostLevels = 32;
+
+/// The splats of the levels, such as "100, 50, 25".
+std::string counts_text(const std::vector<size_t>& counts);
 
 /// Whether write_levels makes folders with such a name: LEVEL_CHUNK, or with a number more where that existed.
 bool names_chunk_folder(std::string_view name);

@@ -77,12 +77,7 @@ class LevelsWriter {
         }
         folders_.replace(meta().dump() + "\n");
         std::vector<std::string> remarks;
-        if (sizes_.size() > 1) {
-            std::string text = "levels of ";
-            for (size_t level = 0; level < sizes_.size(); ++level)
-                text.append(level == 0 ? "" : ", ").append(std::to_string(sizes_[level]));
-            remarks.push_back(text + " splats");
-        }
+        if (sizes_.size() > 1) remarks.push_back("levels of " + counts_text(sizes_) + " splats");
         for (std::string& remark : lost_) remarks.push_back(std::move(remark));
         return remarks;
     }
@@ -199,6 +194,12 @@ class LevelsWriter {
 };
 
 }  // namespace
+
+std::string counts_text(const std::vector<size_t>& counts) {
+    std::string text;
+    for (const size_t count : counts) text.append(text.empty() ? "" : ", ").append(std::to_string(count));
+    return text;
+}
 
 bool names_chunk_folder(std::string_view name) {
     return is_pair_of_numbers(without_number(name));

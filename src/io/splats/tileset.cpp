@@ -16,6 +16,7 @@
 #include "ewa/splat_edit.h"
 #include "io/splats/formats.h"
 #include "io/splats/gltf_splats.h"
+#include "io/splats/levels.h"
 #include "io/splats/part_folders.h"
 #include "io/splats/splat_tree.h"
 
@@ -95,10 +96,8 @@ class TilesetWriter {
         }
         join();
         folders_.replace(structure(origin).dump(1) + "\n");
-        std::string text = std::to_string(written_) + " tiles of levels with ";
-        for (size_t level = 0; level < levels; ++level)
-            text.append(level == 0 ? "" : ", ").append(std::to_string(sizes[level]));
-        std::vector<std::string> remarks(1, text + " splats");
+        std::vector<std::string> remarks(
+            1, std::to_string(written_) + " tiles of levels with " + counts_text(sizes) + " splats");
         if (size_t(options_.levels) > levels)
             remarks.push_back(std::to_string(levels) + " of " + std::to_string(options_.levels) +
                               " levels: more would have tiles of fewer than " +
