@@ -5,6 +5,7 @@
 
 #include "capture/steps.h"
 #include "core/hash.h"
+#include "core/json_field.h"
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
@@ -23,12 +24,6 @@ std::map<std::string, std::string> contents_in(const Json& lines) {
         if (space != std::string::npos) contents[line.substr(space + 1)] = line.substr(0, space);
     }
     return contents;
-}
-
-/// Empty if the record has no such text.
-std::string text_in(const Json& object, const char* key) {
-    const auto found = object.is_object() ? object.find(key) : object.end();
-    return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();
 }
 
 void add_remark(std::vector<std::string>& remarks, const std::vector<std::string>& names, const char* one,
@@ -73,7 +68,7 @@ Chosen later_choice(const fs::path& folder, const std::vector<fs::path>& found, 
     auto searched = contents_in(before["files"]);
     std::map<std::string, std::string> reasons;  // by line
     for (const Json& photo : before.value("skipped", Json::array()))
-        reasons[text_in(photo, "file")] = text_in(photo, "reason");
+        reasons[core::text_in(photo, "file")] = core::text_in(photo, "reason");
     Chosen chosen;
     std::vector<Skipped> skipped;
     std::vector<std::string> changed, added, missing;

@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <regex>
 
 #include "capture/steps.h"
 #include "core/json.h"
+#include "core/json_field.h"
 #include "core/parallel.h"
 #include "core/process.h"
 #include "core/text.h"
@@ -21,6 +23,7 @@ namespace ewa::capture {
 namespace {
 
 namespace fs = std::filesystem;
+using core::text_in;
 using Json = nlohmann::json;
 
 /// "30000/1001", "25" or "0/0".
@@ -40,14 +43,8 @@ double seconds_of(const std::string& text) {
     return std::isfinite(seconds) ? seconds : 0;
 }
 
-std::string text_of(const Json& object, const char* key) {
-    const auto found = object.find(key);
-    return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();
-}
-
-int number_of(const Json& object, const char* key) {
-    const auto found = object.find(key);
-    return found != object.end() && found->is_number_integer() ? found->get<int>() : 0;
+int whole_of(const Json& object, const char* key) {
+    return int(std::clamp(core::number_in(object, key).value_or(0), 0.0, double(INT32_MAX)));
 }
 
 int count_of(double rate, double seconds) {
@@ -105,18 +102,18 @@ Streams by_ffprobe(const fs::path& film, const std::function<bool()>& go_on) {
     for (const Json& stream : root["streams"]) {
         found.other_streams = true;
         const Json disposition = stream.value("disposition", Json::object());
-        if (text_of(stream, "codec_type") != "video" || number_of(disposition, "attached_pic") != 0) continue;
-        FilmInfo info{.stream = number_of(stream, "index"),
-                      .width = number_of(stream, "width"),
-                      .height = number_of(stream, "height"),
-                      .frames = integer(text_of(stream, "nb_frames")),
-                      .stated = integer(text_of(stream, "nb_frames")),
-                      .rate = ratio(text_of(stream, "avg_frame_rate")),
-                      .matrix = text_of(stream, "color_space"),
-                      .transfer = text_of(stream, "color_transfer")};
+        if (text_in(stream, "codec_type") != "video" || whole_of(disposition, "attached_pic") != 0) continue;
+        FilmInfo info{.stream = whole_of(stream, "index"),
+                      .width = whole_of(stream, "width"),
+                      .height = whole_of(stream, "height"),
+                      .frames = integer(text_in(stream, "nb_frames")),
+                      .stated = integer(text_in(stream, "nb_frames")),
+                      .rate = ratio(text_in(stream, "avg_frame_rate")),
+                      .matrix = text_in(stream, "color_space"),
+                      .transfer = text_in(stream, "color_transfer")};
         const Json tags = stream.value("tags", Json::object());
         for (const std::string& duration :
-             {text_of(stream, "duration"), text_of(tags, "DURATION"), text_of(format, "duration")})
+             {text_in(stream, "duration"), text_in(tags, "DURATION"), text_in(format, "duration")})
             if (info.frames < 1) info.frames = count_of(info.rate, seconds_of(duration));
         keep_largest(found, info);
     }
@@ -124,16 +121,16 @@ Streams by_ffprobe(const fs::path& film, const std::function<bool()>& go_on) {
     const auto ask_again = [&](const char* option, const std::function<void(const Json&)>& take) {
         const Json again = probed(film, option, go_on);
         for (const Json& stream : again["streams"])
-            if (number_of(stream, "index") == best.stream) take(stream);
+            if (whole_of(stream, "index") == best.stream) take(stream);
     };
     if (best.stream >= 0 && best.frames < 1)
         ask_again("-count_packets",
-                  [&](const Json& stream) { best.frames = integer(text_of(stream, "nb_read_packets")); });
+                  [&](const Json& stream) { best.frames = integer(text_in(stream, "nb_read_packets")); });
     // The frames of ProRes may name no colours where the container does.
     if (best.stream >= 0 && best.matrix.empty())
         ask_again("-nofind_stream_info", [&](const Json& stream) {
-            best.matrix = text_of(stream, "color_space");
-            best.transfer = text_of(stream, "color_transfer");
+            best.matrix = text_in(stream, "color_space");
+            best.transfer = text_in(stream, "color_transfer");
         });
     return found;
 }

@@ -19,6 +19,7 @@
 #include "cli/run_inputs.h"
 #include "cli/splat_statistics.h"
 #include "core/folders.h"
+#include "core/json_field.h"
 #include "core/messages.h"
 #include "core/text.h"
 #include "ewa/capture.h"
@@ -115,12 +116,9 @@ void print_run(const folders::Run& run) {
         fmt::print("dataset         {}{}\n", core::one_line(run.named_dataset),
                    run.dataset.empty() ? " (not found)" : "");
     const Json summary = summary_of(run);
-    const auto number = [&](const char* name) {
-        const auto found = summary.find(name);
-        return found != summary.end() && found->is_number() ? found->get<double>() : std::nan("");
-    };
-    if (std::isfinite(number("steps"))) fmt::print("steps           {:.0f}\n", number("steps"));
-    if (std::isfinite(number("test_psnr"))) fmt::print("test PSNR       {:.3f} dB\n", number("test_psnr"));
+    if (const auto steps = core::number_in(summary, "steps")) fmt::print("steps           {:.0f}\n", *steps);
+    if (const auto psnr = core::number_in(summary, "test_psnr"))
+        fmt::print("test PSNR       {:.3f} dB\n", *psnr);
 }
 
 /// run: the training run that the file is of; null: unknown.

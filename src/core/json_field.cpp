@@ -11,21 +11,29 @@ namespace ewa::core {
 
 namespace {
 
-constexpr double kMostPixels = 1 << 20, kMostIndex = 1ull << 53;
+constexpr uint64_t kMostPixels = 1 << 20;
 
 std::string quoted(const char* key) {
     return std::string("\"") + key + "\"";
 }
 
-/// False if a value is not a finite number, or lists lie in lists in lists.
-bool add_numbers(const nlohmann::json& list, int depth, std::vector<double>& numbers) {
+template <class Json>
+bool is_finite(const Json& value) {
+    return value.is_number() && std::isfinite(value.template get<double>());
+}
+
+/// False unless the value is a list of finite numbers, or of equally long lists of them.
+bool add_numbers(const nlohmann::json& list, size_t most, std::vector<double>& numbers) {
+    if (!list.is_array() || list.size() > most) return false;
+    const bool rows = !list.empty() && list[0].is_array();
     for (const nlohmann::json& value : list) {
-        if (value.is_array() && depth == 0) {
-            if (!add_numbers(value, 1, numbers)) return false;
-        } else if (value.is_number() && std::isfinite(value.get<double>())) {
-            numbers.push_back(value.get<double>());
+        if (rows) {
+            if (!value.is_array() || value.size() != list[0].size() || value.empty() || value[0].is_array() ||
+                !add_numbers(value, most - numbers.size(), numbers))
+                return false;
         } else {
-            return false;
+            if (!is_finite(value)) return false;
+            numbers.push_back(value.get<double>());
         }
     }
     return true;
@@ -33,44 +41,85 @@ bool add_numbers(const nlohmann::json& list, int depth, std::vector<double>& num
 
 }  // namespace
 
+JsonField JsonField::of_file(const std::filesystem::path& file, const JsonLimits& limits,
+                             std::string advice) {
+    const auto whole = std::make_shared<const nlohmann::json>(read_json_file<nlohmann::json>(file, limits));
+    JsonField field(*whole, one_line(file.string()), std::move(advice));
+    field.whole_ = whole;
+    return field;
+}
+
+JsonField JsonField::of_text(std::string_view text, const std::string& name, const JsonLimits& limits,
+                             std::string advice) {
+    const auto whole = std::make_shared<const nlohmann::json>(parse_json<nlohmann::json>(text, name, limits));
+    JsonField field(*whole, name, std::move(advice));
+    field.whole_ = whole;
+    return field;
+}
+
 void JsonField::fail(const std::string& text) const {
     throw InputError(one_line(where_ + ": " + text));
 }
 
+void JsonField::fail(const char* key, const std::string& expected) const {
+    fail((key ? quoted(key) + " " : std::string()) + "is not " + expected);
+}
+
+JsonField JsonField::or_of(const nlohmann::json& other) const {
+    JsonField both = *this;
+    both.other_ = &other;
+    return both;
+}
+
 bool JsonField::has(const char* key) const {
     const auto found = value_->find(key);
-    return found != value_->end() && !found->is_null();
+    if (found != value_->end() && !found->is_null()) return true;
+    return other_ && other_->contains(key) && !other_->find(key)->is_null();
 }
 
 const nlohmann::json& JsonField::member(const char* key) const {
-    if (!has(key)) fail(quoted(key) + " is missing");
-    return *value_->find(key);
+    if (!key) return *value_;
+    if (!value_->is_object()) fail("is not a JSON object" + advice_);
+    if (!has(key)) fail(quoted(key) + " is missing" + advice_);
+    const auto found = value_->find(key);
+    return found != value_->end() && !found->is_null() ? *found : *other_->find(key);
 }
 
 JsonField JsonField::at(const char* key, const std::string& what) const {
-    return {member(key), what.empty() ? where_ : where_ + ": " + what};
+    return {member(key), what.empty() ? where_ : where_ + ": " + what, advice_};
 }
 
 const nlohmann::json& JsonField::list(const char* key) const {
     const nlohmann::json& value = member(key);
-    if (!value.is_array()) fail(quoted(key) + " is not a list");
+    if (!value.is_array()) fail(key, "a list");
     return value;
 }
 
 const nlohmann::json& JsonField::members(const char* key) const {
     const nlohmann::json& value = member(key);
-    if (!value.is_object()) fail(quoted(key) + " is not a JSON object");
+    if (!value.is_object()) fail(key, "a JSON object");
     return value;
 }
 
 JsonField JsonField::object(const char* key) const {
-    return {members(key), where_};
+    return {members(key), where_, advice_};
+}
+
+JsonField JsonField::part(const char* key) const {
+    return {members(key), where_ + ": " + quoted(key), advice_};
+}
+
+std::vector<JsonField> JsonField::items(const char* key) const {
+    std::vector<JsonField> fields;
+    for (const nlohmann::json& value : list(key))
+        fields.emplace_back(value, where_ + ": " + quoted(key) + " " + std::to_string(fields.size()),
+                            advice_);
+    return fields;
 }
 
 double JsonField::number(const char* key) const {
     const nlohmann::json& value = member(key);
-    if (!value.is_number() || !std::isfinite(value.get<double>()))
-        fail(quoted(key) + " is not a finite number");
+    if (!is_finite(value)) fail(key, "a finite number");
     return value.get<double>();
 }
 
@@ -78,40 +127,81 @@ double JsonField::number(const char* key, double absent) const {
     return has(key) ? number(key) : absent;
 }
 
-std::vector<double> JsonField::numbers(const char* key, size_t count) const {
-    const nlohmann::json& value = member(key);
+std::optional<double> JsonField::number_if(const char* key) const {
+    return has(key) ? std::optional(number(key)) : std::nullopt;
+}
+
+std::vector<double> JsonField::numbers(const char* key, size_t least, size_t most, const char* form) const {
     std::vector<double> numbers;
-    if (!value.is_array() || value.size() > count || !add_numbers(value, 0, numbers) ||
-        numbers.size() != count)
-        fail(quoted(key) + " is not a list of " + std::to_string(count) + " finite numbers");
-    return numbers;
+    if (add_numbers(member(key), most, numbers) && numbers.size() >= least && numbers.size() <= most)
+        return numbers;
+    const std::string range = least < most ? std::to_string(least) + " to " : std::string();
+    fail(key, form ? form : "a list of " + range + std::to_string(most) + " finite numbers");
+}
+
+std::vector<float> JsonField::floats(const char* key, size_t count, const char* form) const {
+    std::vector<float> values;
+    for (const double number : numbers(key, count, count, form)) {
+        values.push_back(float(number));
+        if (!std::isfinite(values.back())) fail(key, form ? form : "a list of numbers that float32 has");
+    }
+    return values;
+}
+
+uint64_t JsonField::whole(const char* key, uint64_t most, uint64_t least) const {
+    constexpr double kLimit = 1ull << 53;
+    const nlohmann::json& value = member(key);
+    const double number = is_finite(value) ? value.get<double>() : -1;
+    if (number >= 0 && number < kLimit && number == std::floor(number) && uint64_t(number) >= least &&
+        uint64_t(number) <= most)
+        return uint64_t(number);
+    fail(key, "a whole number of " + std::to_string(least) + " to " + std::to_string(most));
 }
 
 int JsonField::side(const char* key) const {
-    const double value = number(key);
-    if (!(value >= 1 && value <= kMostPixels) || value != std::floor(value))
-        fail(quoted(key) + " is not a whole number of pixels in 1..1048576");
-    return static_cast<int>(value);
+    return int(whole(key, kMostPixels, 1));
 }
 
-uint64_t JsonField::index(const char* key) const {
-    const double value = number(key);
-    if (!(value >= 0 && value < kMostIndex) || value != std::floor(value))
-        fail(quoted(key) + " is not a whole number");
-    return static_cast<uint64_t>(value);
-}
-
-std::string JsonField::text(const char* key) const {
+const std::string& JsonField::text(const char* key) const {
     const nlohmann::json& value = member(key);
-    if (!value.is_string()) fail(quoted(key) + " is not a string");
-    return value.get<std::string>();
+    if (!value.is_string()) fail(key, "a string");
+    return value.get_ref<const std::string&>();
 }
 
-std::optional<std::vector<double>> three_numbers(const nlohmann::json& value) {
+std::string JsonField::text(const char* key, const std::string& absent) const {
+    return has(key) ? text(key) : absent;
+}
+
+bool JsonField::flag(const char* key) const {
+    if (!has(key)) return false;
+    const nlohmann::json& value = member(key);
+    if (!value.is_boolean()) fail(quoted(key) + " is neither true nor false");
+    return value.get<bool>();
+}
+
+std::optional<std::vector<double>> three_numbers(const nlohmann::json& object, const char* key) {
+    const auto list = object.find(key);
     std::vector<double> numbers;
-    if (!value.is_array() || value.size() != 3 || !add_numbers(value, 1, numbers) || numbers.size() != 3)
-        return std::nullopt;
+    if (list == object.end() || list->size() != 3 || !add_numbers(*list, 3, numbers)) return std::nullopt;
     return numbers;
 }
+
+template <class Json>
+std::string text_in(const Json& object, const char* key) {
+    const auto found = object.find(key);
+    return found != object.end() && found->is_string() ? found->template get<std::string>() : std::string();
+}
+
+template <class Json>
+std::optional<double> number_in(const Json& object, const char* key) {
+    const auto found = object.find(key);
+    if (found == object.end() || !is_finite(*found)) return std::nullopt;
+    return found->template get<double>();
+}
+
+template std::string text_in(const nlohmann::json&, const char*);
+template std::string text_in(const nlohmann::ordered_json&, const char*);
+template std::optional<double> number_in(const nlohmann::json&, const char*);
+template std::optional<double> number_in(const nlohmann::ordered_json&, const char*);
 
 }  // namespace ewa::core

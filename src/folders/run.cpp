@@ -5,6 +5,7 @@
 
 #include "core/folders.h"
 #include "core/json.h"
+#include "core/json_field.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "folders/run_folder.h"
@@ -18,13 +19,12 @@ namespace fs = std::filesystem;
 bool made_of(const fs::path& dataset, const fs::path& named) try {
     const auto capture =
         core::read_json_file<nlohmann::json>(dataset / kCaptureFile, {.bytes = kMostConfigBytes});
-    const auto input = capture.is_object() ? capture.find("input") : capture.end();
-    if (input == capture.end() || !input->is_string()) return false;
+    const std::string input = core::text_in(capture, "input");
     // The folder above may have moved since.
     const auto last = [](const fs::path& path) {
         return (path.lexically_normal() / "").parent_path().filename();
     };
-    return last(input->get<std::string>()) == last(named);
+    return !input.empty() && last(input) == last(named);
 } catch (const InputError&) {
     return false;
 }
@@ -56,13 +56,16 @@ bool Run::made_dataset() const {
 }
 
 std::string Run::text(const char* option) const {
-    const auto found = config.find(option);
-    return found != config.end() && found->is_string() ? found->get<std::string>() : std::string();
+    return core::text_in(config, option);
 }
 
 bool Run::flag(const char* option) const {
     const auto found = config.find(option);
     return found != config.end() && *found == true;
+}
+
+int Run::number(const char* option, int least, int most, int absent) const {
+    return int(std::clamp(core::number_in(config, option).value_or(absent), double(least), double(most)));
 }
 
 fs::path Run::refined_cameras() const {

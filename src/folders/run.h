@@ -25,6 +25,8 @@ struct Run {
     bool made_dataset() const;
     /// The option's text in config.json; empty if it is not a text.
     std::string text(const char* option) const;
+    /// The option's number in config.json, in this range; `absent` if it is not a number.
+    int number(const char* option, int least, int most, int absent) const;
     /// Whether the option is a flag that is set.
     bool flag(const char* option) const;
 };

@@ -6,9 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "core/json.h"
-#include "core/typing.h"
-#include "ewa/error.h"
+#include "core/json_field.h"
 
 namespace ewa::live {
 namespace {
@@ -41,30 +39,23 @@ std::string encode(const Status& status) {
 }
 
 Status decode_status(const std::string& text) {
-    const std::string name = "the trainer's status";
-    const Json json = core::parse_json<Json>(text, name);
-    try {
-        Status status;
-        status.run = json.at("run").get<std::string>();
-        if (status.run.size() > kLongestRun) throw InputError("\"run\" is too long");
-        status.step = int(report::whole_number(json, "step", INT32_MAX));
-        status.steps = int(report::whole_number(json, "steps", INT32_MAX));
-        status.splats = uint32_t(report::whole_number(json, "splats", UINT32_MAX));
-        status.loss = report::number_or_nan(json, "loss");
-        status.seconds = json.at("seconds").is_null() ? 0 : report::number_or_nan(json, "seconds");
-        const std::string state = json.at("state").get<std::string>();
-        status.state = state == "paused" ? State::paused : state == "done" ? State::done : State::running;
-        status.commands = json.at("commands").get<bool>();
-        const Json& lines = json.at("metrics");
-        if (!lines.is_array() || lines.size() > kMostLines)
-            throw InputError("\"metrics\" is not a list of at most " + std::to_string(kMostLines) + " lines");
-        for (const Json& line : lines) status.metrics.push_back(report::metrics_line(line));
-        return status;
-    } catch (const InputError& error) {
-        throw InputError(name + " cannot be read: " + error.what());
-    } catch (const Json::exception& error) {
-        throw InputError(name + " cannot be read: " + core::one_line(core::plain_reason(error.what())));
-    }
+    const auto field = core::JsonField::of_text(text, "the trainer's status");
+    Status status;
+    status.run = field.text("run");
+    if (status.run.size() > kLongestRun) field.fail("\"run\" is too long");
+    status.step = int(field.whole("step", INT32_MAX));
+    status.steps = int(field.whole("steps", INT32_MAX));
+    status.splats = uint32_t(field.whole("splats", UINT32_MAX));
+    status.loss = report::number_or_nan(field, "loss");
+    status.seconds = field.number("seconds", 0);
+    const std::string state = field.text("state");
+    status.state = state == "paused" ? State::paused : state == "done" ? State::done : State::running;
+    status.commands = field.flag("commands");
+    if (field.list("metrics").size() > kMostLines)
+        field.fail("\"metrics\" has more than " + std::to_string(kMostLines) + " lines");
+    for (const core::JsonField& line : field.items("metrics"))
+        status.metrics.push_back(report::metrics_line(line));
+    return status;
 }
 
 double seconds_left(const Status& status) {

@@ -14,6 +14,7 @@
 
 #include "core/atomic_file.h"
 #include "core/json.h"
+#include "core/json_field.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
@@ -56,9 +57,9 @@ std::string start_of(const fs::path& path, size_t most) {
 /// How many steps the run's settings ask for. 0 if they cannot be read.
 int steps_of(const fs::path& folder) {
     try {
-        const Json json = core::parse_json<Json>(start_of(folder / folders::kConfigFile, kLargestConfig),
-                                                 folders::kConfigFile);
-        return int(report::whole_number(json, "steps", INT32_MAX));
+        const auto config = core::JsonField::of_text(start_of(folder / folders::kConfigFile, kLargestConfig),
+                                                     folders::kConfigFile);
+        return int(config.whole("steps", INT32_MAX));
     } catch (const InputError&) {
         return 0;
     }
@@ -192,11 +193,9 @@ Address parse_address(const std::string& text) {
 }
 
 std::optional<LiveFile> read_live_file(const fs::path& folder) try {
-    const Json json =
-        core::parse_json<Json>(start_of(folder / folders::kLiveFile, kLargestLiveFile), folders::kLiveFile);
-    const uint64_t port = report::whole_number(json, "port", UINT16_MAX);
-    if (port == 0 || !json.contains("token") || !json["token"].is_string()) return std::nullopt;
-    return LiveFile{uint16_t(port), json["token"].get<std::string>()};
+    const auto field =
+        core::JsonField::of_text(start_of(folder / folders::kLiveFile, kLargestLiveFile), folders::kLiveFile);
+    return LiveFile{uint16_t(field.whole("port", UINT16_MAX, 1)), field.text("token")};
 } catch (const InputError&) {
     return std::nullopt;  // absent, half written, or damaged
 }
@@ -208,10 +207,7 @@ std::string find_token(const std::string& given, const fs::path& file) {
         return variable ? variable : "";
     }
     std::string token(core::trim(start_of(file, kLargestLiveFile)));
-    if (token.starts_with('{')) {
-        const Json json = core::parse_json<Json>(token, file.string());
-        token = json.contains("token") && json["token"].is_string() ? json["token"].get<std::string>() : "";
-    }
+    if (token.starts_with('{')) token = core::text_in(core::parse_json<Json>(token, file.string()), "token");
     const auto plain = [](char c) { return c > ' ' && c < 0x7f; };
     if (token.empty() || !std::all_of(token.begin(), token.end(), plain))
         throw InputError(core::one_line(file.string()) +

@@ -14,6 +14,7 @@
 #include "core/folders.h"
 #include "core/hash.h"
 #include "core/json.h"
+#include "core/json_field.h"
 #include "core/outputs.h"
 #include "core/random.h"
 #include "core/text.h"
@@ -213,12 +214,8 @@ std::optional<Record> read_record(const fs::path& folder) {
     } catch (const InputError&) {
         return std::nullopt;  // truncated, or not a record of ewa
     }
-    if (!json.is_object() || !json.contains("fingerprint") || !json["fingerprint"].is_string())
-        return std::nullopt;
-    Record record{.fingerprint = json["fingerprint"].get<std::string>(), .exposure = std::nullopt};
-    if (json.contains("exposure") && json["exposure"].is_number())
-        record.exposure = json["exposure"].get<double>();
-    return record;
+    Record record{core::text_in(json, "fingerprint"), core::number_in(json, "exposure")};
+    return record.fingerprint.empty() ? std::nullopt : std::optional(std::move(record));
 }
 
 class DatasetJob {

@@ -11,7 +11,7 @@
 #include <sstream>
 
 #include "core/atomic_file.h"
-#include "core/json.h"
+#include "core/json_field.h"
 #include "ewa/error.h"
 
 namespace ewa::report {
@@ -103,34 +103,25 @@ bool shortens_many(const Summary& summary) {
     return double(summary.limited_steps) > 1e-3 * double(summary.steps) * double(summary.splats);
 }
 
-uint64_t whole_number(const Json& object, const char* name, uint64_t most) {
-    const auto found = object.is_object() ? object.find(name) : object.end();
-    if (found == object.end() || !found->is_number_unsigned() || found->get<uint64_t>() > most)
-        throw InputError(std::string("\"") + name + "\" is no whole number of 0 to " + std::to_string(most));
-    return found->get<uint64_t>();
+double number_or_nan(const core::JsonField& field, const char* key) {
+    return field.value().contains(key) ? field.number(key, std::nan("")) : field.number(key);
 }
 
-double number_or_nan(const Json& object, const char* name) {
-    const auto found = object.is_object() ? object.find(name) : object.end();
-    if (found == object.end() || !(found->is_null() || found->is_number()))
-        throw InputError(std::string("\"") + name + "\" is neither a number nor null");
-    return found->is_null() ? std::nan("") : found->get<double>();
-}
-
-MetricsLine metrics_line(const Json& json) {
+MetricsLine metrics_line(const core::JsonField& field) {
     MetricsLine line;
-    line.step = int(whole_number(json, "step", INT32_MAX));
-    line.seconds = number_or_nan(json, "seconds");
-    line.wall_seconds = number_or_nan(json, "wall_seconds");
-    line.loss = number_or_nan(json, "loss");
-    line.splats = uint32_t(whole_number(json, "splats", UINT32_MAX));
-    if (json.contains("test_psnr")) line.test_psnr = number_or_nan(json, "test_psnr");
-    if (json.contains("test_ssim")) line.test_ssim = number_or_nan(json, "test_ssim");
-    if (json.contains("train_psnr")) line.train_psnr = number_or_nan(json, "train_psnr");
+    line.step = int(field.whole("step", INT32_MAX));
+    line.seconds = number_or_nan(field, "seconds");
+    line.wall_seconds = number_or_nan(field, "wall_seconds");
+    line.loss = number_or_nan(field, "loss");
+    line.splats = uint32_t(field.whole("splats", UINT32_MAX));
+    const auto known = [&](const std::string& key) { return field.value().contains(key); };
+    if (known("test_psnr")) line.test_psnr = number_or_nan(field, "test_psnr");
+    if (known("test_ssim")) line.test_ssim = number_or_nan(field, "test_ssim");
+    if (known("train_psnr")) line.train_psnr = number_or_nan(field, "train_psnr");
     for (const Metric& metric : all_metrics())
         if (const std::string key = "test_" + metric.name;
-            metric.name != "psnr" && metric.name != "ssim" && json.contains(key))
-            line.test_figures.push_back({metric.name, number_or_nan(json, key.c_str())});
+            metric.name != "psnr" && metric.name != "ssim" && known(key))
+            line.test_figures.push_back({metric.name, number_or_nan(field, key.c_str())});
     return line;
 }
 
@@ -140,12 +131,7 @@ std::vector<MetricsLine> parse_metrics(const std::string& text) {
     std::string line;
     while (std::getline(stream, line)) {
         const std::string name = "line " + std::to_string(lines.size() + 1) + " of the metrics";
-        const Json json = core::parse_json<Json>(line, name);
-        try {
-            lines.push_back(metrics_line(json));
-        } catch (const InputError& error) {
-            throw InputError(name + " is not one: " + error.what());
-        }
+        lines.push_back(metrics_line(core::JsonField::of_text(line, name)));
     }
     return lines;
 }

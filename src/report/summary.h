@@ -11,6 +11,10 @@
 
 #include "ewa/summary.h"
 
+namespace ewa::core {
+class JsonField;
+}
+
 namespace ewa::report {
 
 /// Keys keep their order, so that the files of two runs can be compared line by line.
@@ -26,14 +30,12 @@ std::string cameras_text(const CameraMoves& moves);
 /// Whether more updates were shortened than the few of ordinary scenes: one in a thousand.
 bool shortens_many(const Summary& summary);
 
-/// The whole number in 0..most that an object has under this name. Throws InputError if it has none.
-uint64_t whole_number(const Json& object, const char* name, uint64_t most);
-/// The number under this name; NaN for null. Throws InputError if there is neither.
-double number_or_nan(const Json& object, const char* name);
+/// The number under this key; NaN for null. Throws InputError if there is neither.
+double number_or_nan(const core::JsonField& field, const char* key);
 
 Json to_json(const MetricsLine& line);
 /// The inverse of to_json. Throws InputError that names what is missing or wrong.
-MetricsLine metrics_line(const Json& json);
+MetricsLine metrics_line(const core::JsonField& field);
 /// The lines of metrics.jsonl. Throws InputError that names the first wrong line.
 std::vector<MetricsLine> parse_metrics(const std::string& text);
 std::string metrics_text(const std::vector<MetricsLine>& lines);

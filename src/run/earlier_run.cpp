@@ -10,13 +10,13 @@
 
 #include "core/folders.h"
 #include "core/json.h"
+#include "core/json_field.h"
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "folders/former_options.h"
 #include "folders/run_folder.h"
 #include "io/datasets/dataset_folders.h"
-#include "report/summary.h"
 #include "run/option_table.h"
 #include "train/checkpoint.h"
 
@@ -37,22 +37,19 @@ struct EarlierRun {
 /// Empty if the file is missing or damaged.
 std::optional<EarlierRun> from_checkpoint(const folders::RunFolder& folder) try {
     const Checkpoint head = read_checkpoint_head(folder / folders::kCheckpointFile);
-    const Json settings = core::parse_json<Json>(head.settings, "settings");
-    const Json options = settings.is_object() ? settings.value("options", Json()) : Json();
+    const auto settings = core::JsonField::of_text(head.settings, "settings");
     return EarlierRun{
-        uint64_t(head.state.report.step), report::whole_number(options, "steps", INT32_MAX), {}};
+        uint64_t(head.state.report.step), settings.object("options").whole("steps", INT32_MAX), {}};
 } catch (const InputError&) {
     return std::nullopt;
 }
 
 std::optional<EarlierRun> from_summary(const folders::RunFolder& folder) try {
-    const Json summary = core::read_json_file<Json>(folder / folders::kSummaryFile);
+    const auto summary = core::JsonField::of_file(folder / folders::kSummaryFile);
     EarlierRun run;
-    run.step = run.steps = report::whole_number(summary, "steps", INT32_MAX);
-    const Json interrupted = summary.value("interrupted", Json());
-    if (interrupted.is_boolean() && interrupted.get<bool>()) ++run.steps;
-    if (summary.contains("test_psnr") && summary["test_psnr"].is_number())
-        run.psnr = summary["test_psnr"].get<double>();
+    run.step = run.steps = summary.whole("steps", INT32_MAX);
+    if (summary.flag("interrupted")) ++run.steps;
+    run.psnr = core::number_in(summary.value(), "test_psnr");
     return run;
 } catch (const InputError&) {
     return std::nullopt;

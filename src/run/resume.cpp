@@ -6,6 +6,7 @@
 
 #include "core/hash.h"
 #include "core/json.h"
+#include "core/json_field.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "folders/former_options.h"
@@ -40,15 +41,14 @@ Json parse_settings(const std::filesystem::path& path, const std::string& stored
 
 /// A value of "reached", which only a run continued with another number of steps has. Wrong values count as absent.
 int reached(const Json& settings, const char* name, int absent, int most) {
-    const Json all = settings.value("reached", Json::object());
-    const Json value = all.is_object() ? all.value(name, Json()) : Json();
-    return value.is_number_unsigned() && value.get<uint64_t>() <= uint64_t(most) ? value.get<int>() : absent;
+    const double value = core::number_in(settings.value("reached", Json()), name).value_or(absent);
+    return value >= 0 && value <= most ? int(value) : absent;
 }
 
 /// The largest number of splats that a run may have had. 0 if it is not known.
 uint32_t cap_of(const Json& settings) {
-    const Json value = settings.value("cap", Json());
-    return value.is_number_unsigned() && value.get<uint64_t>() <= UINT32_MAX ? value.get<uint32_t>() : 0;
+    const double cap = core::number_in(settings, "cap").value_or(0);
+    return cap >= 0 && cap <= UINT32_MAX ? uint32_t(cap) : 0;
 }
 
 /// The value as to_config writes it: "1.0,1,1" and "1,1,1" are the same background.

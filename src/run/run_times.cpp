@@ -6,9 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
-#include "core/json.h"
-#include "core/text.h"
-#include "ewa/error.h"
+#include "core/json_field.h"
 
 namespace ewa::train {
 namespace {
@@ -21,20 +19,15 @@ PlainJson rows_of(const std::vector<TimesAt>& times) {
     return rows;
 }
 
-std::vector<TimesAt> times_in(const PlainJson& all, const char* name, const std::string& file) {
-    const auto wrong = [&] {
-        return InputError(file + ": \"" + name + "\" is no list of a step and two times each");
-    };
-    const auto is_time = [](const PlainJson& value) {
-        return value.is_number() && std::isfinite(value.get<double>()) && value.get<double>() >= 0;
-    };
-    if (!all.is_object() || !all.contains(name) || !all[name].is_array()) throw wrong();
+/// A list of a step and two times each.
+std::vector<TimesAt> times_in(const core::JsonField& all, const char* name) {
     std::vector<TimesAt> times;
-    for (const PlainJson& row : all[name]) {
-        if (!row.is_array() || row.size() != 3 || !row[0].is_number_unsigned() ||
-            row[0].get<uint64_t>() > INT32_MAX || !is_time(row[1]) || !is_time(row[2]))
-            throw wrong();
-        times.push_back({row[0].get<int>(), row[1].get<double>(), row[2].get<double>()});
+    for (const core::JsonField& row : all.items(name)) {
+        const std::vector<double> values = row.numbers(nullptr, 3);
+        if (values[0] < 0 || values[0] > INT32_MAX || values[0] != std::floor(values[0]) || values[1] < 0 ||
+            values[2] < 0)
+            row.fail("is no step with two times");
+        times.push_back({int(values[0]), values[1], values[2]});
     }
     return times;
 }
@@ -77,9 +70,8 @@ void write_times(const std::filesystem::path& path, const RunTimes& times) {
 }
 
 RunTimes read_times(const std::filesystem::path& path) {
-    const PlainJson all = core::read_json_file<PlainJson>(path);
-    const std::string file = core::one_line(path.string());
-    return {times_in(all, "metrics", file), times_in(all, "checkpoints", file)};
+    const auto field = core::JsonField::of_file(path);
+    return {times_in(field, "metrics"), times_in(field, "checkpoints")};
 }
 
 }  // namespace ewa::train

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "core/folders.h"
-#include "core/json.h"
+#include "core/json_field.h"
 #include "ewa/error.h"
 #include "ewa/run_options.h"
 #include "folders/run_folder.h"
@@ -20,8 +20,7 @@ bool made_of_photos(const fs::path& dataset, const fs::path& photos) {
     try {
         const auto capture = core::read_json_file<nlohmann::json>(dataset / folders::kCaptureFile);
         std::error_code error;
-        return capture.is_object() &&
-               capture.value("input", nlohmann::json()) == fs::canonical(photos, error).string();
+        return core::text_in(capture, "input") == fs::canonical(photos, error).string();
     } catch (const InputError&) {
         return false;
     }

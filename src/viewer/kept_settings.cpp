@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/json.h"
+#include "core/json_field.h"
 #include "ewa/error.h"
 
 namespace ewa::viewer {
@@ -20,10 +21,8 @@ constexpr int kLeastSide = 200, kMostSide = 16384;  // px of a window
 /// The number of this name, if it is one in the range.
 template <class T>
 void take(const Json& json, const char* name, T least, T most, T& value) {
-    const auto found = json.find(name);
-    if (found == json.end() || !found->is_number()) return;
-    const double number = found->get<double>();
-    if (number >= double(least) && number <= double(most)) value = T(number);
+    const auto number = core::number_in(json, name);
+    if (number && *number >= double(least) && *number <= double(most)) value = T(*number);
 }
 
 }  // namespace
@@ -44,7 +43,6 @@ KeptSettings read_settings(const fs::path& file) {
     KeptSettings settings;
     try {
         const Json json = core::read_json_file<Json>(file, {.bytes = kMostSettingsBytes});
-        if (!json.is_object()) return settings;
         Size window;
         take(json, "window_width", kLeastSide, kMostSide, window.width);
         take(json, "window_height", kLeastSide, kMostSide, window.height);

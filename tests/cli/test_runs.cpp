@@ -236,10 +236,10 @@ TEST_F(Runs, EvalRenderAndCompareUseTheSky) {
         "--background sky and --refine-poses exclude each other");
     write_file(folder / "sky.json", R"({"size": 2, "texels": [1, 2]})");
     expect_failure(run_ewa({"render", alone, "-o", folder / "a.png"}), 2,
-                   "sky.json: \"texels\" are not 12 finite numbers");
+                   "sky.json: \"texels\" is not a list of 12 finite numbers");
     write_file(folder / "sky.json", R"({"size": 2000})");
     expect_failure(run_ewa({"render", alone, "-o", folder / "a.png"}), 2,
-                   "sky.json: \"size\" is not a number from 1 to 1024");
+                   "sky.json: \"size\" is not a whole number of 1 to 1024");
     fs::remove(run + "/sky.json");
     // A run without a sky leaves none of an earlier one.
     ASSERT_TRUE(fs::exists(other + "/sky.json"));

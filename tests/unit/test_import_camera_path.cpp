@@ -97,7 +97,7 @@ TEST(ImportCameraPath, ErrorsNameTheCamera) {
     };
     refuse("camera 1: \"fov\" is missing", [](json& p) { p["camera_path"][1].erase("fov"); });
     refuse("camera 1: \"fov\" is not between 0 and 180", [](json& p) { p["camera_path"][1]["fov"] = 180; });
-    refuse("camera 2: \"camera_to_world\" is not a list of 16",
+    refuse("camera 2: \"camera_to_world\" is not 3 or 4 rows of 4 finite numbers",
            [](json& p) { p["camera_path"][2]["camera_to_world"] = {1}; });
     refuse("camera 0: \"camera_to_world\" is not a rotation",
            [](json& p) { p["camera_path"][0]["camera_to_world"][0] = 7; });

@@ -191,7 +191,7 @@ TEST(ImportOpenSfm, OpenDroneMapAndTheLargestOfSeveral) {
 
 TEST(ImportOpenSfm, MalformedFilesAreOneLine) {
     const std::vector<std::pair<std::function<void(json&)>, std::string>> cases{
-        {[](json& f) { f = json::array({"cameras"}); }, "\"shots\" is missing"},
+        {[](json& f) { f = json::array({"cameras"}); }, "is not a JSON object"},
         {[](json& f) { f[0]["shots"] = 3; }, "\"shots\" is not a JSON object"},
         {[](json& f) { f[0].erase("cameras"); }, "\"cameras\" is missing"},
         {[](json& f) { f[0]["cameras"]["v2 phone 48 36"]["projection_type"] = "dual"; },

@@ -151,7 +151,7 @@ TEST(ImportRecord3d, MalformedFilesAreOneLine) {
         {[](json& m) {
              m["poses"][1] = {1, 2, 3};
          },
-         "\"poses\" 1: \"values\" is not a list of 7"},
+         "\"poses\" 1: is not a list of 7"},
         {[](json& m) { m["poses"][2][3] = "w"; }, "is not a list of 7 finite numbers"},
         {[](json& m) { m["poses"][2][3] = 5; }, "the quaternion is not of unit length"},
         {[](json& m) { m["poses"][2] = {0, 0, 0, 0, 1, 2, 3}; }, "the quaternion is not of unit length"},

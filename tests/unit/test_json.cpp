@@ -148,7 +148,7 @@ TEST(Json, MetricsThatAreNone) {
     };
     refused(times(400000, "["), "nests deeper");
     refused(between("{\"step\":", times(400000, "["), ""), "nests deeper");
-    refused("[]", "\"step\"");
+    refused("[]", "is not a JSON object");
     refused(R"({"step":1e300,"seconds":1,"wall_seconds":1,"loss":1,"splats":7})", "\"step\"");
     refused(R"({"step":1,"seconds":1,"wall_seconds":1,"loss":"x","splats":7})", "\"loss\"");
     refused(R"({"step":1,"seconds":1,"wall_seconds":1,"loss":1,"splats":-7})", "\"splats\"");

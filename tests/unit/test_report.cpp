@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "core/html.h"
+#include "core/json_field.h"
 #include "ewa/error.h"
 #include "folders/run_folder.h"
 #include "image/image_files.h"
@@ -70,11 +71,15 @@ TEST(Report, MetricsHaveTestFiguresOnlyWhereEvaluated) {
     EXPECT_FALSE(to_json(line).contains("train_psnr"));
     line.train_psnr = 25.5;
     EXPECT_EQ(to_json(line)["train_psnr"], 25.5);
-    EXPECT_EQ(metrics_line(Json::parse(to_json(line).dump())).train_psnr, 25.5);
+    const auto read_back = [](const MetricsLine& written) {
+        const auto json = nlohmann::json::parse(to_json(written).dump());
+        return metrics_line({json, "a line"});
+    };
+    EXPECT_EQ(read_back(line).train_psnr, 25.5);
     line.test_figures = {{"cc_psnr", 21.5}, {"ms_ssim", std::nan("")}};
     EXPECT_EQ(to_json(line)["test_cc_psnr"], 21.5);
     EXPECT_TRUE(to_json(line)["test_ms_ssim"].is_null());
-    const MetricsLine read = metrics_line(Json::parse(to_json(line).dump()));
+    const MetricsLine read = read_back(line);
     ASSERT_EQ(read.test_figures.size(), 2u);
     EXPECT_EQ(read.test_figures[0].name, "cc_psnr");
     EXPECT_EQ(read.test_figures[0].value, 21.5);

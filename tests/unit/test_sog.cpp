@@ -284,11 +284,15 @@ TEST(Sog, RefusesWithTheReason) {
     refuse(changed([](json& meta) { meta["count"] = -1; }), {"\"count\" is not a whole number"});
     refuse(changed([](json& meta) { meta["count"] = 200000000; }), {"claims 200000000 splats"});
     refuse(changed([](json& meta) { meta["count"] = 5; }), {"l.webp", "4×1 pixels", "5 splats"});
-    refuse(changed([](json& meta) { meta.erase("quats"); }), {"has no \"quats\""});
-    refuse(changed([](json& meta) { meta["means"]["mins"] = {0, 0}; }), {"\"means.mins\" has no number"});
-    refuse(changed([](json& meta) { meta["means"]["mins"] = {0, 0, nullptr}; }), {"\"means.mins\""});
-    refuse(changed([](json& meta) { meta["sh0"]["codebook"] = json::array(); }), {"\"sh0.codebook\""});
-    refuse(changed([](json& meta) { meta["sh0"]["files"] = "a"; }), {"\"files\" of \"sh0\""});
+    refuse(changed([](json& meta) { meta.erase("quats"); }), {"\"quats\" is missing; it is damaged"});
+    refuse(changed([](json& meta) {
+               meta["means"]["mins"] = {0, 0};
+           }),
+           {"\"means\": \"mins\" is not a list of 3 finite numbers"});
+    refuse(changed([](json& meta) { meta["means"]["mins"] = {0, 0, nullptr}; }), {"\"means\": \"mins\""});
+    refuse(changed([](json& meta) { meta["sh0"]["codebook"] = json::array(); }),
+           {"\"sh0\": \"codebook\" is not a list of 1 to 256 finite numbers"});
+    refuse(changed([](json& meta) { meta["sh0"]["files"] = "a"; }), {"\"sh0\": \"files\" is not a list"});
     refuse(changed([](json& meta) { meta["shN"]["bands"] = 2; }), {"c.webp", "192×1"});
     refuse(changed([](json& meta) { meta["shN"]["count"] = 1; }),
            {"splat 1", "row 1", "\"shN\", which has 1"});

@@ -151,7 +151,7 @@ TEST(Transforms, RotationsAreMadeOrthonormal) {
     refuse({{0, 0, 1, 1}, {1, 0, 0, 2}, {0, -1, 0, 3}, {0, 0, 0, 1}}, "mirrors");
     refuse({{0, 0, 0, 1}, {0, 0, 0, 2}, {0, 0, 0, 3}, {0, 0, 0, 1}}, "degenerate");
     refuse({{0, 0, 1, 1}, {1, 0, 0, 2}}, "rows");
-    refuse({{0, 0, 1, 1}, {1, 0, 0}, {0, 1, 0, 3}}, "4 numbers");
+    refuse({{0, 0, 1, 1}, {1, 0, 0}, {0, 1, 0, 3}}, "rows of 4 finite numbers");
     refuse({{0, 0, 1, "x"}, {1, 0, 0, 2}, {0, 1, 0, 3}}, "finite number");
     refuse("text", "rows");
 }
@@ -224,7 +224,7 @@ TEST(Transforms, NamesWhatIsWrong) {
         scene.refuse(parts);
     };
     refuse("fl_x", 0, {"not positive"});
-    refuse("fl_x", "ten", {"\"fl_x\"", "not a number"});
+    refuse("fl_x", "ten", {"\"fl_x\"", "not a finite number"});
     refuse("w", 7.5, {"\"w\""});
     refuse("w", -8, {"\"w\""});
     refuse("w", 1e12, {"\"w\""});
@@ -351,14 +351,14 @@ TEST(Transforms, NumbersThatAreNotFiniteCountWhereTheyAreUsed) {
             scene.folder.write("transforms.json", with(key, number));
             expect_error<InputError>(
                 [&] { load_dataset(scene.folder.path(), {}); },
-                {"transforms.json: frame 0: \"" + std::string(key) + "\" is not finite"});
+                {"transforms.json: frame 0: \"" + std::string(key) + "\" is not a finite number"});
         }
         std::string text = scene.model.dump();
         const std::string row = "[[0,0,1,1]";
         scene.folder.write("transforms.json",
                            text.replace(text.find(row), row.size(), "[[0,0," + std::string(number) + ",1]"));
         expect_error<InputError>([&] { load_dataset(scene.folder.path(), {}); },
-                                 {"\"transform_matrix\" holds an entry that is not a finite number"});
+                                 {"\"transform_matrix\" is not 3 or 4 rows of 4 finite numbers"});
     }
 }
 

@@ -30,9 +30,9 @@ TEST(TransformsLenses, NerfstudiosListOfTerms) {
     scene.model["frames"][0]["distortion_params"] = {0.1, 0.2, 0.3, 0.4, 0, 0};
     scene.refuse({"the distortion term k4 is not supported"});
     scene.model["frames"][0]["distortion_params"] = {0.1, 0.2};
-    scene.refuse({"frame 0", "\"distortion_params\" is not a list of 6 numbers"});
+    scene.refuse({"frame 0", "\"distortion_params\" is not a list of 6 finite numbers"});
     scene.model["frames"][0]["distortion_params"] = {0.1, 0.2, 0, 0, 0, "x"};
-    scene.refuse({"\"distortion_params\" holds an entry that is not a finite number"});
+    scene.refuse({"\"distortion_params\" is not a list of 6 finite numbers"});
 }
 
 TEST(TransformsLenses, Fisheye624IsProjectArias) {

@@ -88,12 +88,13 @@ TEST(ViewList, DamageIsRefusedWithItsPlace) {
     refused("{\"views\": 3}", "not a list");
     refused(good.substr(0, good.size() / 2), "not valid JSON");
     refused("{\"views\": [3]}", "view 0");
-    refused(with("\"width\": 640", "\"width\": 0"), "view 1: width");
-    refused(with("\"width\": 640", "\"width\": 1e9"), "view 1: width");
+    refused(with("\"width\": 640", "\"width\": 0"), "view 1: \"width\" is not a whole number of 1 to 65536");
+    refused(with("\"width\": 640", "\"width\": 1e9"),
+            "view 1: \"width\" is not a whole number of 1 to 65536");
     refused(with("\"fx\": 500.1", "\"fx\": -1"), "view 1: a focal length");
     refused(with("\"fx\": 500.1", "\"fx\": 1e999"), "not valid JSON");
     refused(with("\"fx\"", "\"gx\""), "view 1");
-    refused(with("\"pivot\": [", "\"pivot\": [1,"), "pivot needs 3");
+    refused(with("\"pivot\": [", "\"pivot\": [1,"), "\"pivot\" is not a list of 3");
     refused(with("\"rotation\": [", "\"rotation\": [0,0,0, 0,0,0, 0,0,0], \"other\": ["),
             "rotation is not orthonormal");
     refused(with("\"rotation\": [", "\"rotation\": [1,0,0, 0,1,0, 0,0,-1], \"other\": ["),

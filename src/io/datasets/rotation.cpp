@@ -4,6 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/matrix.hpp>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "core/json_field.h"
 
 namespace ewa::io {
 
@@ -44,6 +48,15 @@ glm::dmat3 nearest_rotation(const glm::dmat3& matrix) {
 void set_pose(Camera& camera, const glm::dmat3& axes, const glm::dvec3& center) {
     camera.rotation = glm::transpose(axes);
     camera.translation = -(camera.rotation * center);
+}
+
+void read_opengl_pose(const core::JsonField& field, const char* key, Camera& camera) {
+    const size_t count = field.at(key).value().size() == 3 ? 12 : 16;
+    const std::vector<double> m = field.numbers(key, count, count, "3 or 4 rows of 4 finite numbers");
+    const glm::dmat3 axes(m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]);
+    if (const std::string fault = rotation_fault(axes); !fault.empty())
+        field.fail(std::string("\"") + key + "\" is not a rotation: " + fault);
+    set_pose(camera, from_opengl(nearest_rotation(axes)), {m[3], m[7], m[11]});
 }
 
 }  // namespace ewa::io

@@ -6,6 +6,10 @@
 
 #include "ewa/camera.h"
 
+namespace ewa::core {
+class JsonField;
+}
+
 namespace ewa::io {
 
 /// Why the matrix is no rotation times a positive factor; empty if it is one, up to rounding to four decimals.
@@ -21,5 +25,9 @@ void set_pose(Camera& camera, const glm::dmat3& axes, const glm::dvec3& center);
 inline glm::dmat3 from_opengl(const glm::dmat3& axes) {
     return {axes[0], -axes[1], -axes[2]};
 }
+
+/// The pose of a matrix, row by row, from a camera with OpenGL's axes to the world. Its last row says nothing and may be missing.
+/// Throws InputError.
+void read_opengl_pose(const core::JsonField& field, const char* key, Camera& camera);
 
 }  // namespace ewa::io

@@ -28,11 +28,9 @@
 
 #include "core/atomic_file.h"
 #include "core/folders.h"
-#include "core/json.h"
+#include "core/json_field.h"
 #include "core/sandboxed_path.h"
-#include "core/text.h"
 #include "core/words.h"
-#include "ewa/error.h"
 #include "io/datasets/image_records.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/named_splits.h"
@@ -46,57 +44,10 @@ namespace {
 using nlohmann::json;
 using Json = nlohmann::ordered_json;
 
-constexpr size_t kLongestName = 200;      // in an error
-constexpr double kLongestSide = 1 << 20;  // px
+constexpr size_t kLongestName = 200;  // in an error
 
-/// A frame and the top of its file. A key is looked up in the frame, then at the top.
-class Entry {
-  public:
-    Entry(const std::string& where, const json& top, const json& frame)
-        : top_(top), frame_(frame), where_(where) {}
-
-    const json* find(const char* key) const {
-        if (const auto it = frame_.find(key); it != frame_.end() && !it->is_null()) return &*it;
-        if (const auto it = top_.find(key); it != top_.end() && !it->is_null()) return &*it;
-        return nullptr;
-    }
-
-    std::optional<double> number(const char* key) const {
-        const json* value = find(key);
-        if (!value) return std::nullopt;
-        if (!value->is_number()) fail(std::string("\"") + key + "\" is not a number");
-        const double number = value->get<double>();
-        if (!std::isfinite(number)) fail(std::string("\"") + key + "\" is not finite");
-        return number;
-    }
-
-    std::string text(const char* key) const {
-        const json* value = find(key);
-        if (!value) return {};
-        if (!value->is_string()) fail(std::string("\"") + key + "\" is not a string");
-        return value->get<std::string>();
-    }
-
-    /// A number is true unless it is 0. False without the key.
-    bool flag(const char* key) const {
-        const json* value = find(key);
-        if (!value) return false;
-        if (!value->is_boolean() && !value->is_number())
-            fail(std::string("\"") + key + "\" is neither true nor false");
-        return value->is_boolean() ? value->get<bool>() : number(key) != 0;
-    }
-
-    const std::string& where() const { return where_; }
-
-    [[noreturn]] void fail(const std::string& text) const {
-        throw InputError(where_ + ": " + core::one_line(text));
-    }
-
-  private:
-    const json& top_;
-    const json& frame_;
-    std::string where_;
-};
+/// A key is looked up in the frame, then at the top of the file.
+using Entry = core::JsonField;
 
 using Term = double Distortion::*;
 
@@ -106,18 +57,10 @@ constexpr std::pair<const char*, Term> kTerms[] = {
     {"s1", &Distortion::s1}, {"s2", &Distortion::s2}, {"s3", &Distortion::s3}, {"s4", &Distortion::s4}};
 
 /// A list of terms; false if the entry has none.
-bool read_terms(const Entry& entry, std::initializer_list<Term> terms, Distortion& d) {
-    const json* list = entry.find("distortion_params");
-    if (!list) return false;
-    if (!list->is_array() || list->size() != terms.size())
-        entry.fail("\"distortion_params\" is not a list of " + std::to_string(terms.size()) + " numbers");
-    size_t i = 0;
-    for (const Term term : terms) {
-        const json& value = (*list)[i++];
-        if (!value.is_number() || !std::isfinite(value.get<double>()))
-            entry.fail("\"distortion_params\" holds an entry that is not a finite number");
-        d.*term = value.get<double>();
-    }
+bool read_terms(const Entry& entry, const std::vector<Term>& terms, Distortion& d) {
+    if (!entry.has("distortion_params")) return false;
+    const std::vector<double> values = entry.numbers("distortion_params", terms.size());
+    for (size_t i = 0; i < terms.size(); ++i) d.*terms[i] = values[i];
     return true;
 }
 
@@ -132,6 +75,11 @@ Distortion read_fisheye624(const Entry& entry) {
                     d))
         entry.fail("\"distortion_params\" is missing, which has the terms of FISHEYE624");
     return d;
+}
+
+/// A number is true unless it is 0.
+bool is_set(const Entry& entry, const char* key) {
+    return entry.has(key) && entry.at(key).value().is_number() ? entry.number(key) != 0 : entry.flag(key);
 }
 
 /// Throws for models that no lens of ewa's is.
@@ -155,23 +103,23 @@ Distortion read_lens(const Entry& entry) {
     const auto holds = [](auto& list, const std::string& name) {
         return std::find(std::begin(list), std::end(list), name) != std::end(list);
     };
-    std::string model = entry.text("camera_model");
+    std::string model = entry.text("camera_model", {});
     std::ranges::transform(model, model.begin(), [](unsigned char c) { return char(std::toupper(c)); });
     if (model == "EQUIRECTANGULAR") return {.lens = Lens::equirectangular};
     if (model == "ORTHOGRAPHIC" || model == "ORTHOPHOTO") return {.lens = Lens::orthographic};
     if (model == "FISHEYE624") return read_fisheye624(entry);
-    const bool fisheye = entry.flag("is_fisheye") || holds(kFisheye, model);
+    const bool fisheye = is_set(entry, "is_fisheye") || holds(kFisheye, model);
     if (!fisheye && !holds(kPerspective, model)) refuse_model_of(entry, model);
     Distortion d;
     d.lens = fisheye ? Lens::fisheye : Lens::brown;
     using Of = Distortion;
     if (!read_terms(entry, {&Of::k1, &Of::k2, &Of::k3, &Of::k4, &Of::p1, &Of::p2}, d))
-        for (const auto& [key, term] : kTerms) d.*term = entry.number(key).value_or(0);
+        for (const auto& [key, term] : kTerms) d.*term = entry.number(key, 0);
     const bool full = model == "FULL_OPENCV";
     const std::pair<const char*, bool> unsure[] = {{"k4", d.k4 != 0 && !fisheye && !full},
                                                    {"k5", d.k5 != 0 && !full},
                                                    {"k6", d.k6 != 0 && !full},
-                                                   {"ftheta_p0", entry.number("ftheta_p0").value_or(0) != 0}};
+                                                   {"ftheta_p0", entry.number("ftheta_p0", 0) != 0}};
     for (const auto& [key, refused] : unsure)
         if (refused)
             entry.fail(std::string("the distortion term ") + key +
@@ -210,7 +158,7 @@ Bases bases_of(const std::filesystem::path& folder, const std::filesystem::path&
 
 /// The file that the entry names under this key: a path of another machine is searched by name, in any case. Empty if it names none.
 std::filesystem::path named_file(const Entry& entry, const char* key, const Bases& bases) {
-    const std::string name = entry.text(key);
+    const std::string name = entry.text(key, {});
     if (name.empty()) return {};
     const std::string what = std::string("\"") + key + "\" " + name.substr(0, kLongestName);
     const std::filesystem::path inside = named_path(name);
@@ -239,8 +187,8 @@ ImageFinder image_finder(const json& frames, const Bases& bases) {
     std::vector<std::string> names;
     bool beside = false;
     for (const json& frame : frames)
-        if (const auto name = frame.find("file_path"); name != frame.end() && name->is_string()) {
-            names.push_back(name->get<std::string>());
+        if (const std::string name = core::text_in(frame, "file_path"); !name.empty()) {
+            names.push_back(name);
             beside = beside || names.back().starts_with("../") || names.back().starts_with("..\\");
         }
     // The file may be of another folder of the dataset than the images.
@@ -257,25 +205,19 @@ ImageFinder image_finder(const json& frames, const Bases& bases) {
 }
 
 void find_image(const Entry& entry, const ImageFinder& finder, ImageRecord& image) {
-    const std::string name = entry.text("file_path");
+    const std::string name = entry.text("file_path", {});
     if (name.empty()) entry.fail("\"file_path\" is missing");
     finder.find(name, entry.where(), image);
 }
 
 void read_depth(const Entry& entry, const Bases& bases, ImageRecord& image) {
     image.depth = named_file(entry, "depth_file_path", bases);
-    image.depth_unit = entry.number("depth_unit_scale_factor").value_or(image.depth_unit);
+    image.depth_unit = entry.number("depth_unit_scale_factor", image.depth_unit);
     if (!(image.depth_unit > 0)) entry.fail("\"depth_unit_scale_factor\" is not above 0");
 }
 
-int whole_size(const Entry& entry, const char* key, double value) {
-    if (!(value >= 1 && value <= kLongestSide) || value != std::floor(value))
-        entry.fail(std::string("\"") + key + "\" is not a whole number of pixels in 1..1048576");
-    return static_cast<int>(value);
-}
-
 double focal_from_angle(const Entry& entry, const char* key, int size, Lens lens) {
-    const double angle = *entry.number(key);
+    const double angle = entry.number(key);
     const std::string name = std::string("\"") + key + "\"";
     if (lens == Lens::orthographic)
         entry.fail(name + " says nothing of parallel rays; they need \"fl_x\", the pixels per world unit");
@@ -292,10 +234,9 @@ double focal_from_angle(const Entry& entry, const char* key, int size, Lens lens
 /// Width and height stay 0 if neither the entry nor an image file states them.
 void read_intrinsics(const Entry& entry, ImageRecord& image) {
     Camera& camera = image.camera;
-    const std::optional<double> w = entry.number("w"), h = entry.number("h");
-    if (w && h) {
-        camera.width = whole_size(entry, "w", *w);
-        camera.height = whole_size(entry, "h", *h);
+    if (entry.number_if("w") && entry.number_if("h")) {
+        camera.width = entry.side("w");
+        camera.height = entry.side("h");
     } else if (core::is_file(image.path)) {
         const ImageSize size = read_image_size(image.path);
         camera.width = size.width;
@@ -307,58 +248,35 @@ void read_intrinsics(const Entry& entry, ImageRecord& image) {
         set_sphere(camera, entry.where());
         return;
     }
-    if (const auto fl_x = entry.number("fl_x"))
-        camera.fx = *fl_x;
-    else if (entry.number("camera_angle_x"))
+    if (entry.has("fl_x"))
+        camera.fx = entry.number("fl_x");
+    else if (entry.has("camera_angle_x"))
         camera.fx = focal_from_angle(entry, "camera_angle_x", camera.width, image.distortion.lens);
     else if (image.distortion.lens == Lens::orthographic)
         entry.fail("\"fl_x\" is missing, the pixels per world unit of parallel rays");
     else
         entry.fail("\"fl_x\" or \"camera_angle_x\" is missing");
-    if (const auto fl_y = entry.number("fl_y"))
-        camera.fy = *fl_y;
-    else if (!entry.number("fl_x") && entry.number("camera_angle_y"))
+    if (entry.has("fl_y"))
+        camera.fy = entry.number("fl_y");
+    else if (!entry.has("fl_x") && entry.has("camera_angle_y"))
         camera.fy = focal_from_angle(entry, "camera_angle_y", camera.height, image.distortion.lens);
     else
         camera.fy = camera.fx;
     if (!(camera.fx > 0 && camera.fy > 0)) entry.fail("a focal length is not positive");
-    camera.cx = entry.number("cx").value_or(0.5 * camera.width);
-    camera.cy = entry.number("cy").value_or(0.5 * camera.height);
-}
-
-void read_pose(const Entry& entry, const char* key, Camera& camera) {
-    const json* rows = entry.find(key);
-    const std::string name = std::string("\"") + key + "\"";
-    if (!rows) entry.fail(name + " is missing");
-    if (!rows->is_array() || (rows->size() != 3 && rows->size() != 4))
-        entry.fail(name + " needs 3 or 4 rows");
-    glm::dmat3 axes;
-    glm::dvec3 center;
-    for (int row = 0; row < 3; ++row) {
-        const json& values = (*rows)[size_t(row)];
-        if (!values.is_array() || values.size() != 4) entry.fail("a row of " + name + " needs 4 numbers");
-        for (int column = 0; column < 4; ++column) {
-            const json& value = values[size_t(column)];
-            if (!value.is_number() || !std::isfinite(value.get<double>()))
-                entry.fail(name + " holds an entry that is not a finite number");
-            (column < 3 ? axes[column][row] : center[row]) = value.get<double>();
-        }
-    }
-    if (const std::string fault = rotation_fault(axes); !fault.empty())
-        entry.fail(name + " is not a rotation: " + fault);
-    set_pose(camera, from_opengl(nearest_rotation(axes)), center);
+    camera.cx = entry.number("cx", 0.5 * camera.width);
+    camera.cy = entry.number("cy", 0.5 * camera.height);
 }
 
 void read_poses(const Entry& entry, Camera& camera) {
-    const std::string order = entry.text("rolling_shutter");
-    if (order.empty() || order == "global") return read_pose(entry, "transform_matrix", camera);
+    const std::string order = entry.text("rolling_shutter", {});
+    if (order.empty() || order == "global") return read_opengl_pose(entry, "transform_matrix", camera);
     const auto from = core::find_value(scene::kReadoutWords, order);
     if (!from)
         entry.fail("\"rolling_shutter\": '" + order.substr(0, kLongestName) +
                    "' is not top-to-bottom, bottom-to-top, left-to-right, right-to-left or global");
-    read_pose(entry, "transform_matrix_start", camera);
+    read_opengl_pose(entry, "transform_matrix_start", camera);
     Camera end;
-    read_pose(entry, "transform_matrix_end", end);
+    read_opengl_pose(entry, "transform_matrix_end", end);
     camera.readout = Readout{*from, end.rotation, end.translation};
 }
 
@@ -376,13 +294,11 @@ Json matrix_of(const Camera& camera) {
 
 ImageRecords read_transforms(const std::filesystem::path& path, int split, bool with_points,
                              const std::filesystem::path& root) {
-    const std::string name = core::one_line(path.string());
-    const json top = core::read_json_file<json>(
-        path, {.comments = true, .not_finite = true});  // as instant-ngp and Python write them
-    if (!top.is_object()) throw InputError(name + ": is not a JSON object");
-    const auto frames = top.find("frames");
-    if (frames == top.end() || !frames->is_array())
-        throw InputError(name + ": the list \"frames\" is missing");
+    // As instant-ngp and Python write them.
+    const Entry file = Entry::of_file(path, {.comments = true, .not_finite = true});
+    const json& top = file.value();
+    const std::string& name = file.where();
+    const json& frames = file.list("frames");
     ImageRecords result;
     const Bases bases = bases_of(path.parent_path(), root);
     result.files = {path};
@@ -390,11 +306,11 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
     result.program = program_of(top);
     add_notes(top, result);
     bool unused_poses = false;
-    const ImageFinder finder = image_finder(*frames, bases);
+    const ImageFinder finder = image_finder(frames, bases);
     result.folder = finder.folder();
-    for (size_t i = 0; i < frames->size(); ++i) {
-        const Entry entry(name + ": frame " + std::to_string(i), top, (*frames)[i]);
-        if (!(*frames)[i].is_object()) entry.fail("is not a JSON object");
+    for (size_t i = 0; i < frames.size(); ++i) {
+        const Entry entry = Entry(frames[i], name + ": frame " + std::to_string(i)).or_of(top);
+        if (!frames[i].is_object()) entry.fail("is not a JSON object");
         ImageRecord image;
         image.split = split;
         image.distortion = read_lens(entry);
@@ -402,8 +318,7 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
         image.mask = named_file(entry, "mask_path", bases);
         read_depth(entry, bases, image);
         read_poses(entry, image.camera);
-        unused_poses =
-            unused_poses || (entry.find("transform_matrix_start") && !entry.find("rolling_shutter"));
+        unused_poses = unused_poses || (entry.has("transform_matrix_start") && !entry.has("rolling_shutter"));
         read_intrinsics(entry, image);
         result.images.push_back(std::move(image));
     }
@@ -411,12 +326,8 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
     if (unused_poses)
         result.notes.emplace_back(
             "transform_matrix_start and _end are not used: rolling_shutter names no order of the readout");
-    if (const auto view = top.find("view_dependent"); view != top.end() && !view->is_null()) {
-        if (!view->is_boolean()) throw InputError(name + ": \"view_dependent\" is neither true nor false");
-        result.color_depends_on_view = view->get<bool>();
-    }
-    const json empty = json::object();
-    const auto cloud = named_file(Entry(name, top, empty), "ply_file_path", bases);
+    if (file.has("view_dependent")) result.color_depends_on_view = file.flag("view_dependent");
+    const auto cloud = named_file(file, "ply_file_path", bases);
     if (!cloud.empty()) result.files.push_back(cloud);
     if (with_points && !cloud.empty()) {
         PlyPoints points = read_points_ply(cloud);

@@ -7,10 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
-#include "core/json.h"
-#include "core/text.h"
-#include "core/typing.h"
-#include "ewa/error.h"
+#include "core/json_field.h"
 #include "scene/readout.h"
 
 namespace ewa::io {
@@ -21,17 +18,6 @@ using Json = nlohmann::ordered_json;
 constexpr uint64_t kLargestView = 2048;  // bytes of the file
 constexpr double kRotationTolerance = 1e-6;
 
-std::vector<double> numbers(const Json& object, const char* name, size_t count) {
-    const Json& list = object.at(name);
-    std::vector<double> values =
-        list.is_array() ? list.get<std::vector<double>>() : std::vector{list.get<double>()};
-    if (values.size() != count)
-        throw InputError(std::string(name) + " needs " + std::to_string(count) + " numbers");
-    for (const double value : values)
-        if (!std::isfinite(value)) throw InputError(std::string(name) + " is not finite");
-    return values;
-}
-
 bool is_rotation(const glm::dmat3& r) {
     const glm::dmat3 product = r * glm::transpose(r);
     for (int i = 0; i < 3; ++i)
@@ -40,48 +26,43 @@ bool is_rotation(const glm::dmat3& r) {
     return glm::determinant(r) > 0;
 }
 
-void read_pose(const std::vector<double>& rotation, const std::vector<double>& translation,
-               glm::dmat3& to_rotation, glm::dvec3& to_translation) {
-    for (int row = 0; row < 3; ++row) {
-        for (int column = 0; column < 3; ++column)
-            to_rotation[column][row] = rotation[size_t(3 * row + column)];
-        to_translation[row] = translation[size_t(row)];
-    }
-    if (!is_rotation(to_rotation)) throw InputError("rotation is not orthonormal");
+void read_pose(const core::JsonField& view, const std::string& end, glm::dmat3& to_rotation,
+               glm::dvec3& to_translation) {
+    const auto r = view.numbers(("rotation" + end).c_str(), 9);
+    const auto t = view.numbers(("translation" + end).c_str(), 3);
+    to_rotation = {r[0], r[3], r[6], r[1], r[4], r[7], r[2], r[5], r[8]};
+    to_translation = {t[0], t[1], t[2]};
+    if (!is_rotation(to_rotation)) view.fail("rotation" + end + " is not orthonormal");
 }
 
-std::optional<Readout> parse_readout(const Json& object) {
-    if (!object.contains("rolling_shutter")) return std::nullopt;
-    const auto order = object.at("rolling_shutter").get<std::string>();
+std::optional<Readout> parse_readout(const core::JsonField& view) {
+    if (!view.has("rolling_shutter")) return std::nullopt;
+    const std::string order = view.text("rolling_shutter");
     const auto from = core::find_value(scene::kReadoutWords, order);
-    if (!from)
-        throw InputError("rolling_shutter '" + core::one_line(order.substr(0, 40)) + "' is no direction");
+    if (!from) view.fail("rolling_shutter '" + order.substr(0, 40) + "' is no direction");
     Readout end{*from, {}, {}};
-    read_pose(numbers(object, "rotation_end", 9), numbers(object, "translation_end", 3), end.rotation,
-              end.translation);
+    read_pose(view, "_end", end.rotation, end.translation);
     return end;
 }
 
-NamedView parse_view(const Json& object) {
-    NamedView view;
-    view.name = object.value("name", std::string());
-    Camera& camera = view.camera;
-    for (const auto& [name, side] : {std::pair{"width", &camera.width}, {"height", &camera.height}}) {
-        const double value = numbers(object, name, 1)[0];
-        if (!(value >= 1 && value <= 65536)) throw InputError(std::string(name) + " is not in 1..65536");
-        *side = int(value);
-    }
+NamedView parse_view(const core::JsonField& view) {
+    NamedView named;
+    named.name = view.text("name", {});
+    Camera& camera = named.camera;
+    camera.width = int(view.whole("width", 65536, 1));
+    camera.height = int(view.whole("height", 65536, 1));
     for (const auto& [name, value] :
          {std::pair{"fx", &camera.fx}, {"fy", &camera.fy}, {"cx", &camera.cx}, {"cy", &camera.cy}})
-        *value = numbers(object, name, 1)[0];
-    if (!(camera.fx > 0) || !(camera.fy > 0)) throw InputError("a focal length is not above zero");
-    const auto rotation = numbers(object, "rotation", 9), translation = numbers(object, "translation", 3),
-               pivot = object.contains("pivot") ? numbers(object, "pivot", 3) : std::vector<double>(3);
-    read_pose(rotation, translation, camera.rotation, camera.translation);
-    for (int k = 0; k < 3; ++k) view.pivot[k] = pivot[size_t(k)];
-    camera.readout = parse_readout(object);
-    view.aligned = object.value("aligned", false);
-    return view;
+        *value = view.number(name);
+    if (!(camera.fx > 0) || !(camera.fy > 0)) view.fail("a focal length is not above zero");
+    read_pose(view, "", camera.rotation, camera.translation);
+    if (view.has("pivot")) {
+        const auto pivot = view.numbers("pivot", 3);
+        named.pivot = {pivot[0], pivot[1], pivot[2]};
+    }
+    camera.readout = parse_readout(view);
+    named.aligned = view.flag("aligned");
+    return named;
 }
 
 }  // namespace
@@ -111,23 +92,14 @@ Json camera_json(const std::string& name, const Camera& c) {
 }
 
 std::vector<NamedView> read_views(const std::filesystem::path& path, size_t most) {
-    const Json document =
-        core::read_json_file<Json>(path, {.bytes = most * kLargestView, .not_finite = true});
-    if (!document.is_object() || !document.contains("views") || !document["views"].is_array())
-        throw InputError(path.string() + ": is not a list of views: expected an object with \"views\"");
-    if (document["views"].size() > most)
-        throw InputError(path.string() + ": more than " + std::to_string(most) + " views");
+    const auto top = core::JsonField::of_file(path, {.bytes = most * kLargestView, .not_finite = true});
+    const nlohmann::json& document = top.value();
+    if (!document.contains("views") || !document["views"].is_array())
+        top.fail("is not a list of views: expected an object with \"views\"");
+    if (document["views"].size() > most) top.fail("more than " + std::to_string(most) + " views");
     std::vector<NamedView> views;
-    for (const Json& entry : document["views"]) {
-        const std::string where = path.string() + ": view " + std::to_string(views.size()) + ": ";
-        try {
-            views.push_back(parse_view(entry));
-        } catch (const InputError& problem) {
-            throw InputError(where + problem.what());
-        } catch (const Json::exception& problem) {
-            throw InputError(where + std::string(core::plain_reason(problem.what())));
-        }
-    }
+    for (const nlohmann::json& entry : document["views"])
+        views.push_back(parse_view({entry, top.where() + ": view " + std::to_string(views.size())}));
     return views;
 }
 

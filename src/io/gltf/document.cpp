@@ -7,6 +7,7 @@
 
 #include "core/file_reader.h"
 #include "core/json.h"
+#include "core/json_field.h"
 #include "core/sandboxed_path.h"
 #include "core/typing.h"
 #include "ewa/error.h"
@@ -201,19 +202,14 @@ std::string missing_property(const std::string& error) {
     return {};
 }
 
-/// Calls visit(object, "kind 3: ", its "uri" or null) for each object of the list "kinds".
-template <class Visit>
-void for_each_source(const GltfDocument& document, const void* json_list, const std::string& kind,
-                     const Visit& visit) {
-    const json& list = *static_cast<const json*>(json_list);
-    if (!list.is_array()) document.fail("\"" + kind + "s\" is not a list");
-    for (size_t i = 0; i < list.size(); ++i) {
-        const std::string what = kind + " " + std::to_string(i) + ": ";
-        if (!list[i].is_object()) document.fail(what + "is not an object");
-        const auto uri = list[i].find("uri");
-        if (uri != list[i].end() && !uri->is_string()) document.fail(what + "\"uri\" is not a string");
-        visit(list[i], what, uri == list[i].end() ? nullptr : uri->get_ptr<const std::string*>());
+/// The objects of the list "kinds".
+std::vector<core::JsonField> objects_of(const core::JsonField& top, const std::string& kind) {
+    std::vector<core::JsonField> fields;
+    for (const json& value : top.list((kind + "s").c_str())) {
+        fields.emplace_back(value, top.where() + ": " + kind + " " + std::to_string(fields.size()));
+        if (!value.is_object()) fields.back().fail("is not an object");
     }
+    return fields;
 }
 
 const std::vector<int>& roots(const GltfDocument& document) {
@@ -295,11 +291,11 @@ GltfDocument::GltfDocument(const std::filesystem::path& path, GltfContent conten
         top = parse(name_, chunks, content);
     }
     if (!top.is_object()) fail("the JSON is not an object");
+    const core::JsonField field(top, name_);
     if (!top.contains("asset")) fail("the JSON has no \"asset\", which every glTF has");
     check_required(*this, top, content);
-    if (const auto list = top.find("buffers"); list != top.end()) add_buffers(&*list, bin_begin, bin_size);
-    if (const auto list = top.find("images"); list != top.end() && content == GltfContent::meshes)
-        add_images(&*list);
+    if (top.contains("buffers")) add_buffers(field, bin_begin, bin_size);
+    if (top.contains("images") && content == GltfContent::meshes) add_images(field);
     if (const auto list = top.find("animations"); list != top.end()) animated_ = !list->empty();
     const std::string text = needed_sections(*this, top, content);
     top = nullptr;
@@ -316,40 +312,34 @@ GltfDocument::GltfDocument(const std::filesystem::path& path, GltfContent conten
         fail("is not a valid glTF: " + error.substr(0, kLongestReason) + missing_property(error));
 }
 
-void GltfDocument::add_buffers(const void* json_buffers, uint64_t chunk_begin, uint64_t chunk_size) {
-    for_each_source(*this, json_buffers, "buffer",
-                    [&](const json& object, const auto& what, const auto* uri) {
-                        const auto length = object.find("byteLength");
-                        if (length == object.end() || !length->is_number_unsigned())
-                            fail(what + "\"byteLength\" is not a whole number of 0 or more");
-                        Buffer buffer;
-                        if (uri)
-                            buffer = open_uri(*uri, what);
-                        else if (binary_ && buffers_.empty())
-                            buffer = {path_, chunk_begin, chunk_size, {}};
-                        else
-                            fail(what + "has no \"uri\", and is not the first of a .glb");
-                        if (length->get<uint64_t>() > buffer.size)
-                            fail(what + "\"byteLength\" is " + std::to_string(length->get<uint64_t>()) +
-                                 ", but it holds " + std::to_string(buffer.size) + " bytes");
-                        buffer.size = length->get<uint64_t>();
-                        buffers_.push_back(std::move(buffer));
-                    });
+void GltfDocument::add_buffers(const core::JsonField& top, uint64_t chunk_begin, uint64_t chunk_size) {
+    constexpr uint64_t kMostBytes = uint64_t(1) << 50;
+    for (const core::JsonField& field : objects_of(top, "buffer")) {
+        const uint64_t length = field.whole("byteLength", kMostBytes);
+        Buffer buffer;
+        if (field.has("uri"))
+            buffer = open_uri(field.text("uri"), "buffer " + std::to_string(buffers_.size()) + ": ");
+        else if (binary_ && buffers_.empty())
+            buffer = {path_, chunk_begin, chunk_size, {}};
+        else
+            field.fail("has no \"uri\", and is not the first of a .glb");
+        if (length > buffer.size)
+            field.fail("\"byteLength\" is " + std::to_string(length) + ", but it holds " +
+                       std::to_string(buffer.size) + " bytes");
+        buffer.size = length;
+        buffers_.push_back(std::move(buffer));
+    }
 }
 
-void GltfDocument::add_images(const void* json_images) {
-    for_each_source(*this, json_images, "image", [&](const json& object, const auto& what, const auto* uri) {
+void GltfDocument::add_images(const core::JsonField& top) {
+    for (const core::JsonField& field : objects_of(top, "image")) {
         ImageSource source;
-        if (uri) {
-            source.uri = *uri;
-        } else if (const auto view = object.find("bufferView"); view != object.end()) {
-            if (!view->is_number_unsigned() ||
-                view->get<uint64_t>() > uint64_t(std::numeric_limits<int>::max()))
-                fail(what + "\"bufferView\" is not a whole number of 0 or more");
-            source.view = view->get<int>();
-        }
+        if (field.has("uri"))
+            source.uri = field.text("uri");
+        else if (field.has("bufferView"))
+            source.view = int(field.whole("bufferView", INT32_MAX));
         images_.push_back(std::move(source));
-    });
+    }
 }
 
 const tinygltf::BufferView& GltfDocument::buffer_view(int index, const std::string& what) const {

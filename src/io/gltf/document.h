@@ -11,6 +11,10 @@
 #include <string_view>
 #include <vector>
 
+namespace ewa::core {
+class JsonField;
+}
+
 namespace ewa::io {
 
 /// The numbers of a .glb: its beginning, and the types of its chunks.
@@ -85,8 +89,8 @@ class GltfDocument {
         std::string uri;  // empty: the image is in the buffer view
         int view = -1;
     };
-    void add_buffers(const void* json_buffers, uint64_t chunk_begin, uint64_t chunk_size);
-    void add_images(const void* json_images);
+    void add_buffers(const core::JsonField& top, uint64_t chunk_begin, uint64_t chunk_size);
+    void add_images(const core::JsonField& top);
     Buffer open_uri(const std::string& uri, const std::string& what) const;
     /// The buffer view, after a check that it is in its buffer.
     const tinygltf::BufferView& buffer_view(int index, const std::string& what) const;

@@ -8,6 +8,7 @@
 
 #include "core/folders.h"
 #include "core/json.h"
+#include "core/json_field.h"
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
@@ -43,12 +44,9 @@ std::optional<Place> read_place(const std::filesystem::path& folder) {
     } catch (const InputError&) {
         return {};  // another program's
     }
-    if (!json.is_object() || json.value("axes", nlohmann::json()) != kAxes) return {};
-    std::array values{std::nan(""), std::nan(""), std::nan("")};
-    const std::array names{"latitude", "longitude", "height"};
-    for (size_t i = 0; i < names.size(); ++i)
-        if (json.contains(names[i]) && json[names[i]].is_number()) values[i] = json[names[i]].get<double>();
-    return checked(values);
+    if (core::text_in(json, "axes") != kAxes) return {};
+    const auto value = [&](const char* name) { return core::number_in(json, name).value_or(std::nan("")); };
+    return checked({value("latitude"), value("longitude"), value("height")});
 }
 
 void write_place(const std::filesystem::path& file, const Place& place) {

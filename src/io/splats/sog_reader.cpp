@@ -8,6 +8,7 @@
 #include "core/file_reader.h"
 #include "core/folders.h"
 #include "core/json.h"
+#include "core/json_field.h"
 #include "core/sandboxed_path.h"
 #include "core/text.h"
 #include "io/splats/formats.h"
@@ -93,109 +94,74 @@ class FolderFiles final : public SogFiles {
     std::string name_;
 };
 
-/// The values of a meta.json, checked.
-class Meta {
+constexpr const char* kSogAdvice = "; it is damaged, or not of a SOG";
+constexpr uint64_t kMostSogSplats = kMostWebpSide * kMostWebpSide;
+
+/// 256 steps from low to high, as in version 1.
+SogTable steps_between(double low, double high) {
+    SogTable table;
+    for (size_t i = 0; i < table.size(); ++i) table[i] = float(low + (high - low) * (double(i) / 255));
+    return table;
+}
+
+/// The values of a meta.json.
+class Meta : public core::JsonField {
   public:
-    Meta(json values, std::string name) : values_(std::move(values)), name_(std::move(name)) {
-        if (!values_.is_object()) fail("the JSON is not an object");
-        const bool versioned = values_.contains("version");
-        version_ = versioned ? integer(values_["version"], "version", 1 << 30) : 1;
+    explicit Meta(const core::JsonField& top) : core::JsonField(top) {
+        if (!value().is_object()) fail("the JSON is not an object");
+        version_ = has("version") ? whole("version", 1 << 30) : 1;
         if (version_ != 1 && version_ != 2)
             fail("SOG version " + std::to_string(version_) +
                  " in \"version\" is unknown; 1 and 2 are supported");
         if (version_ == 2) {
-            count_ = integer(at(values_, "count"), "count", kMostSplats);
+            count_ = whole("count", kMostSogSplats);
         } else {
-            const json& shape = at(at(values_, "means"), "shape");
-            if (!shape.is_array() || shape.empty()) fail("\"shape\" of \"means\" is not a list");
-            count_ = integer(shape[0], "shape", kMostSplats);
+            const auto shape = part("means").items("shape");
+            if (shape.empty()) fail("\"shape\" of \"means\" is empty");
+            count_ = shape[0].whole(nullptr, kMostSogSplats);
         }
     }
 
-    [[noreturn]] void fail(const std::string& text) const { throw InputError(name_ + ": " + text); }
-
-    const json& values() const { return values_; }
-    const std::string& name() const { return name_; }
     uint64_t version() const { return version_; }
     uint64_t count() const { return count_; }
     /// splat-transform's mark; empty where there is none.
-    std::string model() const {
-        const auto found = values_.find("model");
-        return found != values_.end() && found->is_string() ? found->get<std::string>() : std::string();
-    }
+    std::string model() const { return core::text_in(value(), "model"); }
     bool antialiased() const {
-        const auto found = values_.find("antialias");
-        if (model() == kAntialiasedModel || model() == kSurfels || model() == "default")
-            return model() == kAntialiasedModel;
-        return found != values_.end() && found->is_boolean() && found->get<bool>();
-    }
-    bool has_sh() const { return values_.contains("shN") && !values_["shN"].is_null(); }
-
-    const json& part(const char* name) const {
-        const json& found = at(values_, name);
-        if (!found.is_object()) fail("\"" + std::string(name) + "\" is not an object");
-        return found;
+        const std::string mark = model();
+        if (mark == kAntialiasedModel || mark == kSurfels || mark == "default")
+            return mark == kAntialiasedModel;
+        const auto found = value().find("antialias");
+        return found != value().end() && *found == true;
     }
 
     /// The name of an image of a part.
     std::string image(const char* part_name, size_t index) const {
-        const json& files = at(part(part_name), "files");
-        if (!files.is_array() || files.size() <= index || !files[index].is_string())
+        const auto files = part(part_name).items("files");
+        if (files.size() <= index)
             fail("\"files\" of \"" + std::string(part_name) + "\" does not name image " +
                  std::to_string(index));
-        return files[index].get<std::string>();
+        return files[index].text(nullptr);
     }
 
-    double number(const json& list, size_t index, const std::string& what) const {
-        const json* value = list.is_array() && index < list.size() ? &list[index] : nullptr;
-        if (!value || !value->is_number() || !std::isfinite(value->get<double>()))
-            fail("\"" + what + "\" has no number at position " + std::to_string(index));
-        return value->get<double>();
-    }
-
-    /// mins or maxs of a channel of a part.
-    double bound(const char* part_name, const char* which, size_t channel) const {
-        return number(at(part(part_name), which), channel, std::string(part_name) + "." + which);
+    /// Version 1's tables of the channels of a part.
+    std::vector<SogTable> steps(const char* part_name, size_t channels) const {
+        const core::JsonField field = part(part_name);
+        const auto low = field.numbers("mins", channels), high = field.numbers("maxs", channels);
+        std::vector<SogTable> tables;
+        for (size_t k = 0; k < channels; ++k) tables.push_back(steps_between(low[k], high[k]));
+        return tables;
     }
 
     /// Version 2's table of a part.
     SogTable codebook(const char* part_name) const {
-        const std::string what = std::string(part_name) + ".codebook";
-        const json& list = at(part(part_name), "codebook");
         SogTable table;
-        if (!list.is_array() || list.empty() || list.size() > table.size())
-            fail("\"" + what + "\" is not a list of at most 256 numbers");
+        const std::vector<double> values = part(part_name).numbers("codebook", 1, table.size());
         // No splat of a whole file refers to values after the last.
-        for (size_t i = 0; i < table.size(); ++i)
-            table[i] = float(number(list, std::min(i, list.size() - 1), what));
+        for (size_t i = 0; i < table.size(); ++i) table[i] = float(values[std::min(i, values.size() - 1)]);
         return table;
     }
-
-    /// 256 steps from low to high, as in version 1.
-    static SogTable steps(double low, double high) {
-        SogTable table;
-        for (size_t i = 0; i < table.size(); ++i) table[i] = float(low + (high - low) * (double(i) / 255));
-        return table;
-    }
-
-    uint64_t integer(const json& value, const char* what, uint64_t most) const {
-        if (!value.is_number_unsigned() || value.get<uint64_t>() > most)
-            fail("\"" + std::string(what) + "\" is not a whole number of 0 to " + std::to_string(most));
-        return value.get<uint64_t>();
-    }
-
-    const json& at(const json& object, const char* key) const {
-        const auto found = object.is_object() ? object.find(key) : object.end();
-        if (!object.is_object() || found == object.end())
-            fail("has no \"" + std::string(key) + "\"; it is damaged, or not of a SOG");
-        return *found;
-    }
-
-    static constexpr uint64_t kMostSplats = kMostWebpSide * kMostWebpSide;
 
   private:
-    json values_;
-    std::string name_;
     uint64_t version_ = 0, count_ = 0;
 };
 
@@ -208,12 +174,12 @@ class SogReader {
         scene_.antialiased = meta_.antialiased();
         if (meta_.model() == kSurfels) remark_surfels(scene_);
         Image centroids;
-        if (meta_.has_sh()) centroids = palette_image();
+        if (meta_.has("shN")) centroids = palette_image();
         Gaussians& g = scene_.gaussians;
         scene_.file_sh_degree = g.sh_degree;
         // An image of no splats may have no pixels, which WebP lacks.
         if (meta_.count() == 0) return std::move(scene_);
-        require_memory(meta_.name(), files_.bytes(meta_.values()), meta_.count(), g.sh_degree,
+        require_memory(meta_.where(), files_.bytes(meta_.value()), meta_.count(), g.sh_degree,
                        kPackedExpansion);
         g.resize(size_t(meta_.count()));
         read_means();
@@ -232,7 +198,7 @@ class SogReader {
 
     Image open(const char* part, size_t index) {
         const std::string file = meta_.image(part, index);
-        Image image{files_.read(file), meta_.name() + ": \"" + core::one_line(file) + "\"", {}};
+        Image image{files_.read(file), meta_.where() + ": \"" + core::one_line(file) + "\"", {}};
         image.head = webp_head(image.bytes, image.name);
         if (!image.head.lossless)
             scene_.remarks.push_back("the image " + file + " is not lossless, so its values are not exact");
@@ -267,14 +233,12 @@ class SogReader {
         for (int d = 1; d <= kMaxShDegree; ++d)
             if (image.head.width == kPaletteRow * uint64_t(sh_coefficients(d) - 1)) degree = d;
         const bool fits = degree > 0 && image.head.height <= kMostPalette / kPaletteRow;
-        if (!fits || (meta_.version() == 2 &&
-                      meta_.integer(meta_.at(meta_.part("shN"), "bands"), "bands", 3) != uint64_t(degree)))
+        if (!fits || (meta_.version() == 2 && meta_.part("shN").whole("bands", 3) != uint64_t(degree)))
             throw InputError(image.name + " has " + size_text(image.head) +
                              " pixels, which does not fit the palette of an SH degree");
         palette_ = image.head.height * kPaletteRow;
         if (meta_.version() == 2)
-            palette_ = std::min(palette_,
-                                meta_.integer(meta_.at(meta_.part("shN"), "count"), "count", kMostPalette));
+            palette_ = std::min(palette_, meta_.part("shN").whole("count", kMostPalette));
         scene_.gaussians.sh_degree = degree;
         return image;
     }
@@ -288,13 +252,9 @@ class SogReader {
                 for (size_t k = 0; k < 3; ++k) set(g.means[3 * i + k], rgba[4 * i + k], k);
         };
         each(0, [](float& mean, uint8_t low, size_t) { mean = low; });
-        std::array<double, 3> from{}, range{};
-        for (size_t k = 0; k < 3; ++k) {
-            from[k] = meta_.bound("means", "mins", k);
-            range[k] = meta_.bound("means", "maxs", k) - from[k];
-        }
+        const auto from = meta_.part("means").numbers("mins", 3), to = meta_.part("means").numbers("maxs", 3);
         each(1, [&](float& mean, uint8_t high, size_t k) {
-            const double v = from[k] + range[k] * ((double(mean) + 256.0 * high) / 65535);
+            const double v = from[k] + (to[k] - from[k]) * ((double(mean) + 256.0 * high) / 65535);
             mean = float(std::copysign(std::expm1(std::abs(v)), v));
         });
     }
@@ -327,11 +287,8 @@ class SogReader {
     }
 
     void read_scales() {
-        std::array<SogTable, 3> tables;
-        for (size_t k = 0; k < 3; ++k)
-            tables[k] = meta_.version() == 2
-                            ? meta_.codebook("scales")
-                            : Meta::steps(meta_.bound("scales", "mins", k), meta_.bound("scales", "maxs", k));
+        const auto tables = meta_.version() == 1 ? meta_.steps("scales", 3)
+                                                 : std::vector<SogTable>(3, meta_.codebook("scales"));
         const std::vector<uint8_t> rgba = pixels("scales", 0);
         Gaussians& g = scene_.gaussians;
         for (size_t i = 0; i < g.size(); ++i)
@@ -339,16 +296,11 @@ class SogReader {
     }
 
     void read_colors() {
-        std::array<SogTable, 4> tables;
-        for (size_t k = 0; k < 4; ++k) {
-            if (meta_.version() == 1)
-                tables[k] = Meta::steps(meta_.bound("sh0", "mins", k), meta_.bound("sh0", "maxs", k));
-            else if (k < 3)
-                tables[k] = meta_.codebook("sh0");
-            else
-                for (uint32_t level = 0; level < 256; ++level)
-                    tables[k][level] = float(logit_of_level(level, 255));
-        }
+        auto tables =
+            meta_.version() == 1 ? meta_.steps("sh0", 4) : std::vector<SogTable>(4, meta_.codebook("sh0"));
+        if (meta_.version() == 2)
+            for (uint32_t level = 0; level < 256; ++level)
+                tables[3][level] = float(logit_of_level(level, 255));
         const std::vector<uint8_t> rgba = pixels("sh0", 0);
         Gaussians& g = scene_.gaussians;
         for (size_t i = 0; i < g.size(); ++i) {
@@ -357,17 +309,10 @@ class SogReader {
         }
     }
 
-    SogTable sh_table() const {
-        if (meta_.version() == 2) return meta_.codebook("shN");
-        const auto scalar = [&](const char* which) {
-            return meta_.number(json::array({meta_.at(meta_.part("shN"), which)}), 0,
-                                std::string("shN.") + which);
-        };
-        return Meta::steps(scalar("mins"), scalar("maxs"));
-    }
-
     void read_sh(const Image& centroids) {
-        const SogTable table = sh_table();
+        const core::JsonField part = meta_.part("shN");
+        const SogTable table = meta_.version() == 2 ? meta_.codebook("shN")
+                                                    : steps_between(part.number("mins"), part.number("maxs"));
         const std::vector<uint8_t> palette = decode_webp(centroids.bytes, centroids.name);
         const std::vector<uint8_t> labels = pixels("shN", 1);
         Gaussians& g = scene_.gaussians;
@@ -397,16 +342,15 @@ class SogReader {
 SplatScene read_sog(const std::filesystem::path& path) {
     ArchivedFiles files(path);
     const std::string name = core::one_line(path.string()) + ": \"" + kSogMeta + "\"";
-    SplatScene scene =
-        SogReader(Meta(core::parse_json<json>(files.read(kSogMeta), name, kMetaLimits), name), files).read();
+    const auto top = core::JsonField::of_text(files.read(kSogMeta), name, kMetaLimits, kSogAdvice);
+    SplatScene scene = SogReader(Meta(top), files).read();
     scene.format = SplatFormat::sog;
     return scene;
 }
 
 SplatScene read_sog_meta(const std::filesystem::path& path) {
     FolderFiles files(path);
-    const std::string name = core::one_line(path.string());
-    SplatScene scene = SogReader(Meta(core::read_json_file<json>(path, kMetaLimits), name), files).read();
+    SplatScene scene = SogReader(Meta(core::JsonField::of_file(path, kMetaLimits, kSogAdvice)), files).read();
     scene.format = SplatFormat::sog_meta;
     scene.variant += ", unpacked";
     return scene;
@@ -415,7 +359,7 @@ SplatScene read_sog_meta(const std::filesystem::path& path) {
 bool is_sog_meta(const std::filesystem::path& path) try {
     if (core::FileReader(path).size() > kMetaLimits.bytes) return false;
     const json values = core::read_json_file<json>(path, kMetaLimits);
-    return values.is_object() && values.contains("means") && values.contains("quats");
+    return values.contains("means") && values.contains("quats");
 } catch (const InputError&) {
     return false;
 }

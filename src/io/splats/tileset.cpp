@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "core/folders.h"
-#include "core/json.h"
+#include "core/json_field.h"
 #include "core/sandboxed_path.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
@@ -246,7 +246,7 @@ std::vector<std::filesystem::path> tile_files(const std::filesystem::path& tiles
     const auto all = core::read_json_file<nlohmann::json>(tileset, kTilesetLimits);
     std::vector<const nlohmann::json*> tiles;
     const auto visit = [&](const nlohmann::json& object, const char* key) {
-        if (object.is_object() && object.contains(key)) tiles.push_back(&object[key]);
+        if (object.contains(key)) tiles.push_back(&object[key]);
     };
     visit(all, "root");
     for (size_t at = 0; at < tiles.size(); ++at) {
@@ -254,10 +254,9 @@ std::vector<std::filesystem::path> tile_files(const std::filesystem::path& tiles
         if (tile.is_array())
             for (const nlohmann::json& child : tile) tiles.push_back(&child);
         visit(tile, "children");
-        if (!tile.is_object() || !tile.contains("content")) continue;
-        const nlohmann::json& content = tile["content"];
-        if (!content.is_object() || !content.contains("uri") || !content["uri"].is_string()) continue;
-        const auto name = core::name_inside(content["uri"].get_ref<const std::string&>());
+        const auto content = tile.find("content");
+        if (content == tile.end()) continue;
+        const auto name = core::name_inside(core::text_in(*content, "uri"));
         if (name && core::links_stay_inside(tileset.parent_path(), *name) &&
             core::is_file(tileset.parent_path() / *name))
             files.push_back(tileset.parent_path() / *name);

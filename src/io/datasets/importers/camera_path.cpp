@@ -12,10 +12,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "core/json.h"
 #include "core/json_field.h"
 #include "core/text.h"
-#include "ewa/error.h"
 #include "io/datasets/importers/importer.h"
 #include "io/datasets/rotation.h"
 #include "io/datasets/view_list.h"
@@ -29,7 +27,7 @@ constexpr size_t kPathDigits = 5;  // of the number of a camera, below kMostCame
 constexpr double kPathRate = 30;
 
 Lens lens_of_path(const core::JsonField& top) {
-    const std::string type = core::lower(top.has("camera_type") ? top.text("camera_type") : "perspective");
+    const std::string type = core::lower(top.text("camera_type", "perspective"));
     if (type == "perspective") return Lens::brown;
     if (type == "fisheye") return Lens::fisheye;
     if (type == "equirectangular") return Lens::equirectangular;
@@ -37,23 +35,10 @@ Lens lens_of_path(const core::JsonField& top) {
              "\" is not supported; take perspective, fisheye or equirectangular");
 }
 
-void read_path_camera(const core::JsonField& field, Camera& camera) {
-    const std::vector<double> m = field.numbers("camera_to_world", 16);
-    glm::dmat3 axes;
-    for (size_t row = 0; row < 3; ++row)
-        for (size_t column = 0; column < 3; ++column) axes[int(column)][int(row)] = m[4 * row + column];
-    if (const std::string fault = rotation_fault(axes); !fault.empty())
-        field.fail("\"camera_to_world\" is not a rotation: " + fault);
-    set_pose(camera, from_opengl(nearest_rotation(axes)), {m[3], m[7], m[11]});
-}
-
 }  // namespace
 
 ImageRecords import_camera_path(const ImportSource& source) {
-    const std::string name = core::one_line(source.file.string());
-    const auto document = core::read_json_file<nlohmann::json>(source.file, {.not_finite = true});
-    const core::JsonField top(document, name);
-    if (!document.is_object()) top.fail("is not a JSON object");
+    const auto top = core::JsonField::of_file(source.file, {.not_finite = true});
     const Lens lens = lens_of_path(top);
     const nlohmann::json& path = top.list("camera_path");
     if (path.empty())
@@ -62,8 +47,7 @@ ImageRecords import_camera_path(const ImportSource& source) {
     ImageRecords records = begin_records(source, "nerfstudio", source.dataset / "images");
     for (size_t i = 0; i < path.size(); ++i) {
         const std::string number = std::to_string(i);
-        const core::JsonField field(path[i], name + ": camera " + number);
-        if (!path[i].is_object()) field.fail("is not a JSON object");
+        const core::JsonField field(path[i], top.where() + ": camera " + number);
         ImageRecord record;
         record.name = std::string(kPathDigits - number.size(), '0') + number;
         Camera& camera = record.camera;
@@ -79,7 +63,7 @@ ImageRecords import_camera_path(const ImportSource& source) {
             if (!(fov > 0 && fov < 180)) field.fail("\"fov\" is not between 0 and 180 degrees");
             camera.fx = camera.fy = 0.5 * camera.height / std::tan(0.5 * glm::radians(fov));
         }
-        read_path_camera(field, camera);
+        read_opengl_pose(field, "camera_to_world", camera);
         finish_record(record, field.where());
         records.images.push_back(std::move(record));
     }

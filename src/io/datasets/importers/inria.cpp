@@ -8,10 +8,7 @@
 // `ewa train --inria` writes it too.
 #include <nlohmann/json.hpp>
 
-#include "core/json.h"
 #include "core/json_field.h"
-#include "core/text.h"
-#include "ewa/error.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/importer.h"
 #include "io/datasets/rotation.h"
@@ -19,14 +16,14 @@
 namespace ewa::io {
 
 ImageRecords import_inria(const ImportSource& source) {
-    const std::string name = core::one_line(source.file.string());
-    const auto document = core::read_json_file<nlohmann::json>(source.file, {.not_finite = true});
-    if (!document.is_array()) throw InputError(name + ": is not a list of cameras");
+    const auto top = core::JsonField::of_file(source.file, {.not_finite = true});
+    const nlohmann::json& document = top.value();
+    if (!document.is_array()) top.fail("is not a list of cameras");
     const ImageFinder images(source.dataset, {"images", "input"});
     ImageRecords records =
         begin_records(source, "INRIA's trainer, or another one in its layout", images.folder());
     for (size_t i = 0; i < document.size(); ++i) {
-        const std::string where = name + ": camera " + std::to_string(i);
+        const std::string where = top.where() + ": camera " + std::to_string(i);
         const core::JsonField field(document[i], where);
         ImageRecord record = begin_record(images, field.text("img_name"), field);
         Camera& camera = record.camera;

@@ -12,10 +12,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "core/json.h"
 #include "core/json_field.h"
-#include "core/text.h"
-#include "ewa/error.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/importer.h"
 #include "io/datasets/rotation.h"
@@ -54,7 +51,7 @@ Keyed keyed(const core::JsonField& top, const char* list, const std::string& wha
     if (!top.has(list)) return entries;
     for (const json& entry : top.list(list)) {
         const core::JsonField field(entry, top.where() + ": " + what + " " + std::to_string(entries.size()));
-        entries.insert_or_assign(field.index("key"), field.object("value"));
+        entries.insert_or_assign(field.whole("key", UINT32_MAX), field.object("value"));
     }
     return entries;
 }
@@ -68,7 +65,7 @@ using TypeNames = std::map<uint64_t, std::string>;
 constexpr uint64_t kNewType = uint64_t(1) << 31;
 
 ImageRecord open_mvg_camera(const core::JsonField& value, TypeNames& types) {
-    const uint64_t id = value.index("polymorphic_id") & ~kNewType;
+    const uint64_t id = value.whole("polymorphic_id", UINT32_MAX) & ~kNewType;
     if (value.has("polymorphic_name")) types[id] = value.text("polymorphic_name");
     const std::string type = types[id];
     const auto& lenses = open_mvg_lenses();
@@ -115,9 +112,7 @@ void add_structure(const core::JsonField& top, ImageRecords& records) {
     for (const json& entry : top.list("structure")) {
         const std::string place = "point " + std::to_string(number++) + " of \"structure\"";
         const auto value = entry.find("value");
-        const auto x = value != entry.end() && value->is_object() && value->contains("X")
-                           ? core::three_numbers((*value)["X"])
-                           : std::nullopt;
+        const auto x = core::three_numbers(value == entry.end() ? entry : *value, "X");
         if (!x) top.fail(place + " has no \"X\" of three finite numbers");
         add_point(records.points, records.dropped, {(*x)[0], (*x)[1], (*x)[2]}, {128, 128, 128},
                   [&] { return top.where() + ": " + place; });
@@ -127,21 +122,20 @@ void add_structure(const core::JsonField& top, ImageRecords& records) {
 }  // namespace
 
 ImageRecords import_open_mvg(const ImportSource& source) {
-    const std::string name = core::one_line(source.file.string());
-    const json document = core::read_json_file<json>(source.file, {.bytes = uint64_t(1) << 30,
-                                                                   .objects = size_t(1) << 22,
-                                                                   .values = size_t(1) << 25,
-                                                                   .not_finite = true,
-                                                                   .skipped = "observations"});
-    if (!document.is_object()) throw InputError(name + ": is not a JSON object");
-    const core::JsonField top(document, name);
+    const auto top = core::JsonField::of_file(source.file, {.bytes = uint64_t(1) << 30,
+                                                            .objects = size_t(1) << 22,
+                                                            .values = size_t(1) << 25,
+                                                            .not_finite = true,
+                                                            .skipped = "observations"});
+    const std::string& name = top.where();
     TypeNames types;
     std::map<uint64_t, ImageRecord> cameras;
     // In the order of the file, in which the first of a type has its name.
     size_t number = 0;
     for (const json& entry : top.list("intrinsics")) {
         const core::JsonField field(entry, name + ": intrinsic " + std::to_string(number++));
-        cameras.insert_or_assign(field.index("key"), open_mvg_camera(field.object("value"), types));
+        cameras.insert_or_assign(field.whole("key", UINT32_MAX),
+                                 open_mvg_camera(field.object("value"), types));
     }
     const Keyed poses = keyed(top, "extrinsics", "extrinsic");
 
@@ -152,12 +146,12 @@ ImageRecords import_open_mvg(const ImportSource& source) {
     for (const json& entry : top.list("views")) {
         const std::string where = name + ": view " + std::to_string(number++);
         const core::JsonField view = data_of(core::JsonField(entry, where).object("value"));
-        const auto pose = poses.find(view.index("id_pose"));
+        const auto pose = poses.find(view.whole("id_pose", UINT32_MAX));
         if (pose == poses.end()) {
             ++unplaced;
             continue;
         }
-        const auto camera = cameras.find(view.index("id_intrinsic"));
+        const auto camera = cameras.find(view.whole("id_intrinsic", UINT32_MAX));
         if (camera == cameras.end()) view.fail("its intrinsic is not in the list \"intrinsics\"");
         ImageRecord record = camera->second;
         images.find(view.text("filename"), where, record);

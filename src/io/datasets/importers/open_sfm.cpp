@@ -13,7 +13,6 @@
 #include <nlohmann/json.hpp>
 
 #include "core/folders.h"
-#include "core/json.h"
 #include "core/json_field.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -83,8 +82,7 @@ const std::vector<OpenSfmLens>& open_sfm_lenses() {
 }
 
 ImageRecord open_sfm_camera(const core::JsonField& field) {
-    const std::string type =
-        field.has("projection_type") ? field.text("projection_type") : std::string("perspective");
+    const std::string type = field.text("projection_type", "perspective");
     const auto& lenses = open_sfm_lenses();
     const auto lens = std::ranges::find(lenses, type, &OpenSfmLens::name);
     if (lens == lenses.end())
@@ -135,12 +133,10 @@ void add_open_sfm_points(const core::JsonField& reconstruction, ImageRecords& re
     if (!reconstruction.has("points")) return;
     for (const auto& [id, point] : reconstruction.members("points").items()) {
         const std::string place = "point " + id.substr(0, 60);
-        const auto position = point.is_object() && point.contains("coordinates")
-                                  ? core::three_numbers(point["coordinates"])
-                                  : std::nullopt;
+        const auto position = core::three_numbers(point, "coordinates");
         if (!position) reconstruction.fail(place + " has no three finite coordinates");
         std::array<uint8_t, 3> color{128, 128, 128};
-        if (const auto rgb = point.contains("color") ? core::three_numbers(point["color"]) : std::nullopt)
+        if (const auto rgb = core::three_numbers(point, "color"))
             for (size_t i = 0; i < 3; ++i) color[i] = uint8_t(std::clamp((*rgb)[i], 0.0, 255.0) + 0.5);
         add_point(records.points, records.dropped, {(*position)[0], (*position)[1], (*position)[2]}, color,
                   [&] { return core::one_line(reconstruction.where() + ": " + place); });
@@ -150,12 +146,13 @@ void add_open_sfm_points(const core::JsonField& reconstruction, ImageRecords& re
 }  // namespace
 
 ImageRecords import_open_sfm(const ImportSource& source) {
-    const std::string name = core::one_line(source.file.string());
-    const json top = core::read_json_file<json>(source.file, {.bytes = uint64_t(1) << 30,
-                                                              .objects = size_t(1) << 22,
-                                                              .values = size_t(1) << 25,
-                                                              .not_finite = true});
-    if (!top.is_array()) throw InputError(name + ": is not a list of reconstructions");
+    const auto file = core::JsonField::of_file(source.file, {.bytes = uint64_t(1) << 30,
+                                                             .objects = size_t(1) << 22,
+                                                             .values = size_t(1) << 25,
+                                                             .not_finite = true});
+    const json& top = file.value();
+    const std::string& name = file.where();
+    if (!top.is_array()) file.fail("is not a list of reconstructions");
     const core::JsonField reconstruction(largest(top, name), name);
     ImageRecords records;
     records.program = source.file.parent_path().filename() == "opensfm" ? "OpenDroneMap" : "OpenSfM";
@@ -174,7 +171,7 @@ ImageRecords import_open_sfm(const ImportSource& source) {
         const auto camera = cameras.find(shot.text("camera"));
         if (camera == cameras.end()) shot.fail("its camera is not in the list of cameras");
         ImageRecord record = camera->second;
-        images.find(key, core::one_line(name), record);
+        images.find(key, name, record);
         const std::vector<double> r = shot.numbers("rotation", 3), t = shot.numbers("translation", 3);
         record.camera.rotation = rotation_by({r[0], r[1], r[2]});
         record.camera.translation = {t[0], t[1], t[2]};

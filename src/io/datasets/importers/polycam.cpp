@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include "core/folders.h"
-#include "core/json.h"
 #include "core/json_field.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -24,11 +23,7 @@ namespace fs = std::filesystem;
 constexpr uint64_t kMostCameraBytes = uint64_t(1) << 20;
 
 ImageRecord read_polycam_camera(const fs::path& path, const ImageFinder& images) {
-    const std::string name = core::one_line(path.string());
-    const nlohmann::json document =
-        core::read_json_file<nlohmann::json>(path, {.bytes = kMostCameraBytes, .not_finite = true});
-    const core::JsonField field(document, name);
-    if (!document.is_object()) field.fail("is not a JSON object");
+    const auto field = core::JsonField::of_file(path, {.bytes = kMostCameraBytes, .not_finite = true});
     ImageRecord record = begin_record(images, path.stem().string(), field);
     Camera& camera = record.camera;
     camera.cx = field.number("cx");
@@ -43,7 +38,7 @@ ImageRecord read_polycam_camera(const fs::path& path, const ImageFinder& images)
     if (const std::string fault = rotation_fault(axes); !fault.empty())
         field.fail("t_00 to t_22 are not a rotation: " + fault);
     set_pose(camera, from_opengl(nearest_rotation(axes)), center);
-    finish_record(record, name);
+    finish_record(record, field.where());
     return record;
 }
 

@@ -10,10 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/folders.h"
-#include "core/json.h"
 #include "core/json_field.h"
-#include "core/text.h"
-#include "ewa/error.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/importer.h"
 #include "io/datasets/rotation.h"
@@ -22,14 +19,11 @@ namespace ewa::io {
 
 namespace {
 
-using nlohmann::json;
-
 /// `count` finite numbers at that index of a list of lists.
 std::vector<double> numbers_at(const core::JsonField& top, const char* key, size_t index, size_t count) {
-    const json& entry = top.value()[key][index];
-    const json wrapped{{"values", entry}};
-    return core::JsonField(wrapped, top.where() + ": \"" + key + "\" " + std::to_string(index))
-        .numbers("values", count);
+    return core::JsonField(top.value()[key][index],
+                           top.where() + ": \"" + key + "\" " + std::to_string(index))
+        .numbers(nullptr, count);
 }
 
 void set_record3d_intrinsics(const core::JsonField& top, size_t index, bool per_frame, Camera& camera) {
@@ -63,10 +57,8 @@ void set_record3d_pose(const core::JsonField& top, size_t index, Camera& camera)
 }  // namespace
 
 ImageRecords import_record3d(const ImportSource& source) {
-    const std::string name = core::one_line(source.file.string());
-    const json document = core::read_json_file<json>(source.file, {.not_finite = true});
-    if (!document.is_object()) throw InputError(name + ": is not a JSON object");
-    const core::JsonField top(document, name);
+    const auto top = core::JsonField::of_file(source.file, {.not_finite = true});
+    const std::string& name = top.where();
     const size_t poses = top.list("poses").size();
     const bool per_frame = top.has("perFrameIntrinsicCoeffs") && !top.list("perFrameIntrinsicCoeffs").empty();
     if (per_frame && top.value()["perFrameIntrinsicCoeffs"].size() != poses)
