@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "arrays.h"
+#include "capture/run_inputs.h"
 #include "capture/what_is.h"
 #include "core/typing.h"
 #include "errors.h"
@@ -11,7 +12,6 @@
 #include "ewa/run_options.h"
 #include "ewa/splat_files.h"
 #include "io/datasets/refined_cameras.h"
-#include "live/run_inputs.h"
 
 namespace ewa::python {
 namespace {
@@ -25,7 +25,7 @@ struct KeptDataset {
 };
 
 DatasetOptions options_of(const AskedDataset& asked, const std::optional<folders::Run>& run) {
-    DatasetOptions options = run ? live::dataset_options_of(*run) : DatasetOptions();
+    DatasetOptions options = run ? capture::dataset_options_of(*run) : DatasetOptions();
     options.downscale = asked.downscale.value_or(options.downscale);
     options.max_width = asked.max_width.value_or(options.max_width);
     options.masks = asked.masks.value_or(options.masks);
@@ -47,10 +47,10 @@ namespace {
 
 LoadedDataset read_dataset(const fs::path& path, const AskedDataset& asked) {
     return with_files([&] {
-        const std::optional<folders::Run> run = live::run_named(path);
+        const std::optional<folders::Run> run = capture::run_named(path);
         LoadedDataset opened{nullptr, fs::absolute(path), options_of(asked, run), test_every_of(run)};
         if (run) opened.background = core::parse_colour(run->text("background")).value_or(opened.background);
-        const fs::path named = run ? live::dataset_of(*run) : path;
+        const fs::path named = run ? capture::dataset_of(*run) : path;
         opened.archived = what_is(named) == What::archive;
         auto kept = std::make_shared<KeptDataset>();
         const auto read = [&](const fs::path& folder) {
@@ -60,7 +60,7 @@ LoadedDataset read_dataset(const fs::path& path, const AskedDataset& asked) {
             kept->files = read_archive(named, read);
         else
             read(named);
-        const fs::path refined = run ? live::refined_cameras_of(*run) : fs::path();
+        const fs::path refined = run ? capture::refined_cameras_of(*run) : fs::path();
         if (!refined.empty()) io::use_refined_cameras(kept->dataset, refined);
         opened.dataset = SharedDataset(kept, &kept->dataset);
         return opened;
@@ -82,7 +82,7 @@ LoadedDataset open_dataset(const fs::path& path, const AskedDataset& asked) {
 }
 
 Splats open_splats(const fs::path& path) {
-    SplatScene scene = with_files([&] { return read_splats(live::splat_input(path).file); });
+    SplatScene scene = with_files([&] { return read_splats(capture::splat_input(path).file); });
     for (const std::string& remark : scene.remarks)
         warn(PyExc_UserWarning, spelled((path.string() + ": " + remark).c_str()));
     return {std::move(scene.gaussians), scene.antialiased, std::move(scene.comments)};

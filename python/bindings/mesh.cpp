@@ -10,6 +10,7 @@
 
 #include "arrays.h"
 #include "bindings.h"
+#include "capture/run_inputs.h"
 #include "core/text.h"
 #include "core/typing.h"
 #include "core/words.h"
@@ -19,7 +20,6 @@
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "inputs.h"
-#include "live/run_inputs.h"
 #include "mesh/mesh_files.h"
 #include "mesh/scene_mesh.h"
 #include "options.h"
@@ -71,7 +71,7 @@ nb::ndarray<nb::numpy, T> threes(const Rows& rows) {
 std::optional<folders::Run> run_of(const ObjectOrPath<Splats>& splats) {
     const auto* const path = std::get_if<fs::path>(&splats);
     if (!path) return std::nullopt;
-    std::optional<folders::Run> run = live::run_named(*path);
+    std::optional<folders::Run> run = capture::run_named(*path);
     return run ? run : folders::run_of_splats(*path);
 }
 

@@ -13,6 +13,7 @@
 
 #include "arrays.h"
 #include "bindings.h"
+#include "capture/run_inputs.h"
 #include "core/folders.h"
 #include "core/json.h"
 #include "core/text.h"
@@ -26,7 +27,6 @@
 #include "folders/former_options.h"
 #include "folders/run_folder.h"
 #include "inputs.h"
-#include "live/run_inputs.h"
 #include "metrics.h"
 #include "options.h"
 #include "run/evaluation.h"
@@ -85,7 +85,7 @@ struct FirstSplats {
             throw InputError(
                 "init is neither splats nor \"sfm\", \"stereo\" or \"random\", and there is no file " +
                 core::one_line(word));
-        word = std::filesystem::absolute(live::splat_input(path).file).string();
+        word = std::filesystem::absolute(capture::splat_input(path).file).string();
     }
 
     Gaussians splats(const TrainerStart& start) const {

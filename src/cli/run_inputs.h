@@ -6,19 +6,19 @@
 #include <string>
 #include <vector>
 
+#include "capture/run_inputs.h"
 #include "cli/arguments.h"
 #include "ewa/appearance.h"
-#include "live/run_inputs.h"
 
 namespace ewa::cli {
 
-using live::dataset_input;
-using live::dataset_of;
-using live::names_run_with_splats;
-using live::refined_cameras_of;
-using live::run_named;
-using live::splat_input;
-using live::SplatInput;
+using capture::dataset_input;
+using capture::dataset_of;
+using capture::names_run_with_splats;
+using capture::refined_cameras_of;
+using capture::run_named;
+using capture::splat_input;
+using capture::SplatInput;
 
 /// Gives --kernel, --background, --downscale, --max-width, --masks, --lens and --test-every the run's values, where `app` has the option
 /// and the command line does not. other: a dataset in place of the run's; its images become as wide as those that the run was trained on,

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "capture/run_inputs.h"
 #include "capture/what_is.h"
 #include "core/folders.h"
 #include "core/typing.h"
@@ -15,7 +16,6 @@
 #include "ewa/synthetic_dataset.h"
 #include "folders/run_folder.h"
 #include "io/datasets/refined_cameras.h"
-#include "live/run_inputs.h"
 #include "scene/looks.h"
 
 namespace ewa::viewer {
@@ -59,9 +59,7 @@ Look look_of(const folders::Run& run) {
     }
     look.kernel = core::find_value(scene::kKernelWords, run.text("kernel")).value_or(look.kernel);
     look.points = run.flag("points");
-    const auto nearest = run.config.find("nearest");
-    if (nearest != run.config.end() && nearest->is_number_integer())
-        look.nearest = std::clamp(nearest->get<int>(), 1, kMostNearest);
+    look.nearest = run.number("nearest", 1, kMostNearest, look.nearest);
     look.background = core::parse_colour(run.text("background")).value_or(look.background);
     return look;
 }
@@ -91,7 +89,7 @@ void add_cameras(OpenedScene& scene, const folders::Run& run, const fs::path& ca
     const fs::path dataset = cameras.empty() ? run.dataset : cameras;
     try {
         if (!dataset.empty())
-            scene.dataset = load_cameras(dataset, live::dataset_options_of(run), points,
+            scene.dataset = load_cameras(dataset, capture::dataset_options_of(run), points,
                                          cameras.empty() ? run.refined_cameras() : fs::path());
         else
             scene.remark = "the dataset of this run was not found; name it with --cameras DATASET";

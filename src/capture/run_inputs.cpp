@@ -1,22 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "live/run_inputs.h"
+#include "capture/run_inputs.h"
 
-#include <algorithm>
-
+#include "capture/what_is.h"
 #include "core/folders.h"
 #include "core/messages.h"
 #include "core/text.h"
 #include "core/words.h"
 #include "ewa/error.h"
-#include "io/datasets/dataset_folders.h"
 #include "scene/looks.h"
 
-namespace ewa::live {
+namespace ewa::capture {
 namespace fs = std::filesystem;
 
 std::optional<folders::Run> run_named(const fs::path& path) {
-    if (!core::is_folder(path) || io::is_dataset_folder(path)) return std::nullopt;
-    return folders::find_run(path);
+    return core::is_folder(path) && what_is(path) == What::run ? folders::find_run(path) : std::nullopt;
 }
 
 SplatInput splat_input(const fs::path& path) {
@@ -40,8 +37,7 @@ SplatInput splat_input(const fs::path& path) {
 }
 
 bool names_run_with_splats(const fs::path& path) {
-    if (!core::is_folder(path)) return false;
-    const std::optional<folders::Run> run = folders::find_run(path);
+    const auto run = core::is_folder(path) ? folders::find_run(path) : std::nullopt;
     return run && !run->splats.empty();
 }
 
@@ -70,15 +66,11 @@ fs::path refined_cameras_of(const folders::Run& run) {
 
 DatasetOptions dataset_options_of(const folders::Run& run) {
     DatasetOptions options;
-    const auto downscale = run.config.find("downscale");
-    if (downscale != run.config.end() && downscale->is_number_integer())
-        options.downscale = std::clamp(downscale->get<int>(), 1, 1024);
-    const auto width = run.config.find("max-width");
-    if (width != run.config.end() && width->is_number_integer())
-        options.max_width = std::clamp(width->get<int>(), 0, 65535);
+    options.downscale = run.number("downscale", 1, 1024, options.downscale);
+    options.max_width = run.number("max-width", 0, 65535, options.max_width);
     options.masks = core::find_value(scene::kMaskWords, run.text("masks")).value_or(options.masks);
     options.lens = core::find_value(scene::kLensWords, run.text("lens")).value_or(options.lens);
     return options;
 }
 
-}  // namespace ewa::live
+}  // namespace ewa::capture

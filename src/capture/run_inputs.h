@@ -7,7 +7,7 @@
 #include "ewa/dataset.h"
 #include "folders/run.h"
 
-namespace ewa::live {
+namespace ewa::capture {
 
 /// The run whose folder this is. Empty for other paths, and for a folder that is also a dataset.
 std::optional<folders::Run> run_named(const std::filesystem::path& path);
@@ -38,4 +38,4 @@ std::filesystem::path refined_cameras_of(const folders::Run& run);
 /// The options by which the run reads its images. Those that its config.json lacks have their defaults.
 DatasetOptions dataset_options_of(const folders::Run& run);
 
-}  // namespace ewa::live
+}  // namespace ewa::capture
