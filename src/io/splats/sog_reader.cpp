@@ -2,6 +2,7 @@
 // Reads SOG, whose layout sog.h describes.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -38,61 +39,22 @@ std::vector<std::string> image_names_in(const json& meta) {
 }
 
 /// The files of a SOG by the names that its meta.json has for them.
-class SogFiles {
-  public:
-    virtual ~SogFiles() = default;
-    virtual std::string read(const std::string& name) = 0;
-    virtual uint64_t bytes(const json& meta) const = 0;  // of all together
+struct SogFiles {
+    std::function<std::string(const std::string& name)> read;
+    std::function<uint64_t()> bytes;  // of all together
 };
 
-class ArchivedFiles final : public SogFiles {
-  public:
-    explicit ArchivedFiles(const std::filesystem::path& path)
-        : archive_(path), name_(core::one_line(path.string())), bytes_(std::filesystem::file_size(path)) {}
-    std::string read(const std::string& name) override {
-        const auto found =
-            std::ranges::find_if(archive_.entries(), [&](const auto& entry) { return entry.name == name; });
-        if (found == archive_.entries().end())
-            throw InputError(name_ + ": \"" + core::one_line(name) + "\" is not in the archive");
-        return archive_.text(*found);
-    }
-    uint64_t bytes(const json&) const override { return bytes_; }
-
-  private:
-    ZipFiles archive_;
-    std::string name_;
-    uint64_t bytes_;
-};
-
-class FolderFiles final : public SogFiles {
-  public:
-    explicit FolderFiles(const std::filesystem::path& meta)
-        : meta_(meta), name_(core::one_line(meta.string())) {}
-
-    std::string read(const std::string& name) override { return core::read_text_file(path_of(name)); }
-
-    uint64_t bytes(const json& meta) const override {
-        uint64_t sum = std::filesystem::file_size(meta_);
-        for (const std::string& name : image_names_in(meta)) sum += std::filesystem::file_size(path_of(name));
-        return sum;
-    }
-
-    /// Throws InputError unless the image is in the folder.
-    std::filesystem::path path_of(const std::string& name) const {
-        const auto inside = core::name_inside(name);
-        const std::filesystem::path folder = meta_.parent_path();
-        if (!inside || !core::links_stay_inside(folder, *inside))
-            throw InputError(name_ + ": names the image \"" + core::one_line(name) +
-                             "\", which is not in its folder");
-        if (!core::is_file(folder / *inside))
-            throw InputError(name_ + ": the image \"" + core::one_line(name) + "\" is missing beside it");
-        return folder / *inside;
-    }
-
-  private:
-    std::filesystem::path meta_;
-    std::string name_;
-};
+/// Throws InputError unless the image is in the folder of the meta.json.
+std::filesystem::path image_beside(const std::filesystem::path& meta, const std::string& name) {
+    const auto inside = core::name_inside(name);
+    const std::filesystem::path folder = meta.parent_path();
+    if (!inside || !core::links_stay_inside(folder, *inside))
+        throw InputError(
+            core::one_line(meta.string() + ": names the image \"" + name + "\", which is not in its folder"));
+    if (!core::is_file(folder / *inside))
+        throw InputError(core::one_line(meta.string() + ": the image \"" + name + "\" is missing beside it"));
+    return folder / *inside;
+}
 
 constexpr const char* kSogAdvice = "; it is damaged, or not of a SOG";
 constexpr uint64_t kMostSogSplats = kMostWebpSide * kMostWebpSide;
@@ -167,7 +129,7 @@ class Meta : public core::JsonField {
 
 class SogReader {
   public:
-    SogReader(Meta meta, SogFiles& files) : meta_(std::move(meta)), files_(files) {}
+    SogReader(Meta meta, const SogFiles& files) : meta_(std::move(meta)), files_(files) {}
 
     SplatScene read() {
         scene_.variant = "version " + std::to_string(meta_.version());
@@ -179,8 +141,7 @@ class SogReader {
         scene_.file_sh_degree = g.sh_degree;
         // An image of no splats may have no pixels, which WebP lacks.
         if (meta_.count() == 0) return std::move(scene_);
-        require_memory(meta_.where(), files_.bytes(meta_.value()), meta_.count(), g.sh_degree,
-                       kPackedExpansion);
+        require_memory(meta_.where(), files_.bytes(), meta_.count(), g.sh_degree, kPackedExpansion);
         g.resize(size_t(meta_.count()));
         read_means();
         read_rotations();
@@ -331,7 +292,7 @@ class SogReader {
     }
 
     const Meta meta_;
-    SogFiles& files_;
+    const SogFiles& files_;
     SplatScene scene_;
     WebpHead size_;         // of the images with a pixel per splat
     uint64_t palette_ = 0;  // its rows
@@ -340,17 +301,35 @@ class SogReader {
 }  // namespace
 
 SplatScene read_sog(const std::filesystem::path& path) {
-    ArchivedFiles files(path);
-    const std::string name = core::one_line(path.string()) + ": \"" + kSogMeta + "\"";
-    const auto top = core::JsonField::of_text(files.read(kSogMeta), name, kMetaLimits, kSogAdvice);
+    ZipFiles archive(path);
+    const std::string name = core::one_line(path.string());
+    const SogFiles files{
+        [&](const std::string& file) {
+            const auto found =
+                std::ranges::find(archive.entries(), std::filesystem::path(file), &ZipFiles::Entry::name);
+            if (found == archive.entries().end())
+                throw InputError(name + ": \"" + core::one_line(file) + "\" is not in the archive");
+            return archive.text(*found);
+        },
+        [&] { return uint64_t(std::filesystem::file_size(path)); }};
+    const auto top = core::JsonField::of_text(files.read(kSogMeta), name + ": \"" + kSogMeta + "\"",
+                                              kMetaLimits, kSogAdvice);
     SplatScene scene = SogReader(Meta(top), files).read();
     scene.format = SplatFormat::sog;
     return scene;
 }
 
 SplatScene read_sog_meta(const std::filesystem::path& path) {
-    FolderFiles files(path);
-    SplatScene scene = SogReader(Meta(core::JsonField::of_file(path, kMetaLimits, kSogAdvice)), files).read();
+    const auto top = core::JsonField::of_file(path, kMetaLimits, kSogAdvice);
+    const SogFiles files{
+        [&](const std::string& file) { return core::read_text_file(image_beside(path, file)); },
+        [&] {
+            uint64_t sum = std::filesystem::file_size(path);
+            for (const std::string& file : image_names_in(top.value()))
+                sum += std::filesystem::file_size(image_beside(path, file));
+            return sum;
+        }};
+    SplatScene scene = SogReader(Meta(top), files).read();
     scene.format = SplatFormat::sog_meta;
     scene.variant += ", unpacked";
     return scene;
@@ -367,9 +346,8 @@ bool is_sog_meta(const std::filesystem::path& path) try {
 std::vector<std::filesystem::path> sog_images(const std::filesystem::path& meta) try {
     std::vector<std::filesystem::path> images;
     if (!core::is_file(meta)) return images;
-    const FolderFiles folder(meta);
     const json values = core::read_json_file<json>(meta, kMetaLimits);
-    for (const std::string& name : image_names_in(values)) images.push_back(folder.path_of(name));
+    for (const std::string& name : image_names_in(values)) images.push_back(image_beside(meta, name));
     return images;
 } catch (const InputError&) {
     return {};
