@@ -30,7 +30,7 @@ int main(int argc, char** argv) {
     ewa::core::refuse_empty_values<CLI::Validator>(app);
     try {
         app.parse(argc, argv);
-        const int status = ewa::bench::run(options, {"/proc/self/exe"});
+        const int status = ewa::bench::run(options);
         if (std::fflush(stdout) != 0) return fail("cannot write to standard output", 1);
         return status;
     } catch (const CLI::ParseError& error) {

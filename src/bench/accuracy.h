@@ -6,11 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "bench/bench.h"
 #include "ewa/camera.h"
 #include "ewa/device.h"
 #include "ewa/gaussians.h"
 #include "ewa/render_options.h"
-#include "report/chart.h"
+#include "report/work_precision.h"
 
 namespace ewa::bench {
 
@@ -45,5 +46,9 @@ Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaus
 /// What the points of all series are worth. "on the front": no other point of the same exact image is faster and less
 /// wrong. Otherwise the name of one that is.
 void set_verdicts(std::vector<report::WorkSeries>& series);
+
+/// Measures the scene file of the options through its camera. Prints the tables, and writes them as JSON: `rendering` has
+/// report::work_precision_json, and `styles` how each series is drawn. Returns 0. Throws InputError, RunError.
+int run_accuracy(const Options& options);
 
 }  // namespace ewa::bench

@@ -8,13 +8,13 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "bench/accuracy.h"
 #include "bench/ceiling/ceiling.h"
 #include "bench/kernel_choices.h"
 #include "bench/result.h"
 #include "bench/stability/stability.h"
 #include "core/json.h"
 #include "core/outputs.h"
-#include "core/typing.h"
 #include "ewa/device.h"
 #include "ewa/error.h"
 
@@ -47,7 +47,7 @@ bool all_good(const CaseResult& result) {
     return std::all_of(result.checks.begin(), result.checks.end(), std::mem_fn(&Check::good));
 }
 
-Result measure_all(const Options& options, const std::vector<std::string>& program) {
+Result measure_all(const Options& options) {
     const std::vector<Case> cases = select_cases(options.cases, options.large);
     Result result;
     result.version = EWA_VERSION;
@@ -56,10 +56,9 @@ Result measure_all(const Options& options, const std::vector<std::string>& progr
     result.device = device_info(*device);
     print(header_text(result));
 
-    MeasureOptions measuring{options.runs, options.check, config_with(options.kernels, device->limits()),
-                             result.host.copies, program};
-    measuring.first_step_command.insert(measuring.first_step_command.end(),
-                                        {"--first-step", "--device", std::to_string(result.device.index)});
+    const MeasureOptions measuring{options.runs, options.check,
+                                   config_with(options.kernels, device->limits()), result.host.copies,
+                                   result.device.index};
     for (const Case& one : cases) {
         result.cases.push_back(measure(device, one, measuring));
         print(case_text(result.cases.back()));
@@ -69,57 +68,28 @@ Result measure_all(const Options& options, const std::vector<std::string>& progr
     return result;
 }
 
-CLI::Validator in_range(int low, int high) {
-    return CLI::Validator([low, high](std::string& text) { return core::settle_number(text, low, high); },
-                          "");
-}
-
 }  // namespace
 
 void add_options(CLI::App& app, Options& options) {
-    app.add_option("--json", options.json, "Write the results to this file")->type_name("FILE");
-    app.add_option("--cases", options.cases,
-                   "Run only the cases whose name contains, or matches if it has * or ?, one of these")
-        ->type_name("PATTERN,...");
-    app.add_flag("--list", options.list, "List the cases and exit");
-    app.add_option("--runs", options.runs, "Runs of each case (0: as many as fit in about a second, 5 to 25)")
-        ->transform(in_range(0, 1000))
-        ->type_name("N");
-    app.add_option("--device", options.device, "Number of the device, or part of its name (see ewa devices)")
-        ->type_name("NAME|N");
+    core::add_bench_options<CLI::Validator>(app, options);
+    app.add_flag("--accuracy", options.accuracy,
+                 "Error against run time of every way to draw the scene FILE. ewa bench --accuracy makes one "
+                 "of a dataset");
     app.add_option(
-           "--kernels", options.kernels,
-           "Use other kernels than those for the device: tile=8x8, broadcast=shuffles|shared|uniform, "
-           "sort=ranked|counted, scan=N, elements=N, interleave=N")
-        ->type_name("NAME=VALUE,...");
-    app.add_flag("--check", options.check,
-                 "Compare the results with the CPU reference; exit with status 1 if one exceeds its bound");
-    app.add_flag("--large", options.large, "Also run the cases that take gigabytes, or minutes on a CPU");
-    app.add_option("--compare", options.compare,
-                   "Print new time over old time per case and pass; this file has the old ones")
-        ->type_name("OLD.json");
-    app.add_option("--results", options.results,
-                   "With --compare: read the new results from this file instead of measuring")
-        ->type_name("NEW.json");
-    app.add_flag("--stability", options.stability,
-                 "Compare stiff and extreme scenes with the CPU reference, and train from each; exit with "
-                 "status 1 if a bound is exceeded. It takes minutes");
-    app.add_option("FILE", options.scene,
-                   "With --stability: use this splat file instead of the built-in scenes")
+           "FILE", options.scene,
+           "With --stability: use this scene instead of the built-in ones. ewa bench --stability makes "
+           "one of a splat file")
         ->type_name("");
-    app.add_option("--training-steps", options.training_steps,
-                   "With --stability: training steps from each scene; 0: none")
-        ->transform(in_range(0, 100000))
-        ->type_name("N");
     app.add_flag("--first-step", options.first_step, "The new process that the case first_step starts")
         ->group("");
 }
 
-int run(const Options& options, const std::vector<std::string>& program) {
+int run(const Options& options) {
     if (options.list) return list_cases(options.stability);
     core::check_outputs(
         {{"--json", options.json}},
         {{"--compare", options.compare}, {"--results", options.results}, {"FILE", options.scene}});
+    if (options.accuracy) return run_accuracy(options);
     if (options.stability) return run_stability(options);
     if (!options.scene.empty()) throw InputError(options.scene.string() + ": a file needs --stability");
     if (options.first_step) return run_first_step(options.device);
@@ -130,7 +100,7 @@ int run(const Options& options, const std::vector<std::string>& program) {
         print(compare_text(before, core::read_json_file<Json>(options.results)));
         return 0;
     }
-    const Result result = measure_all(options, program);
+    const Result result = measure_all(options);
     const Json json = result;
     if (!options.json.empty()) core::write_json(options.json, json);
     if (!options.compare.empty())

@@ -213,13 +213,15 @@ double start_to_first_step(const std::vector<std::string>& command, const std::s
     return double(end - start) * 1e-6;
 }
 
-/// Runs the command in a new process, first with an empty shader cache, then with the cache of that run.
+/// Runs the first step in a new process, first with an empty shader cache, then with the cache of that run.
 CaseResult measure_first_step(const Case& one, const MeasureOptions& options) {
+    const std::vector<std::string> command{core::own_program().string(), "--first-step", "--device",
+                                           std::to_string(options.device)};
     std::vector<double> cold, warm;
     for (int run = 0; run < (options.runs > 0 ? std::min(options.runs, 3) : 3); ++run) {
         const core::TemporaryFolder cache("ewa-bench-");
-        cold.push_back(start_to_first_step(options.first_step_command, cache.path().string()));
-        warm.push_back(start_to_first_step(options.first_step_command, cache.path().string()));
+        cold.push_back(start_to_first_step(command, cache.path().string()));
+        warm.push_back(start_to_first_step(command, cache.path().string()));
     }
     CaseResult result;
     result.one = one;

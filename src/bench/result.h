@@ -72,8 +72,8 @@ struct MeasureOptions {
     int runs = 0;  // 0: see repeat()
     bool check = false;
     passes::KernelConfig kernels;
-    Bandwidth copies;                             // of the host
-    std::vector<std::string> first_step_command;  // the command that calls run_first_step() for a device
+    Bandwidth copies;  // of the host
+    int device = 0;    // its number
 };
 
 CaseResult measure(const std::shared_ptr<gpu::Device>& device, const Case& one,

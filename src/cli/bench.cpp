@@ -1,24 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa bench: time per pass, error against the CPU reference, and error against run time.
+// ewa bench: starts ewa-bench, reads splats for it, and measures held-out PSNR against the run time of training.
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "bench/accuracy.h"
-#include "bench/bench.h"
 #include "cli/arguments.h"
 #include "cli/command.h"
+#include "cli/interrupt.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
+#include "cli/status.h"
 #include "core/atomic_file.h"
+#include "core/bench_options.h"
+#include "core/process.h"
+#include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/evaluation.h"
 #include "ewa/splat_files.h"
 #include "ewa/trainer.h"
 #include "report/chart.h"
 #include "scene/readout.h"
+#include "scene/scene_file.h"
 
 namespace ewa::cli {
 namespace {
@@ -29,12 +33,46 @@ constexpr uint32_t kMaxSplats = 40000;
 constexpr int kEvaluations = 6;
 
 struct BenchArguments {
-    bench::Options options;
+    core::BenchOptions options;
+    fs::path file;  // of splats, or with --accuracy a dataset; empty: none
     bool accuracy = false;
     // Used only with --accuracy.
     fs::path splats, svg;  // splats empty: the result of the training. svg empty: not written
     int steps = 600;       // of each training; 0: no training
 };
+
+/// What ewa-bench gets of these arguments: all but the file. It has the same options.
+std::vector<std::string> options_given(const CLI::App& app) {
+    std::vector<std::string> words;
+    for (const CLI::Option* option : app.get_options())
+        if (option->count() > 0 && !option->get_positional())
+            words.push_back("--" + option->get_lnames().front() + "=" + option->results().front());
+    return words;
+}
+
+/// Returns the exit status of ewa-bench, which is beside this program.
+int run_ewa_bench(std::vector<std::string> arguments) {
+    const fs::path program = core::own_program().replace_filename("ewa-bench");
+    if (!core::is_file(program))
+        throw RunError(program.string() +
+                       ", which measures, is missing; put it there: it comes with ewa, and " +
+                       "scripts/build makes it");
+    arguments.insert(arguments.begin(), program.string());
+    return run_in_front(arguments);
+}
+
+/// Reads the splats of --stability into a scene file of the same name. Returns the exit status.
+int run_stability(const BenchArguments& arguments, std::vector<std::string> words) {
+    const fs::path file = splat_input(arguments.file).file;
+    Gaussians gaussians = load_splats(file);
+    if (gaussians.size() == 0) throw InputError(arguments.file.string() + ": has no splats");
+    fs::path name = arguments.file.filename();
+    if (name.empty() || name == "." || name == "..") name = file.filename();
+    const core::TemporaryFolder folder("ewa-bench-");
+    scene::write_scene_file(folder.path() / name, {std::move(gaussians), {}});
+    words.push_back((folder.path() / name).string());
+    return run_ewa_bench(std::move(words));
+}
 
 struct Trained {
     report::WorkSeries curve;
@@ -71,41 +109,39 @@ Trained train(const std::shared_ptr<gpu::Device>& device, const Dataset& dataset
     return result;
 }
 
-void print_tables(const report::WorkPrecision& diagram) {
-    fmt::print(
-        "\nTime: the median of a whole frame. RMS error, worst: over pixels and channels, against the exact "
-        "image that "
-        "the method's name ends with.\n"
-        "  opacity: 3DGS's, the same from every side. density: a longer way through a splat absorbs more.\n"
-        "on the front: nothing with the same exact image is faster and less wrong.\n\n"
-        "{:<28} {:<12} {:>10}  {:>9} {:>9}  {}\n",
-        "method", "effort", "ms", "RMS error", "worst", "verdict");
-    for (const report::WorkSeries& series : diagram.series)
-        for (const report::WorkPoint& p : series.points)
-            fmt::print("{:<28} {:<12} {:>10.2f}  {:>9.2e} {:>9.2e}  {}\n", series.name, p.name, p.time,
-                       p.error, p.worst, p.verdict);
-    for (const report::WorkTable& table : diagram.tables) {
-        fmt::print("\n{}. {}\n\n{:<44}", table.title, table.note, table.columns.front());
-        for (size_t i = 1; i < table.columns.size(); ++i) fmt::print(" {:>22}", table.columns[i]);
-        fmt::print("\n");
-        for (const auto& [name, values] : table.rows) {
-            fmt::print("{:<44}", name);
-            for (const double value : values) fmt::print(" {:>22.2e}", value);
-            fmt::print("\n");
-        }
+/// Held-out PSNR against run time of training with each strategy. gaussians: becomes the result of the last.
+report::WorkPrecision training_diagram(const std::shared_ptr<gpu::Device>& device, const Dataset& dataset,
+                                       const Split& split, int steps, Gaussians& gaussians) {
+    report::WorkPrecision diagram{
+        "Training: held-out PSNR against run time", "seconds of training", "PSNR, dB", true, {}, {}};
+    const std::pair<const char*, Strategy> strategies[] = {
+        {"none", Strategy::none}, {"mcmc", Strategy::mcmc}, {"adc", Strategy::adc}};
+    for (const auto& [name, strategy] : strategies) {
+        if (steps == 0) break;
+        Trained trained = train(device, dataset, split, name, strategy, steps);
+        diagram.series.push_back(std::move(trained.curve));
+        gaussians = std::move(trained.gaussians);
     }
+    diagram.notes.push_back(
+        fmt::format("{} steps of each strategy, at most {} splats, on {}; evaluation does not count.", steps,
+                    kMaxSplats, device_info(*device).name));
+    return diagram;
 }
 
-report::WorkTable cause_table(const bench::AccuracyReference& reference) {
-    report::WorkTable table{
-        "Error of splatting by cause, exact image: " + reference.name,
-        {"cause", "alone", "splatting without it"},
-        {},
-        "RMS error in float64. alone: the exact image with this approximation and no other"};
-    for (const bench::Cause& cause : reference.causes)
-        table.rows.emplace_back(cause.name, std::vector<double>{cause.alone, cause.without});
-    table.rows.emplace_back("all: splatting", std::vector<double>{reference.splatting, reference.splatting});
-    return table;
+/// The diagram of what ewa-bench has measured. measured: its JSON.
+report::WorkPrecision rendering_diagram(const report::Json& measured) {
+    const report::Json& rendering = measured.at("rendering");
+    report::WorkPrecision diagram;
+    diagram.title = rendering.at("title");
+    for (size_t i = 0; i < rendering.at("series").size(); ++i) {
+        const report::Json &series = rendering.at("series")[i], &style = measured.at("styles").at(i);
+        report::WorkSeries one{series.at("name"), true, {}, style.at("dashed"), style.at("hue")};
+        for (const report::Json& point : series.at("points"))
+            one.points.push_back({point.at("name"), report::number_or_nan(point, "time"),
+                                  report::number_or_nan(point, "error")});
+        diagram.series.push_back(std::move(one));
+    }
+    return diagram;
 }
 
 /// The file of the training diagram, beside that of rendering; empty: none.
@@ -114,92 +150,59 @@ fs::path training_svg(const BenchArguments& arguments) {
     return fs::path(arguments.svg).replace_filename(arguments.svg.stem().string() + "_training.svg");
 }
 
-void check_files(const BenchArguments& arguments) {
-    const fs::path beside = training_svg(arguments);
-    const fs::path& json = arguments.options.json;
-    check_command_outputs(
-        {{"--svg", arguments.svg}, {"--svg's diagram of training", beside}, {"--json", json}},
-        {{"--splats", arguments.splats}});
+void write_diagrams(const BenchArguments& arguments, const report::Json& measured,
+                    const report::WorkPrecision& training) {
+    if (!arguments.options.json.empty())
+        write_json(arguments.options.json, {{"rendering", measured.at("rendering")},
+                                            {"training", report::work_precision_json(training)}});
+    if (arguments.svg.empty()) return;
+    make_folder(arguments.svg.parent_path());
+    core::write_text_file(arguments.svg, report::work_precision_svg(rendering_diagram(measured)));
+    if (const fs::path beside = training_svg(arguments); !beside.empty())
+        core::write_text_file(beside, report::work_precision_svg(training));
 }
 
-/// Error against run time of rendering a scene through one camera. Prints progress.
-report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& device,
-                                        const Gaussians& gaussians, const Camera& camera) {
-    if (!camera.distortion.none() || scene::moves(camera))
-        throw InputError("--accuracy measures pinholes at rest only; take --lens undistort");
-    const bench::Accuracy accuracy = bench::measure_accuracy(device, gaussians, camera, {});
-    report::WorkPrecision diagram;
-    diagram.title = "Rendering: error against run time";
-    diagram.series = accuracy.series;
-    diagram.notes.push_back(
-        fmt::format("{} splats, {}x{}, on {}. The error is measured at {} pixels against the "
-                    "emission-absorption integral of the splats as 3D Gaussians, computed in float64 along "
-                    "each ray ({:.1f} s).",
-                    gaussians.size(), camera.width, camera.height, device_info(*device).name, accuracy.pixels,
-                    accuracy.exact_seconds));
-    diagram.notes.push_back(
-        fmt::format("Times are of whole frames on the device, with recording and waiting. The march on the "
-                    "host is C++ in "
-                    "float64 on {} threads; its time at those pixels is scaled to the whole image.",
-                    accuracy.threads));
-    diagram.notes.push_back(
-        "opacity: exact with 3DGS's opacity, the same from every side. density: exact with a density fixed "
-        "per splat, "
-        "so that a longer way through it absorbs more.");
-    for (const bench::AccuracyReference& reference : accuracy.references)
-        diagram.tables.push_back(cause_table(reference));
-    return diagram;
-}
-
-/// Error against run time of training and of rendering its result, or of rendering a given scene.
+/// Error against run time of training, and of rendering its result or a given scene. Returns the exit status.
 int run_accuracy(const BenchArguments& arguments) {
-    const fs::path path = dataset_input(arguments.options.scene);
+    const fs::path path = dataset_input(arguments.file);
     if (path.empty()) throw InputError("--accuracy needs a DATASET: ewa bench --accuracy DATASET");
     if (arguments.splats.empty() && arguments.steps == 0)
         throw InputError("--accuracy: --training-steps 0 leaves no scene to render; name one with --splats");
-    check_files(arguments);
+    check_command_outputs({{"--svg", arguments.svg},
+                           {"--svg's diagram of training", training_svg(arguments)},
+                           {"--json", arguments.options.json}},
+                          {{"--splats", arguments.splats}});
+    scene::SceneFile scene;
     Gaussians given;
     if (!arguments.splats.empty()) given = load_splats(splat_input(arguments.splats).file);
     const DeviceOptions device_options{.selector = arguments.options.device};
-    const Views views = load_views(
-        {.splats = arguments.splats, .dataset = path, .draw = {}, .device = device_options}, "all", 0);
-    const Dataset& dataset = views.dataset;
-    const Split split = split_frames(dataset, 8);
-    if (split.test.empty() || split.train.empty())
-        throw InputError(path.string() + ": too few images to hold one out");
-    const auto device = open_device(device_options);
-    fmt::print("device: {}\n", device_info(*device).name);
+    report::WorkPrecision training;
+    {
+        const Views views = load_views(
+            {.splats = arguments.splats, .dataset = path, .draw = {}, .device = device_options}, "all", 0);
+        const Dataset& dataset = views.dataset;
+        const Split split = split_frames(dataset, 8);
+        if (split.test.empty() || split.train.empty())
+            throw InputError(path.string() + ": too few images to hold one out");
+        if (arguments.steps > 0 && dataset.points.positions.empty())
+            throw InputError(path.string() + ": has no points to start the training from");
+        scene.camera = dataset.frames[size_t(split.test.front())].camera;
+        if (!scene.camera.distortion.none() || scene::moves(scene.camera))
+            throw InputError("--accuracy measures pinholes at rest only; take --lens undistort");
+        const auto device = open_device(device_options);
+        fmt::print("device: {}\n", device_info(*device).name);
+        training = training_diagram(device, dataset, split, arguments.steps, scene.gaussians);
+    }
+    if (!arguments.splats.empty()) scene.gaussians = std::move(given);
 
-    report::WorkPrecision training{
-        "Training: held-out PSNR against run time", "seconds of training", "PSNR, dB", true, {}, {}};
-    Gaussians gaussians;
-    if (arguments.steps > 0 && dataset.points.positions.empty())
-        throw InputError(path.string() + ": has no points to start the training from");
-    const std::pair<const char*, Strategy> strategies[] = {
-        {"none", Strategy::none}, {"mcmc", Strategy::mcmc}, {"adc", Strategy::adc}};
-    for (const auto& [name, strategy] : strategies) {
-        if (arguments.steps == 0) break;
-        Trained trained = train(device, dataset, split, name, strategy, arguments.steps);
-        training.series.push_back(std::move(trained.curve));
-        gaussians = std::move(trained.gaussians);
-    }
-    training.notes.push_back(
-        fmt::format("{} steps of each strategy, at most {} splats, on {}; evaluation does not count.",
-                    arguments.steps, kMaxSplats, device_info(*device).name));
-    if (!arguments.splats.empty()) gaussians = std::move(given);
-    const report::WorkPrecision rendering =
-        rendering_diagram(device, gaussians, dataset.frames[size_t(split.test.front())].camera);
-    print_tables(rendering);
-    if (!arguments.options.json.empty())
-        write_json(arguments.options.json, {{"rendering", report::work_precision_json(rendering)},
-                                            {"training", report::work_precision_json(training)}});
-    if (!arguments.svg.empty()) {
-        make_folder(arguments.svg.parent_path());
-        core::write_text_file(arguments.svg, report::work_precision_svg(rendering));
-        if (const fs::path beside = training_svg(arguments); !beside.empty())
-            core::write_text_file(beside, report::work_precision_svg(training));
-    }
-    return 0;
+    const core::TemporaryFolder folder("ewa-bench-");
+    const fs::path file = folder.path() / "scene", results = folder.path() / "rendering.json";
+    scene::write_scene_file(file, scene);
+    std::vector<std::string> words{"--accuracy", "--json=" + results.string(), file.string()};
+    if (!arguments.options.device.empty()) words.push_back("--device=" + arguments.options.device);
+    const int status = run_ewa_bench(std::move(words));
+    if (status == kDone) write_diagrams(arguments, core::read_json_file<report::Json>(results), training);
+    return status;
 }
 
 /// Refuses options that the chosen mode would not use.
@@ -217,7 +220,10 @@ void check_modes(const CLI::App& app) {
 
 Action add_bench(CLI::App& app) {
     const auto arguments = std::make_shared<BenchArguments>();
-    bench::add_options(app, arguments->options);
+    core::add_bench_options<CLI::Validator>(app, arguments->options);
+    app.add_option("FILE", arguments->file,
+                   "With --stability: use this splat file instead of the built-in scenes")
+        ->type_name("");
     app.add_flag("--accuracy", arguments->accuracy,
                  "Error against run time on the dataset FILE: of rendering, against the integral along each "
                  "ray, and of training with each strategy for --training-steps (600). It takes minutes");
@@ -228,16 +234,22 @@ Action add_bench(CLI::App& app) {
                    "With --accuracy: write the diagram of rendering to FILE, and that of training to "
                    "NAME_training.svg beside it")
         ->type_name("FILE");
-    arguments->options.read_splats = [](const fs::path& path) { return load_splats(splat_input(path).file); };
-    const CLI::Option* steps = app.get_option("--training-steps");
-    return [&app, arguments, steps] {
+    return [&app, arguments] {
         check_modes(app);
-        if (!arguments->accuracy) {
-            check_command_outputs({{"--json", arguments->options.json}}, {});
-            return bench::run(arguments->options, {"/proc/self/exe", "bench"});
+        const core::BenchOptions& options = arguments->options;
+        if (arguments->accuracy) {
+            if (app.count("--training-steps") > 0) arguments->steps = options.training_steps;
+            return run_accuracy(*arguments);
         }
-        if (steps->count() > 0) arguments->steps = arguments->options.training_steps;
-        return run_accuracy(*arguments);
+        const fs::path& file = arguments->file;
+        check_command_outputs(
+            {{"--json", options.json}},
+            {{"--compare", options.compare}, {"--results", options.results}, {"FILE", file}});
+        std::vector<std::string> words = options_given(app);
+        if (options.stability && !options.list && !file.empty())
+            return run_stability(*arguments, std::move(words));
+        if (!file.empty()) words.push_back(file.string());
+        return run_ewa_bench(std::move(words));
     };
 }
 

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/interrupt.h"
 
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
+#include <cstdio>
 #include <string_view>
 
 #include "core/atomic_file.h"
+#include "core/process.h"
 
 namespace ewa::cli {
 namespace {
@@ -20,6 +23,31 @@ constexpr std::string_view kNote = "\nsaving, then ending; Ctrl-\\ ends at once 
 // Two threads can handle two signals at the same time.
 std::atomic<bool> signalled = false, at_terminal = false;
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may use only lock-free atomics");
+
+std::atomic<pid_t> in_front = 0;  // the program that gets the signals; 0: none
+static_assert(std::atomic<pid_t>::is_always_lock_free);
+
+void pass_on(int signal) {
+    const int reason = errno;
+    if (const pid_t program = in_front) kill(program, signal);
+    errno = reason;
+}
+
+/// Signals of a watch wait while one exists.
+class SignalPause {
+  public:
+    SignalPause() {
+        sigset_t waiting;
+        sigemptyset(&waiting);
+        for (const int signal : kSignals) sigaddset(&waiting, signal);
+        pthread_sigmask(SIG_BLOCK, &waiting, &before_);
+    }
+    ~SignalPause() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+    SignalPause(const SignalPause&) = delete;
+
+  private:
+    sigset_t before_;
+};
 
 void note_signal(int signal) {
     const int reason = errno;  // the interrupted code may still read it
@@ -78,6 +106,28 @@ void remove_temporary_files_on_signals() {
         const struct sigaction before = handle(signal, remove_files_and_end);
         if (before.sa_handler == SIG_IGN) sigaction(signal, &before, nullptr);
     }
+}
+
+int run_in_front(const std::vector<std::string>& command) {
+    std::fflush(stdout);  // what it prints comes behind
+    std::array<struct sigaction, kSignals.size()> before;
+    {
+        const SignalPause pause;
+        in_front = core::start_program(command, {}, {.output = STDOUT_FILENO}, core::ProcessGroup::shared);
+        for (size_t i = 0; i < kSignals.size(); ++i) {
+            before[i] = handle(kSignals[i], pass_on);
+            if (before[i].sa_handler == SIG_IGN) sigaction(kSignals[i], &before[i], nullptr);
+        }
+    }
+    const pid_t program = in_front;
+    siginfo_t ended{};
+    while (waitid(P_PID, id_t(program), &ended, WEXITED | WNOWAIT) != 0 && errno == EINTR) {
+    }
+    in_front = 0;  // its number is its own until the next line
+    int status = 0;
+    waitpid(program, &status, 0);
+    for (size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &before[i], nullptr);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
 void end_on_signals() {

@@ -4,6 +4,8 @@
 #include <csignal>
 
 #include <array>
+#include <string>
+#include <vector>
 
 namespace ewa::cli {
 
@@ -35,6 +37,12 @@ void remove_temporary_files_on_signals();
 /// For work that saves nothing: the signals of a watch delete the temporary files and end the program at once, with
 /// kInterruptedStatus.
 void end_on_signals();
+
+/// Runs a program with this process's standard output and error, and an empty standard input. The signals of a watch go to the
+/// program. Returns its exit status, or 128 and the number of the signal that ended it. Throws RunError if it cannot be
+/// started.
+/// command: the path of the program, then its arguments.
+int run_in_front(const std::vector<std::string>& command);
 
 /// The exit status after Ctrl-C.
 inline constexpr int kInterruptedStatus = 130;

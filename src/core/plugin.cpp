@@ -3,12 +3,11 @@
 
 #include <dlfcn.h>
 #include <link.h>
-#include <sys/auxv.h>
 
-#include <bit>
 #include <filesystem>
 #include <string_view>
 
+#include "core/process.h"
 #include "ewa/error.h"
 
 namespace ewa::core {
@@ -28,8 +27,7 @@ fs::path own_file() {
     dladdr1(reinterpret_cast<const void*>(&own_file), &unused, &found, RTLD_DL_LINKMAP);
     const char* name = found ? static_cast<const link_map*>(found)->l_name : "";  // empty for the program
     std::error_code unknown;
-    // Not /proc/self/exe, which a bare chroot does not have.
-    return fs::canonical(*name ? name : std::bit_cast<const char*>(getauxval(AT_EXECFN)), unknown);
+    return *name ? fs::canonical(name, unknown) : own_program();
 }
 
 fs::path file_of(const Plugin& plugin) {

@@ -3,18 +3,21 @@
 
 #include <fcntl.h>
 #include <poll.h>
+#include <sys/auxv.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <optional>
+#include <system_error>
 
 #include "core/folders.h"
 #include "core/text.h"
@@ -163,12 +166,15 @@ bool give(int descriptor, int place, int mode) {
 }
 
 /// Becomes the program, between fork and exec: nothing here takes memory or a lock. A reason why not goes to `report`.
-[[noreturn]] void become(char* const* command, char* const* environment, const Streams& streams, pid_t parent,
-                         int report) {
-    setpgid(0, 0);
+[[noreturn]] void become(char* const* command, char* const* environment, const Streams& streams,
+                         ProcessGroup group, pid_t parent, int report) {
+    if (group == ProcessGroup::own) setpgid(0, 0);
     // A killed parent cannot end the program. The program would run for hours, on files that the next run takes over.
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() != parent) _exit(1);
+    sigset_t none;
+    sigemptyset(&none);
+    sigprocmask(SIG_SETMASK, &none, nullptr);  // a program inherits what its parent blocks
     if (give(streams.input, STDIN_FILENO, O_RDONLY) && give(streams.output, STDOUT_FILENO, O_WRONLY) &&
         (streams.errors < 0 || give(streams.errors, STDERR_FILENO, O_WRONLY)))
         execve(command[0], command, environment);
@@ -198,15 +204,20 @@ std::filesystem::path find_program(const std::string& name) {
     return {};
 }
 
+std::filesystem::path own_program() {
+    std::error_code unknown;
+    return std::filesystem::canonical(std::bit_cast<const char*>(getauxval(AT_EXECFN)), unknown);
+}
+
 pid_t start_program(std::vector<std::string> command, const std::vector<std::string>& environment,
-                    const Streams& streams) {
+                    const Streams& streams, ProcessGroup group) {
     const std::string name = one_line(command[0]);
     command[0] = file_of(command[0]);
     std::vector<std::string> all = environment_with(environment);
     const std::vector<char*> words = pointers(command), changed = pointers(all);
     Pipe report;
     const pid_t parent = getpid(), child = fork();
-    if (child == 0) become(words.data(), changed.data(), streams, parent, report.to.get());
+    if (child == 0) become(words.data(), changed.data(), streams, group, parent, report.to.get());
     int reason = child < 0 ? errno : 0;
     report.to.close();
     // The end of the pipe closes as the program starts.

@@ -14,6 +14,9 @@ namespace ewa::core {
 /// The executable file of this name in PATH; empty if there is none. Entries of PATH that are empty count for nothing.
 std::filesystem::path find_program(const std::string& name);
 
+/// The file of the program that runs, without symbolic links. It needs no /proc, which a bare chroot does not have.
+std::filesystem::path own_program();
+
 /// File descriptors that a program gets.
 struct Streams {
     int input = -1;   // -1: standard input is empty
@@ -21,13 +24,15 @@ struct Streams {
     int errors = -1;  // -1: standard error is this process's
 };
 
-/// Starts a program in a process group of its own, so Ctrl-C reaches this process alone. The caller waits for it.
-/// The program is killed if the thread that started it ends.
+/// Whether Ctrl-C on a terminal reaches this process alone, or both.
+enum class ProcessGroup { own, shared };
+
+/// Starts a program. The caller waits for it. The program is killed if the thread that started it ends.
 /// command: the path of the program, or a name for find_program, then its arguments.
 /// environment: NAME=value, beside those of this process.
 /// Throws RunError if the program cannot be started.
 pid_t start_program(std::vector<std::string> command, const std::vector<std::string>& environment,
-                    const Streams& streams);
+                    const Streams& streams, ProcessGroup group = ProcessGroup::own);
 
 struct Program {
     std::vector<std::string> command;      // the name or path of the program, then its arguments

@@ -10,6 +10,7 @@
 #include <set>
 #include <sstream>
 
+#include "scene/scene_file.h"
 #include "support/temp_folder.h"
 
 namespace ewa::test {
@@ -148,6 +149,36 @@ TEST(BenchProgram, StabilityIsMeasuredAndWritten) {
     }
     EXPECT_EQ(results.at("training").size(), 8u);  // along rays nothing trains
     EXPECT_EQ(run(kProgram + " --stability /nowhere.ply").status, 2);
+}
+
+TEST(BenchProgram, StabilityAndAccuracyOfASceneFileAreMeasured) {
+    const TempFolder folder;
+    scene::SceneFile scene;
+    scene.gaussians.resize(1);
+    scene.gaussians.means = {0, 0, 3};
+    scene.gaussians.quaternions = {1, 0, 0, 0};
+    scene.gaussians.log_scales = {-0.5f, -0.5f, -0.5f};
+    scene.gaussians.opacity_logits = {3};
+    scene.gaussians.sh = {1, 1, 1};
+    scene.camera = {16, 16, 16, 16, 8, 8, glm::dmat3(1), glm::dvec3(0)};
+    const std::string file = (folder / "one").string(), json = (folder / "a.json").string();
+    scene::write_scene_file(file, scene);
+    const Ended stable = run(kProgram + " --stability " + file + " --training-steps 2 --json " + json);
+    ASSERT_EQ(stable.status, 0) << stable.output;
+    EXPECT_EQ(read_json(json).at("cases").at(0).at("name"), "one");
+
+    const Ended accurate = run(kProgram + " --accuracy " + file + " --json " + json);
+    ASSERT_EQ(accurate.status, 0) << accurate.output;
+    for (const char* text : {"\nmarch, density               256 samples ", " on the front\n",
+                             "\nError of splatting by cause, exact image: opacity. ", "\nall: splatting "})
+        EXPECT_NE(accurate.output.find(text), std::string::npos) << text << accurate.output;
+    const nlohmann::json results = read_json(json);
+    EXPECT_EQ(results.at("rendering").at("schema"), "ewa-work-precision-1");
+    EXPECT_EQ(results.at("rendering").at("tables").size(), 2u);
+    EXPECT_EQ(results.at("styles").size(), results.at("rendering").at("series").size());
+
+    scene::write_scene_file(file, {scene.gaussians, {}});
+    EXPECT_EQ(run(kProgram + " --accuracy " + file).status, 2) << "without a camera";
 }
 
 TEST(BenchProgram, ListsItsCases) {

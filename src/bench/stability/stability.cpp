@@ -20,6 +20,7 @@
 #include "reference/rays.h"
 #include "reference/render.h"
 #include "scene/readout.h"
+#include "scene/scene_file.h"
 #include "shared/constants.h"
 
 namespace ewa::bench {
@@ -347,10 +348,7 @@ bool stayed_finite(const std::vector<float>& before, const std::vector<float>& a
 
 std::vector<StabilityCase> chosen_cases(const Options& options) {
     if (!options.scene.empty()) {
-        if (!options.read_splats)
-            throw InputError(options.scene.string() +
-                             ": this program reads no splat files; ewa bench --stability does");
-        const Gaussians gaussians = options.read_splats(options.scene);
+        const Gaussians gaussians = scene::read_scene_file(options.scene).gaussians;
         if (gaussians.size() == 0) throw InputError(options.scene.string() + ": has no splats");
         return {stability_case_of(options.scene.filename().string(), gaussians)};
     }
