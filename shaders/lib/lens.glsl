@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where a lens shows a point, and J = d(pixel)/d(point), of cameras with SPEC_LENSES. Points are in camera coordinates, and planes
-// in units of the focal length. src/reference/lens.h has the formulas. Needs projection.glsl, and a block `camera`.
+// in units of the focal length. check/reference/lens.h has the formulas. Needs projection.glsl, and a block `camera`.
 #ifndef EWA_LIB_LENS
 #define EWA_LIB_LENS
 

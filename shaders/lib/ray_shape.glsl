@@ -48,7 +48,7 @@ RayCamera ray_camera(View view) {
     return RayCamera(to_frame * lens.rotation, vec2(1.0), ahead, distance, by_z ? p.z : distance, by_z ? to_frame[2] : ahead);
 }
 
-// How much KERNEL_ANTIALIAS widens a splat. src/reference/rays.h has the formulas.
+// How much KERNEL_ANTIALIAS widens a splat. check/reference/rays.h has the formulas.
 struct Widening {
     vec3 log_scale;     // ln s'
     vec3 narrower;      // (s / s')^2

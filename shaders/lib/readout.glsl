@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Splats that a rolling shutter sees, with LENSES_ROLLING: the time of a splat's row, and its image then.
-// src/reference/readout.h has the formulas. Times are those of scene::middle_motion. Needs lens.glsl.
+// check/reference/readout.h has the formulas. Times are those of scene::middle_motion. Needs lens.glsl.
 #ifndef EWA_LIB_READOUT
 #define EWA_LIB_READOUT
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The gradient by a splat's place that a rolling shutter sees. The point moves the time of its row, and with it the camera.
-// src/reference/readout.h has the formulas. Needs readout.glsl and lens_gradient.glsl.
+// check/reference/readout.h has the formulas. Needs readout.glsl and lens_gradient.glsl.
 #ifndef EWA_LIB_READOUT_GRADIENT
 #define EWA_LIB_READOUT_GRADIENT
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The nearest triangle on a ray, or whether there is one. Nodes have two children; the nearer is
 // visited first, the farther one is pushed on a stack that is deep enough for every hierarchy
-// (mesh/hierarchy.h). CPU reference: src/reference/tracing.cpp.
+// (mesh/hierarchy.h). CPU reference: check/reference/tracing.cpp.
 #ifndef EWA_LIB_TRAVERSAL
 #define EWA_LIB_TRAVERSAL
 #include "lib/mesh.glsl"

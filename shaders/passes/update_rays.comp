@@ -49,7 +49,7 @@ void sum_ray_slots(uint first, uint count, out vec4 sum[RAY_SLOT_TEXELS]) {
     }
 }
 
-// From the gradient of the wider splat to that of the splat: src/reference/rays.h has the formulas. by_opacity: dL/d(ln(c opacity)).
+// From the gradient of the wider splat to that of the splat: check/reference/rays.h has the formulas. by_opacity: dL/d(ln(c opacity)).
 // by_mean: in the axes of r.eye.
 void narrow(RayShape r, Widening w, float by_opacity, inout vec3 by_log_scale, inout vec3 torque, inout vec3 by_mean) {
     // What the formulas subtract nearly cancels for a splat that is far wider than a pixel. Then they are written by the share of the

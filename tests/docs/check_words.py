@@ -3,7 +3,7 @@
 """Checks documents and comments: links, anchors, paths of the source tree, long sentences, and words that the glossary replaces.
 Checks identifiers for words that mean several things.
 
-    tests/docs/check_words.py [FILE...]     Markdown files and sources; without any: all documents, src, include and shaders
+    tests/docs/check_words.py [FILE...]     Markdown files and sources; without any: all documents, src, check, include and shaders
     tests/docs/check_words.py --random N    prints N random paragraphs, for a reader to judge
 
 Code does not count as words. Exit status 1 if a check fails.
@@ -24,17 +24,17 @@ BANNED = {  # pattern: what to write
 BANNED_IN_COMMENTS = {r"told": "printed, sent, or known", r"(?<![^.!?:] )Of(?= )": "the subject's name first"}
 # Words of identifiers: the word, the folders where it misleads, and what to write.
 BANNED_IN_IDENTIFIERS = (
-    (r"told|heard|twins?|legs?", ("src", "include", "shaders", "python/bindings"), "printed, sent, found, or received"),
-    (r"pictures?", ("src/gpu", "src/image", "src/operators", "src/passes", "src/pipeline", "src/portions", "src/reference", "src/train", "shaders"),
+    (r"told|heard|twins?|legs?", ("src", "check", "include", "shaders", "python/bindings"), "printed, sent, found, or received"),
+    (r"pictures?", ("src/gpu", "src/image", "src/operators", "src/passes", "src/pipeline", "src/portions", "src/train", "check/reference", "shaders"),
      "image, render, or part of a view"),
 )
 SUFFIXES = {".h", ".cpp", ".glsl", ".comp"}
-SOURCES = ("src", "include", "shaders", "python/bindings")
+SOURCES = ("src", "check", "include", "shaders", "python/bindings")
 WORD = re.compile(r"\w+(?:[-'’.,]\w+)*")
 NO_IDENTIFIER = re.compile(r'\'\\?.\'|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|//[^\n]*|/\*.*?\*/', re.S)
 IDENTIFIER = re.compile(r"\b[A-Za-z_]\w*")
 WORD_OF_IDENTIFIER = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
-SOURCE_PATH = re.compile(r"`((?:src|shaders|tests|include|scripts|cmake|docs|examples|scenes)/[\w./-]*)`")
+SOURCE_PATH = re.compile(r"`((?:src|check|shaders|tests|include|scripts|cmake|docs|examples|scenes)/[\w./-]*)`")
 
 
 def slug(heading):

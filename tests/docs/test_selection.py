@@ -29,6 +29,8 @@ DOCUMENT = """
 | `src/passes/` | binds `passes.h` | 50 | `gpu` |
 | `src/io/splats/` | a | 50 | `core` |
 | `src/capture/` | a | 50 | `io` |
+| `check/reference/` | a | 50 | `core` |
+| `check/bench/` | a | 50 | `check/reference`, `gpu` |
 | `src/cli/` | a | 100 | everything |
 | `python/bindings/` | a | 50 | everything but `cli` |
 | `python/ewa/` | a | 50 | `ewa._native` |
@@ -53,6 +55,8 @@ class Selection(unittest.TestCase):
         self.assertEqual(self.modules["src/passes"], {"src/gpu", "shaders/passes"})
         self.assertIn("src/capture", self.modules["python/bindings"])
         self.assertNotIn("src/cli", self.modules["python/bindings"])
+        self.assertEqual(self.modules["check/bench"], {"check/reference", "src/gpu"})
+        self.assertNotIn("check/bench", self.modules["src/cli"])
         self.assertEqual(self.modules["python/ewa/gsplat"], {"python/ewa"})
         self.assertEqual(select.module_of("python/ewa/gsplat/a.py", self.modules), "python/ewa/gsplat")
         self.assertIsNone(select.module_of("docs/a.md", self.modules))

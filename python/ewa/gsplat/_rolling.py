@@ -5,7 +5,7 @@ A splat X is at y(t) = exp(t turn) R X + T + t shift in the camera at the share 
 pixel is at the time of its own row: t = first + slope pixel(y(t)). With its velocity v = dy/dt and
 r = d(slope pixel)/dy, a step dy of the splat moves its pixel as (I + k v r^T) dy does for a camera
 at rest, k = 1 / (1 - r v). So a camera at rest shows the splat at y, sheared by that matrix, as the
-rolling shutter does. src/reference/readout.h has the same formulas.
+rolling shutter does. check/reference/readout.h has the same formulas.
 """
 
 from enum import IntEnum
