@@ -50,14 +50,17 @@ std::vector<std::string> options_given(const CLI::App& app) {
     return words;
 }
 
-/// Returns the exit status of ewa-bench, which is beside this program.
-int run_ewa_bench(std::vector<std::string> arguments) {
+/// The program beside this one. Throws RunError if it is not there.
+fs::path ewa_bench() {
     const fs::path program = core::own_program().replace_filename("ewa-bench");
     if (!core::is_file(program))
-        throw RunError(program.string() +
-                       ", which measures, is missing; put it there: it comes with ewa, and " +
-                       "scripts/build makes it");
-    arguments.insert(arguments.begin(), program.string());
+        throw RunError(program.string() + ": is missing; install it there, or make it with scripts/build");
+    return program;
+}
+
+/// Returns its exit status.
+int run_ewa_bench(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), ewa_bench().string());
     return run_in_front(arguments);
 }
 
@@ -74,15 +77,11 @@ int run_stability(const BenchArguments& arguments, std::vector<std::string> word
     return run_ewa_bench(std::move(words));
 }
 
-struct Trained {
-    report::WorkSeries curve;
-    Gaussians gaussians;
-};
-
 /// Trains with one strategy from the points of the dataset. Evaluates held-out views several times; that time
-/// does not count.
-Trained train(const std::shared_ptr<gpu::Device>& device, const Dataset& dataset, const Split& split,
-              const std::string& name, Strategy strategy, int steps) {
+/// does not count. gaussians: becomes the result.
+report::WorkSeries train(const std::shared_ptr<gpu::Device>& device, const Dataset& dataset,
+                         const Split& split, const std::string& name, Strategy strategy, int steps,
+                         Gaussians& gaussians) {
     TrainOptions options;
     options.steps = steps;
     options.strategy = strategy;
@@ -91,22 +90,22 @@ Trained train(const std::shared_ptr<gpu::Device>& device, const Dataset& dataset
     options = resolve(options, dataset, split.train);
     Gaussians start = gaussians_from_points(dataset.points, options.sh_degree);
     Trainer trainer(device, dataset, split.train, start, options);
-    Trained result{{name, true, {}}, {}};
+    report::WorkSeries curve{name, true, {}};
     const int every = std::max(1, steps / kEvaluations);
     Progress progress("trained with " + name, steps, "steps", false);
     while (trainer.steps_done() < steps) {
         const StepReport report = trainer.step();
         progress.update(report.step);
         if (report.step % every != 0 && report.step != steps) continue;
-        result.gaussians = trainer.gaussians();
-        const double psnr = evaluate(device, result.gaussians, dataset, split.test, options.render).psnr;
-        result.curve.points.push_back({fmt::format("step {}", report.step), report.seconds, psnr, 0});
+        gaussians = trainer.gaussians();
+        const double psnr = evaluate(device, gaussians, dataset, split.test, options.render).psnr;
+        curve.points.push_back({fmt::format("step {}", report.step), report.seconds, psnr, 0});
     }
-    const report::WorkPoint& last = result.curve.points.back();
+    const report::WorkPoint& last = curve.points.back();
     progress.note(fmt::format("{:<24} {:<14} {:8.2f} s  {:.2f} dB held out, {} splats of SH degree {}",
-                              "training", name, last.time, last.error, result.gaussians.size(),
-                              result.gaussians.sh_degree));
-    return result;
+                              "training", name, last.time, last.error, gaussians.size(),
+                              gaussians.sh_degree));
+    return curve;
 }
 
 /// Held-out PSNR against run time of training with each strategy. gaussians: becomes the result of the last.
@@ -118,9 +117,7 @@ report::WorkPrecision training_diagram(const std::shared_ptr<gpu::Device>& devic
         {"none", Strategy::none}, {"mcmc", Strategy::mcmc}, {"adc", Strategy::adc}};
     for (const auto& [name, strategy] : strategies) {
         if (steps == 0) break;
-        Trained trained = train(device, dataset, split, name, strategy, steps);
-        diagram.series.push_back(std::move(trained.curve));
-        gaussians = std::move(trained.gaussians);
+        diagram.series.push_back(train(device, dataset, split, name, strategy, steps, gaussians));
     }
     diagram.notes.push_back(
         fmt::format("{} steps of each strategy, at most {} splats, on {}; evaluation does not count.", steps,
@@ -172,9 +169,9 @@ int run_accuracy(const BenchArguments& arguments) {
                            {"--svg's diagram of training", training_svg(arguments)},
                            {"--json", arguments.options.json}},
                           {{"--splats", arguments.splats}});
+    ewa_bench();  // fails before the training if it is missing
     scene::SceneFile scene;
-    Gaussians given;
-    if (!arguments.splats.empty()) given = load_splats(splat_input(arguments.splats).file);
+    if (!arguments.splats.empty()) scene.gaussians = load_splats(splat_input(arguments.splats).file);
     const DeviceOptions device_options{.selector = arguments.options.device};
     report::WorkPrecision training;
     {
@@ -191,10 +188,10 @@ int run_accuracy(const BenchArguments& arguments) {
             throw InputError("--accuracy measures pinholes at rest only; take --lens undistort");
         const auto device = open_device(device_options);
         fmt::print("device: {}\n", device_info(*device).name);
-        training = training_diagram(device, dataset, split, arguments.steps, scene.gaussians);
+        Gaussians trained;
+        training = training_diagram(device, dataset, split, arguments.steps, trained);
+        if (arguments.splats.empty()) scene.gaussians = std::move(trained);
     }
-    if (!arguments.splats.empty()) scene.gaussians = std::move(given);
-
     const core::TemporaryFolder folder("ewa-bench-");
     const fs::path file = folder.path() / "scene", results = folder.path() / "rendering.json";
     scene::write_scene_file(file, scene);
