@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <numeric>
 #include <utility>
 
@@ -20,6 +21,12 @@ constexpr size_t kPassedPiece = size_t(4) << 20;  // bytes
 uint32_t checksum_of(std::span<const std::byte> bytes) {
     if (bytes.empty()) return 0;  // zlib restarts the sum for a null pointer
     return uint32_t(crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point begin) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
 }
 
 }  // namespace
@@ -118,6 +125,22 @@ std::vector<std::byte> from_rank_0(Ranks& ranks, std::span<const std::byte> own)
     in[0] = received;
     ranks.exchange(out, in);
     return received;
+}
+
+std::vector<uint64_t> CountedRanks::gather(std::span<const uint64_t> own) {
+    const auto begin = Clock::now();
+    std::vector<uint64_t> all = ranks_.gather(own);
+    traffic_.waiting += milliseconds_since(begin);
+    return all;
+}
+
+void CountedRanks::exchange(std::span<const std::span<std::byte>> out,
+                            std::span<const std::span<std::byte>> in) {
+    const auto begin = Clock::now();
+    ranks_.exchange(OutParts(out.begin(), out.end()), in);
+    traffic_.exchange += milliseconds_since(begin);
+    for (size_t rank = 0; rank < out.size(); ++rank)
+        if (rank != size_t(ranks_.rank())) traffic_.sent_bytes += out[rank].size();
 }
 
 }  // namespace ewa::portions

@@ -32,4 +32,23 @@ std::vector<std::vector<std::byte>> exchanged(Ranks& ranks, std::vector<std::vec
 /// Bytes of rank 0, on every rank. own: ignored on other ranks. Collective.
 std::vector<std::byte> from_rank_0(Ranks& ranks, std::span<const std::byte> own);
 
+/// What this rank has exchanged with others so far.
+struct Traffic {
+    uint64_t sent_bytes = 0;
+    double exchange = 0, waiting = 0;  // ms
+};
+
+/// Functions of ranks that count what they do.
+class CountedRanks {
+  public:
+    explicit CountedRanks(Ranks& ranks) : ranks_(ranks) {}
+    std::vector<uint64_t> gather(std::span<const uint64_t> own);
+    void exchange(std::span<const std::span<std::byte>> out, std::span<const std::span<std::byte>> in);
+    const Traffic& traffic() const { return traffic_; }
+
+  private:
+    Ranks& ranks_;
+    Traffic traffic_;
+};
+
 }  // namespace ewa::portions

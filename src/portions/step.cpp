@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <chrono>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 namespace ewa::portions {
@@ -14,49 +12,6 @@ namespace ewa::portions {
 using namespace pipeline;
 
 namespace {
-
-constexpr uint64_t kRecordBytes = 16 * shared::RECORD_TEXELS;
-
-/// A part of a device buffer on the host: its memory, or a copy.
-class OnHost {
-  public:
-    OnHost(gpu::Buffer& buffer, uint64_t offset, uint64_t bytes) : buffer_(buffer), offset_(offset) {
-        if (bytes == 0) return;
-        if (buffer.readable()) {
-            bytes_ = {buffer.mapped() + offset, bytes};
-            return;
-        }
-        copy_.resize(bytes);
-        bytes_ = copy_;
-    }
-    std::span<std::byte> part(uint64_t offset, uint64_t bytes) const { return bytes_.subspan(offset, bytes); }
-    /// Called before parts are read, and after all parts are written.
-    void read() {
-        if (!copy_.empty()) buffer_.download(std::span<std::byte>(copy_), offset_);
-    }
-    void write() {
-        if (!copy_.empty()) buffer_.upload(std::span<const std::byte>(copy_), offset_);
-    }
-
-  private:
-    gpu::Buffer& buffer_;
-    uint64_t offset_;
-    std::vector<std::byte> copy_;
-    std::span<std::byte> bytes_;
-};
-
-using Clock = std::chrono::steady_clock;
-
-double milliseconds_since(Clock::time_point begin) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
-}
-
-/// An eighth more: the next views are of about this size.
-void make_room(gpu::Device& device, gpu::Buffer& buffer, const char* name, uint64_t bytes) {
-    if (buffer && buffer.bytes() >= bytes) return;
-    buffer = gpu::Buffer();  // free the old one first
-    buffer = gpu::Buffer(device, name, bytes + bytes / 8);
-}
 
 shared::Counts run(const StepParts& parts, gpu::Recording& recording) {
     parts.frame.record_counts(recording);
@@ -98,10 +53,6 @@ void add_losses(const LossWeights& weights, std::span<const PartLoss> losses, si
     }
 }
 
-uint64_t sum_of(std::span<const uint64_t> values) {
-    return std::accumulate(values.begin(), values.end(), uint64_t(0));
-}
-
 }  // namespace
 
 /// The views of a step, each in so many bands.
@@ -119,35 +70,8 @@ struct Step::ViewPart {
     FrameRequest request;  // without splats and instances
 };
 
-/// Parts of views that are drawn at one time: at most one by each rank. Part `first` + k is drawn by rank k.
-struct Step::Turn {
-    size_t first, view_parts;
-    std::vector<uint64_t> listed{};  // by this rank, of each part
-    std::vector<uint64_t> of_own{};  // listed by each rank, of the part that this rank draws
-    bool draws(int rank) const { return size_t(rank) < view_parts; }
-    uint64_t own() const { return sum_of(of_own); }
-};
-
-std::vector<uint64_t> Step::gather(std::span<const uint64_t> own) {
-    const auto begin = Clock::now();
-    std::vector<uint64_t> all = portions_.ranks().gather(own);
-    traffic_.waiting += milliseconds_since(begin);
-    return all;
-}
-
-void Step::exchange(std::span<const std::span<const std::byte>> out,
-                    std::span<const std::span<std::byte>> in) {
-    const auto begin = Clock::now();
-    portions_.ranks().exchange(out, in);
-    traffic_.exchange += milliseconds_since(begin);
-    for (size_t rank = 0; rank < out.size(); ++rank)
-        if (rank != size_t(portions_.ranks().rank())) traffic_.sent_bytes += out[rank].size();
-}
-
 void Step::reserve(const StepParts& parts, FrameRequest request, uint64_t splats) {
-    // Where all stays on the device, the frame has room for a portion and for a list.
-    const uint64_t least = portions_.streamed() ? 1 : portions_.largest();
-    request.splats = uint32_t(std::max(least, splats));
+    request.splats = uint32_t(lists_->room(splats, portions_.largest()));
     request.instances = parts.instance_capacity;
     parts.frame.reserve(parts.cache.device(), parts.cache.config(), request);
 }
@@ -165,15 +89,15 @@ Step::ViewPart Step::part_of(const StepParts& parts, const Views& of, size_t num
 /// Lists what some parts of views show of this rank's portions, so that each is needed once.
 void Step::list(const StepParts& parts, const Views& of, size_t first, size_t view_parts) {
     gpu::Device& device = parts.cache.device();
-    const bool streamed = portions_.streamed();
+    ViewBuffers& buffers = buffers_.portion;
+    std::vector<Seen>& all = buffers_.seen;
     portions_.visit(Portions::Need::params, [&](int index, const Model& model) {
         const size_t portion = size_t(index);
-        buffers_.list_indices = portions_.take_list_indices();
-        buffers_.reserve(device, model.splats, uint32_t(of.views.size()), of.bands,
-                         uint32_t(streamed ? model.splats : view_parts * model.splats));
+        buffers.list_indices = std::move(portions_.holder().indices());
+        buffers.reserve(device, model.splats, uint32_t(of.views.size()), of.bands,
+                        uint32_t(lists_->records(model.splats, view_parts)));
         uint64_t next_index = 0, records = 0;
-        if (first > 0)
-            next_index = seen_[first - 1].first_indices[portion] + seen_[first - 1].listed[portion];
+        if (first > 0) next_index = all[first - 1].first_indices[portion] + all[first - 1].listed[portion];
         size_t projected = of.views.size();
         for (size_t number = first; number < first + view_parts; ++number) {
             const ViewPart view_part = part_of(parts, of, number);
@@ -182,51 +106,43 @@ void Step::list(const StepParts& parts, const Views& of, size_t first, size_t vi
             projected = view_part.view;
             gpu::Recording recording(device.limits());
             const FramePasses on{{recording, parts.cache}, parts.plan, parts.frame, view_part.inputs};
-            on.list(model, buffers_,
+            on.list(model, buffers,
                     {.view = uint32_t(view_part.view),
                      .list = uint32_t(number),
                      .first_index = uint32_t(next_index),
                      .first_record = uint32_t(records)},
                     again);
             const shared::Counts counts = run(parts, recording);
-            Seen& seen = seen_[number];
+            Seen& seen = all[number];
             seen.first_indices[portion] = next_index;
             seen.listed[portion] = counts.scan_total;
             seen.skipped += counts.skipped_nonfinite;
             next_index += counts.scan_total;
-            if (streamed) {
-                seen.records[portion].resize(counts.scan_total * kRecordBytes);
-                portions_.stream(seen.records[portion].size(), [&] {
-                    buffers_.visible.download(std::span<std::byte>(seen.records[portion]));
-                });
-            } else {
-                records += counts.scan_total;
-            }
+            records += lists_->take(buffers_, seen, portion);
         }
-        // A part without a splat draws one that is not visible, which has a list index behind the others.
-        if (!streamed) buffers_.reserve_sums(device, parts.executor, parts.plan, next_index + 1);
-        portions_.keep_list_indices(std::move(buffers_.list_indices));
+        lists_->end_portion(parts.executor, parts.plan, buffers_, next_index);
+        portions_.holder().indices() = std::move(buffers.list_indices);
     });
-    if (streamed) buffers_.visible = {};  // the part that is drawn takes its memory
+    lists_->end_all(buffers_);
 }
 
 /// How many splats each rank lists of some parts of views.
 std::vector<uint64_t> Step::gather_counts(size_t first, size_t view_parts, StepSums& sums) {
     std::vector<uint64_t> counts;
-    for (size_t k = 0; k < view_parts; ++k) counts.push_back(sum_of(seen_[first + k].listed));
-    counts.push_back(seen_[first + view_parts - 1].skipped);
-    std::vector<uint64_t> all = gather(counts);
+    for (size_t k = 0; k < view_parts; ++k) counts.push_back(sum_of(buffers_.seen[first + k].listed));
+    counts.push_back(buffers_.seen[first + view_parts - 1].skipped);
+    std::vector<uint64_t> all = ranks_.gather(counts);
     sums.skipped_nonfinite = 0;
     for (size_t at = view_parts; at < all.size(); at += counts.size()) sums.skipped_nonfinite += all[at];
     return all;
 }
 
 /// listed: of parts from `first` on, as gather_counts() returns it. begin: the first part of the turn.
-Step::Turn Step::turn_of(const std::vector<uint64_t>& listed, size_t first, size_t view_parts,
-                         size_t begin) const {
+Turn Step::turn_of(const std::vector<uint64_t>& listed, size_t first, size_t view_parts, size_t begin) const {
     const size_t ranks = size_t(portions_.ranks().size()), own = size_t(portions_.ranks().rank());
     Turn turn{begin, std::min(ranks, first + view_parts - begin)};
-    for (size_t k = 0; k < turn.view_parts; ++k) turn.listed.push_back(sum_of(seen_[begin + k].listed));
+    for (size_t k = 0; k < turn.view_parts; ++k)
+        turn.listed.push_back(sum_of(buffers_.seen[begin + k].listed));
     for (size_t rank = 0; rank < ranks; ++rank)
         turn.of_own.push_back(turn.draws(int(own)) ? listed[rank * (view_parts + 1) + begin - first + own]
                                                    : 0);
@@ -239,61 +155,28 @@ void Step::send(const StepParts& parts, const Views& of, const Turn& turn) {
     const size_t ranks = size_t(portions_.ranks().size()), own = size_t(portions_.ranks().rank());
     if (turn.draws(int(own))) {
         reserve(parts, part_of(parts, of, turn.first + own).request, turn.own());
-        make_room(parts.cache.device(), own_sums_, "sums of a view's part",
+        make_room(parts.cache.device(), buffers_.own_sums, "sums of a view's part",
                   ViewBuffers::sum_bytes(parts.plan, turn.own() + 1));
     }
-    const bool streamed = portions_.streamed();
-    OnHost on_device(buffers_.visible, 0, streamed ? 0 : sum_of(turn.listed) * kRecordBytes);
-    on_device.read();
-    OnHost list(parts.frame.records, 0, turn.own() * kRecordBytes);
-    std::vector<std::vector<std::byte>> on_host(ranks);
-    std::vector<std::span<const std::byte>> out(ranks);
-    std::vector<std::span<std::byte>> in(ranks);
-    uint64_t from = 0, to = 0;
-    for (size_t rank = 0; rank < ranks; ++rank) {
-        if (rank < turn.view_parts && streamed) {
-            for (std::vector<std::byte>& records : seen_[turn.first + rank].records) {
-                on_host[rank].insert(on_host[rank].end(), records.begin(), records.end());
-                records = {};
-            }
-            out[rank] = on_host[rank];
-        } else if (rank < turn.view_parts) {
-            out[rank] = on_device.part(from, turn.listed[rank] * kRecordBytes);
-        }
-        in[rank] = list.part(to, turn.of_own[rank] * kRecordBytes);
-        from += out[rank].size();
-        to += in[rank].size();
-    }
-    portions_.stream(to, [&] {
-        exchange(out, in);
-        list.write();
+    lists_->send(buffers_, turn, ranks, [&](std::span<const std::span<std::byte>> out) {
+        OnHost list(parts.frame.records, 0, turn.own() * kRecordBytes);
+        portions_.holder().streaming().stream(list.bytes().size(), [&] {
+            ranks_.exchange(out, pieces_of(list.bytes(), turn.of_own, kRecordBytes, ranks));
+            list.write();
+        });
     });
 }
 
 void Step::return_sums(const StepParts& parts, const Turn& turn) {
     if (portions_.alone()) return;
-    const bool streamed = portions_.streamed();
     const size_t ranks = size_t(portions_.ranks().size());
     const uint64_t splat = ViewBuffers::sum_bytes(parts.plan, 1);
-    OnHost drawn(own_sums_, 0, turn.own() * splat);
+    OnHost drawn(buffers_.own_sums, 0, turn.own() * splat);
     drawn.read();
-    OnHost sums(buffers_.sums, streamed ? 0 : seen_[turn.first].first_indices.front() * splat,
-                streamed ? 0 : sum_of(turn.listed) * splat);
-    std::vector<std::span<const std::byte>> out(ranks);
-    std::vector<std::span<std::byte>> in(ranks);
-    uint64_t from = 0, to = 0;
-    for (size_t rank = 0; rank < ranks; ++rank) {
-        out[rank] = drawn.part(from, turn.of_own[rank] * splat);
-        from += out[rank].size();
-        if (rank >= turn.view_parts) continue;
-        std::vector<std::byte>& waiting = seen_[turn.first + rank].sums;
-        if (streamed) waiting.resize(turn.listed[rank] * splat);
-        in[rank] = streamed ? std::span(waiting) : sums.part(to, turn.listed[rank] * splat);
-        to += in[rank].size();
-    }
-    portions_.stream(from, [&] {
-        exchange(out, in);
-        sums.write();
+    lists_->receive(buffers_, turn, ranks, splat, [&](std::span<const std::span<std::byte>> in) {
+        portions_.holder().streaming().stream(drawn.bytes().size(), [&] {
+            ranks_.exchange(pieces_of(drawn.bytes(), turn.of_own, splat, ranks), in);
+        });
     });
 }
 
@@ -304,20 +187,20 @@ shared::Counts Step::draw_own(const StepParts& parts, const ViewPart& view_part,
     const bool alone = portions_.alone();
     const uint64_t listed = turn.own();
     const uint32_t splats = uint32_t(std::max<uint64_t>(listed, 1));
-    const gpu::Buffer& sums = alone ? buffers_.sums : own_sums_;
+    const gpu::Buffer& sums = alone ? buffers_.portion.sums : buffers_.own_sums;
     for (;;) {
         reserve(parts, view_part.request, listed);
         gpu::Recording recording(device.limits());
         if (listed == 0)
             recording.fill(parts.frame.records, 0, 0, kRecordBytes);
         else if (alone)
-            recording.copy(buffers_.visible, 0, parts.frame.records, 0, listed * kRecordBytes);
+            recording.copy(buffers_.portion.visible, 0, parts.frame.records, 0, listed * kRecordBytes);
         const FramePasses on{{recording, parts.cache}, parts.plan, parts.frame, view_part.inputs};
         const Sorted sorted = on.draw_list(splats);
         if (view_part.of.record_loss) {
             view_part.of.record_loss(on);
             on.list_backward(splats, sorted, sums,
-                             alone ? uint32_t(seen_[view_part.number].first_indices.front()) : 0);
+                             alone ? uint32_t(buffers_.seen[view_part.number].first_indices.front()) : 0);
         }
         if (largest) {
             recording.fill(*largest, 0, 0, largest->bytes());
@@ -329,14 +212,20 @@ shared::Counts Step::draw_own(const StepParts& parts, const ViewPart& view_part,
     }
 }
 
+/// Lists whole views, at most one for each rank, and sends the lists to the ranks that draw them.
+Turn Step::list_views(const StepParts& parts, const Views& of) {
+    StepSums sums;
+    buffers_.seen.assign(of.views.size(), Seen(size_t(portions_.count())));
+    list(parts, of, 0, of.views.size());
+    const Turn turn = turn_of(gather_counts(0, of.views.size(), sums), 0, of.views.size(), 0);
+    send(parts, of, turn);
+    return turn;
+}
+
 bool Step::draw_views(const StepParts& parts, std::span<const StepView> views) {
     const Views of{views, 1};
     const int own = portions_.ranks().rank();
-    StepSums sums;
-    seen_.assign(views.size(), Seen(size_t(portions_.count())));
-    list(parts, of, 0, views.size());
-    const Turn turn = turn_of(gather_counts(0, views.size(), sums), 0, views.size(), 0);
-    send(parts, of, turn);
+    const Turn turn = list_views(parts, of);
     if (turn.draws(own)) draw_own(parts, part_of(parts, of, size_t(own)), turn);
     return turn.draws(own);
 }
@@ -351,36 +240,24 @@ std::vector<float> Step::weights_of(const StepParts& parts, const Views& of, con
         draw_own(parts, part_of(parts, of, own), turn, &largest);
         if (!drawn.empty()) drawn = largest.download<float>(drawn.size());
     }
-    std::vector<std::span<const std::byte>> out(ranks);
-    std::vector<std::span<std::byte>> in(ranks);
-    size_t from = 0, to = 0;
-    for (size_t rank = 0; rank < ranks; ++rank) {
-        out[rank] = std::as_bytes(std::span(drawn).subspan(from, turn.of_own[rank]));
-        from += turn.of_own[rank];
-        if (!turn.draws(int(rank))) continue;
-        in[rank] = std::as_writable_bytes(std::span(listed).subspan(to, turn.listed[rank]));
-        to += turn.listed[rank];
-    }
-    exchange(out, in);
+    ranks_.exchange(pieces_of(std::as_writable_bytes(std::span(drawn)), turn.of_own, sizeof(float), ranks),
+                    pieces_of(std::as_writable_bytes(std::span(listed)), turn.listed, sizeof(float), ranks));
     return listed;
 }
 
 void Step::raise_weights(const StepParts& parts, std::span<const StepView> views,
                          std::vector<std::vector<float>>& largest) {
     const Views of{views, 1};
-    StepSums sums;
-    seen_.assign(views.size(), Seen(size_t(portions_.count())));
-    list(parts, of, 0, views.size());
-    const Turn turn = turn_of(gather_counts(0, views.size(), sums), 0, views.size(), 0);
-    send(parts, of, turn);
+    const Turn turn = list_views(parts, of);
     const std::vector<float> listed = weights_of(parts, of, turn);
     portions_.visit(Portions::Need::state, [&](int portion, const Model& model) {
-        const auto indices = portions_.take_list_indices().download<uint32_t>(views.size() * model.splats);
+        const gpu::Buffer listed_indices = std::move(portions_.holder().indices());
+        const auto indices = listed_indices.download<uint32_t>(views.size() * model.splats);
         std::vector<float>& raised = largest[size_t(portion)];
         raised.resize(model.splats);
         size_t before = 0;
         for (size_t view = 0; view < views.size(); ++view) {
-            const Seen& seen = seen_[view];
+            const Seen& seen = buffers_.seen[view];
             const float* weights =
                 listed.data() + before + sum_of(std::span(seen.listed).first(size_t(portion)));
             before += sum_of(seen.listed);
@@ -391,7 +268,7 @@ void Step::raise_weights(const StepParts& parts, std::span<const StepView> views
             }
         }
     });
-    seen_.clear();
+    buffers_.seen.clear();
 }
 
 StepSums Step::draw(const StepParts& parts, std::span<const StepView> views) {
@@ -401,9 +278,9 @@ StepSums Step::draw(const StepParts& parts, std::span<const StepView> views) {
     std::vector<PartLoss> losses(views.size() * bands_);
     lenses_ = 0;
     for (const StepView& view : views) lenses_ = std::max(lenses_, view.inputs.camera.lenses);
-    seen_.assign(losses.size(), Seen(size_t(portions_.count())));
+    buffers_.seen.assign(losses.size(), Seen(size_t(portions_.count())));
     // Lists on the device are drawn at once. In host memory those of all parts wait.
-    const size_t round = portions_.streamed() ? losses.size() : ranks;
+    const size_t round = lists_->at_once(losses.size(), ranks);
     for (size_t first = 0; first < losses.size(); first += round) {
         const size_t view_parts = std::min(round, losses.size() - first);
         list(parts, of, first, view_parts);
@@ -421,7 +298,7 @@ StepSums Step::draw(const StepParts& parts, std::span<const StepView> views) {
                     std::ranges::copy(view_part.of.learned(), sent.begin() + kLossWords);
             }
             // Waits for the slowest of them.
-            const std::vector<uint64_t> all = gather(sent);
+            const std::vector<uint64_t> all = ranks_.gather(sent);
             return_sums(parts, turn);
             for (size_t k = 0; k < turn.view_parts; ++k) {
                 const auto of_part = std::span(all).subspan(sent.size() * k, sent.size());
@@ -435,48 +312,26 @@ StepSums Step::draw(const StepParts& parts, std::span<const StepView> views) {
     return sums;
 }
 
-/// The sums of a portion, which have waited in host memory.
-void Step::upload_sums(const StepParts& parts, size_t portion) {
-    const uint64_t splat = ViewBuffers::sum_bytes(parts.plan, 1);
-    const Seen& last = seen_.back();
-    buffers_.sums = std::move(own_sums_);
-    make_room(parts.cache.device(), buffers_.sums, "sums of a view's part",
-              (last.first_indices[portion] + last.listed[portion] + 1) * splat);
-    for (const Seen& seen : seen_) {
-        const uint64_t from = sum_of(std::span(seen.listed).first(portion)) * splat,
-                       bytes = seen.listed[portion] * splat;
-        portions_.stream(bytes, [&] {
-            buffers_.sums.upload(std::span<const std::byte>(seen.sums).subspan(from, bytes),
-                                 seen.first_indices[portion] * splat);
-        });
-    }
-}
-
 void Step::update(const StepParts& parts, const Rates& rates, int sh_degree,
                   const std::function<void(const passes::Recorder&, const Model&)>& more, StepSums& sums) {
     std::array<uint64_t, 2> own{};
     const FrameInputs inputs{.camera = {.lenses = lenses_}, .sh_degree = sh_degree};
     portions_.visit(Portions::Need::state, [&](int portion, const Model& model) {
-        buffers_.list_indices = portions_.take_list_indices();
-        if (portions_.streamed()) upload_sums(parts, size_t(portion));
+        buffers_.portion.list_indices = std::move(portions_.holder().indices());
+        lists_->begin_update(buffers_, size_t(portion), ViewBuffers::sum_bytes(parts.plan, 1));
         gpu::Recording recording(parts.cache.device().limits());
         recording.fill(parts.frame.counts, 0, 0, sizeof(shared::Counts));
         const FramePasses on{{recording, parts.cache}, parts.plan, parts.frame, inputs};
-        on.update_views(model, buffers_, rates, bands_);
+        on.update_views(model, buffers_.portion, rates, bands_);
         if (more) more(on, model);
         const shared::Counts counts = run(parts, recording);
         own[0] += counts.dropped_updates;
         own[1] += counts.limited_steps;
         portions_.changed();
-        if (portions_.streamed()) {
-            buffers_.list_indices = {};
-            own_sums_ = std::move(buffers_.sums);
-        } else {
-            portions_.keep_list_indices(std::move(buffers_.list_indices));
-        }
+        portions_.holder().indices() = lists_->end_update(buffers_);
     });
-    seen_.clear();
-    const std::vector<uint64_t> all = gather(own);
+    buffers_.seen.clear();
+    const std::vector<uint64_t> all = ranks_.gather(own);
     for (size_t i = 0; i < all.size(); i += 2) {
         sums.dropped_updates += all[i];
         sums.limited_steps += all[i + 1];

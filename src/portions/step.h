@@ -9,10 +9,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <vector>
 
-#include "pipeline/views.h"
+#include "portions/collect.h"
 #include "portions/portions.h"
 
 namespace ewa::portions {
@@ -48,16 +49,14 @@ struct StepParts {
     size_t learned = 0;               // words that ranks learn of a view
 };
 
-/// What this rank has exchanged with others so far.
-struct Traffic {
-    uint64_t sent_bytes = 0;
-    double exchange = 0, waiting = 0;  // ms
-};
-
 class Step {
   public:
     /// bands: of each view. A view needs a tile row for each.
-    Step(Portions& portions, int bands) : portions_(portions), bands_(uint32_t(bands)) {}
+    Step(Portions& portions, int bands)
+        : portions_(portions),
+          ranks_(portions.ranks()),
+          bands_(uint32_t(bands)),
+          lists_(portions.holder().make_lists()) {}
 
     /// Draws all views and leaves the sums of their gradients. Collective, as all that follows.
     StepSums draw(const StepParts& parts, std::span<const StepView> views);
@@ -75,26 +74,14 @@ class Step {
     void raise_weights(const StepParts& parts, std::span<const StepView> views,
                        std::vector<std::vector<float>>& largest);
     /// Frees what a step holds on the device besides the portions.
-    void free_buffers() { buffers_ = {}, own_sums_ = {}; }
+    void free_buffers() { buffers_ = {}; }
 
-    const Traffic& traffic() const { return traffic_; }
+    const Traffic& traffic() const { return ranks_.traffic(); }
 
   private:
-    /// What this rank's portions list of a part of a view.
-    struct Seen {
-        // The listed splats of each portion, and the list index of the first one.
-        std::vector<uint64_t> listed, first_indices;
-        std::vector<std::vector<std::byte>> records;  // of portions that leave the device
-        std::vector<std::byte> sums;                  // for such portions, one after another
-        uint64_t skipped = 0;                         // splats
-        explicit Seen(size_t portions) : listed(portions), first_indices(portions), records(portions) {}
-    };
     struct ViewPart;
-    struct Turn;
     struct Views;
     static ViewPart part_of(const StepParts& parts, const Views& of, size_t number);
-    std::vector<uint64_t> gather(std::span<const uint64_t> own);
-    void exchange(std::span<const std::span<const std::byte>> out, std::span<const std::span<std::byte>> in);
     void reserve(const StepParts& parts, pipeline::FrameRequest request, uint64_t splats);
     void list(const StepParts& parts, const Views& of, size_t first, size_t view_parts);
     Turn turn_of(const std::vector<uint64_t>& listed, size_t first, size_t view_parts, size_t begin) const;
@@ -104,15 +91,14 @@ class Step {
                             const gpu::Buffer* largest = nullptr);
     std::vector<float> weights_of(const StepParts& parts, const Views& of, const Turn& turn);
     void return_sums(const StepParts& parts, const Turn& turn);
-    void upload_sums(const StepParts& parts, size_t portion);
+    Turn list_views(const StepParts& parts, const Views& of);
 
     Portions& portions_;
+    CountedRanks ranks_;
     uint32_t bands_;
-    pipeline::ViewBuffers buffers_;  // of a portion
-    gpu::Buffer own_sums_;           // of the part that this rank draws, unless all is in one portion
-    std::vector<Seen> seen_;         // by part of a view
-    uint32_t lenses_ = 0;            // LENSES_*, of the cameras of the step
-    Traffic traffic_;
+    std::unique_ptr<Lists> lists_;
+    StepBuffers buffers_;
+    uint32_t lenses_ = 0;  // LENSES_*, of the cameras of the step
 };
 
 }  // namespace ewa::portions

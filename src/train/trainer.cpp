@@ -3,6 +3,7 @@
 #include "ewa/trainer.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <exception>
@@ -12,10 +13,79 @@
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "gpu/device.h"
+#include "train/fused_steps.h"
 #include "train/needs.h"
-#include "train/training.h"
+#include "train/refinement.h"
+#include "train/step_views.h"
+#include "train/training_parts.h"
+#include "train/training_state.h"
 
 namespace ewa {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double milliseconds(Clock::duration time) {
+    return std::chrono::duration<double, std::milli>(time).count();
+}
+
+}  // namespace
+
+namespace train {
+
+/// A training: its parts, and what they do in a step.
+class Training {
+  public:
+    TrainingParts parts;
+
+    Training(std::shared_ptr<gpu::Device> device, const Dataset& dataset, const std::vector<int>& frames,
+             const Gaussians& ready, double extent, const TrainOptions& options, std::shared_ptr<Ranks> ranks,
+             int portions_of_rank)
+        : parts(std::move(device), dataset, frames, ready, extent, options, std::move(ranks),
+                portions_of_rank),
+          refinement(parts, dataset, frames) {}
+
+    const pipeline::Plan& plan() const { return parts.plan; }
+    portions::Portions& portions() { return parts.portions; }
+    /// An optimisation step, and what the schedule does after it. Collective.
+    StepReport step();
+    /// The parts, once all steps are done.
+    TrainingParts& finished() {
+        fused.finish_all();
+        return parts;
+    }
+
+  private:
+    FusedSteps fused{parts};
+    Refinement refinement;
+};
+
+StepReport Training::step() {
+    const auto start = Clock::now();
+    StepLog& log = parts.log;
+    StepReport& report = log.report;
+    const int first = report.step + 1,
+              last = std::min(report.step + parts.options.batch, parts.options.steps);
+    if (parts.fused())
+        fused.optimise(first);
+    else
+        optimise_several(parts, first, last);
+    const auto optimised = Clock::now();
+    for (int step = first; step <= last; ++step) refinement.after(step);
+    const auto end = Clock::now();
+    report.step = last;
+    report.splats = parts.portions.splats();
+    const portions::Holder& holder = parts.portions.holder();
+    log.most_own_bytes = std::max(log.most_own_bytes, holder.state_bytes(holder.splats()));
+    report.seconds += std::chrono::duration<double>(end - start).count();
+    log.times.steps += last - first + 1;
+    log.times.step += milliseconds(end - start);
+    log.times.refinement += milliseconds(end - optimised);
+    return report;
+}
+
+}  // namespace train
+
 namespace {
 
 /// The length that rates and thresholds are relative to: the extent of the cameras. Cameras in one place (a
@@ -141,19 +211,19 @@ void Trainer::follow() {
                 training_->step();
                 break;
             case Call::state:
-                training_->save(nullptr);
+                train::save(training_->finished(), nullptr);
                 break;
             case Call::restore:
-                training_->restore(nullptr);
+                train::restore(training_->finished(), nullptr);
                 break;
             case Call::gaussians:
-                training_->gaussians();
+                train::gaussians_of(training_->finished());
                 break;
             case Call::render:
-                training_->render({});
+                train::render(training_->finished(), {});
                 break;
             case Call::figures:
-                training_->rank_figures();
+                train::rank_figures(training_->parts);
                 break;
         }
     }
@@ -166,7 +236,7 @@ StepReport Trainer::step() {
     return call(*training_, Call::step).step();
 }
 void Trainer::save(train::StateWriter& to) const {
-    call(*training_, Call::state).save(&to);
+    train::save(call(*training_, Call::state).finished(), &to);
 }
 TrainerState Trainer::state() const {
     train::StateInMemory memory;
@@ -174,74 +244,74 @@ TrainerState Trainer::state() const {
     return std::move(memory.state);
 }
 void Trainer::restore(train::StateReader& from) {
-    training_->check_fits(from);
-    call(*training_, Call::restore).restore(&from);
+    train::check_fits(training_->parts, from);
+    train::restore(call(*training_, Call::restore).finished(), &from);
 }
 void Trainer::restore(const TrainerState& state) {
     train::StateOfMemory memory(state);
     restore(memory);
 }
 Gaussians Trainer::gaussians() const {
-    return call(*training_, Call::gaussians).gaussians();
+    return train::gaussians_of(call(*training_, Call::gaussians).finished());
 }
 std::vector<Image> Trainer::render(std::span<const Camera> cameras) const {
     if (training_->plan().points())
         throw InputError("a trainer of points does not draw pictures: a Renderer of its splats does");
-    return call(*training_, Call::render).render(cameras);
+    return train::render(call(*training_, Call::render).finished(), cameras);
 }
 std::vector<RankFigures> Trainer::rank_figures() const {
     if (training_->portions().ranks().size() == 1) return {};
-    return call(*training_, Call::figures).rank_figures();
+    return train::rank_figures(call(*training_, Call::figures).parts);
 }
 std::optional<ChunkFigures> Trainer::chunk_figures() const {
-    return training_->chunk_figures();
+    return train::chunk_figures(training_->parts);
 }
 std::vector<Exposure> Trainer::exposures() const {
-    training_->finish_all();
+    training_->finished();
     std::vector<Exposure> affine;
     if (training_->plan().appearance != AppearanceModel::affine) return affine;
-    for (const Appearance& appearance : training_->learned().appearances.download())
+    for (const Appearance& appearance : training_->parts.learned.appearances.download())
         affine.push_back(std::get<Exposure>(appearance));
     return affine;
 }
 std::vector<Appearance> Trainer::appearances() const {
-    training_->finish_all();
-    return training_->learned().appearances.download();
+    return training_->finished().learned.appearances.download();
 }
 std::shared_ptr<const SkyMap> Trainer::sky() const {
-    training_->finish_all();
+    training_->finished();
     if (!training_->plan().sky) return nullptr;
-    return std::make_shared<const SkyMap>(training_->learned().sky.download());
+    return std::make_shared<const SkyMap>(training_->parts.learned.sky.download());
 }
 std::vector<CameraMotion> Trainer::camera_motions() const {
-    training_->finish_all();
-    return training_->plan().motion ? training_->learned().motions.download() : std::vector<CameraMotion>();
+    training_->finished();
+    return training_->plan().motion ? training_->parts.learned.motions.download()
+                                    : std::vector<CameraMotion>();
 }
 uint32_t Trainer::splats() const {
     return training_->portions().splats();
 }
 uint32_t Trainer::max_splats() const {
-    return training_->options().max_splats;
+    return training_->parts.options.max_splats;
 }
 size_t Trainer::images_on_disk() const {
-    return training_->images_on_disk();
+    return training_->parts.images.full().on_disk();
 }
 int Trainer::steps_done() const {
-    return training_->log().report.step;
+    return training_->parts.log.report.step;
 }
 StepReport Trainer::report() const {
-    training_->finish_all();
-    return training_->log().report;
+    training_->finished();
+    return training_->parts.log.report;
 }
 double Trainer::extent() const {
-    return training_->extent();
+    return training_->parts.extent;
 }
 std::vector<PlanLine> Trainer::plan() const {
     const portions::Portions& portions = training_->portions();
     return pipeline::describe(training_->plan(), portions.sh_degree(), portions.splats());
 }
 StepTimes Trainer::step_times() const {
-    return training_->log().means();
+    return training_->parts.log.means();
 }
 
 }  // namespace ewa

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a training joins of all portions on rank 0, and what it divides among them.
+#include "train/training_state.h"
+
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -8,8 +9,9 @@
 #include <utility>
 
 #include "ewa/error.h"
+#include "pipeline/image_reader.h"
 #include "portions/collect.h"
-#include "train/training.h"
+#include "train/step_views.h"
 
 namespace ewa::train {
 
@@ -38,24 +40,40 @@ std::vector<Image> joined_images(Ranks& ranks, const Image& own, std::span<const
     return images;
 }
 
-}  // namespace
-
-Training::~Training() {
-    if (options_.device_memory_bytes > 0) device_->limit_memory(0, {});
+/// The image through the camera of this rank's number; without pixels if there is none.
+Image render_own(TrainingParts& parts, std::span<const Camera> cameras) {
+    std::vector<gpu::Buffer> blocks;
+    for (const Camera& camera : cameras)
+        blocks.push_back(
+            upload_camera(*parts.device, camera, parts.tools.cache.config(), parts.portions.origin()));
+    std::vector<portions::StepView> views;
+    for (size_t i = 0; i < cameras.size(); ++i) {
+        FrameInputs inputs = inputs_of(blocks[i], cameras[i], parts.options.render);
+        inputs.sky = parts.sky();
+        views.push_back(plain_view(parts, inputs));
+    }
+    portions::StepParts drawing = parts.step_parts();
+    drawing.submitted = [] {};
+    if (!parts.several.draw_views(drawing, views)) return {};
+    return ImageReader(parts.tools.frame).image(shared::PLANE_R, 3);
 }
 
-void Training::save(StateWriter* to) {
-    finish_all();
-    const auto learned = learned_.arrays();
-    const bool moved = portions_.origin() != glm::dvec3(0);
+}  // namespace
+
+void save(TrainingParts& parts, StateWriter* to) {
+    const auto learned = parts.learned.arrays();
+    const bool moved = parts.portions.origin() != glm::dvec3(0);
     const auto save_array = [to](const std::string& name, auto&& pass_on) {
         pass_on([=](uint64_t bytes, uint32_t checksum) { to->begin_array(name, bytes, checksum); },
                 [=](std::span<const std::byte> piece) { to->write(piece); });
     };
-    if (to) to->begin({log_.report, portions_.sh_degree()}, portions_.kept().size() + learned.size() + moved);
-    for (const portions::Array array : portions_.kept())
-        save_array(portions::Portions::name_of(array),
-                   [&](const auto& begin, const auto& take) { portions_.pass_on(array, begin, take); });
+    if (to)
+        to->begin({parts.log.report, parts.portions.sh_degree()},
+                  parts.portions.holder().kept().size() + learned.size() + moved);
+    for (const portions::Array array : parts.portions.holder().kept())
+        save_array(portions::name_of(array), [&](const auto& begin, const auto& take) {
+            portions::pass_on(parts.portions.ranks(), parts.portions.holder().download(array), begin, take);
+        });
     if (!to) return;
     const auto save_bytes = [&](const std::string& name, std::span<const std::byte> bytes) {
         save_array(name, [&](const auto& begin, const auto& take) {
@@ -64,27 +82,29 @@ void Training::save(StateWriter* to) {
     };
     for (const LearnedTable::Array& array : learned)
         save_bytes(array.name, array.buffer->download<std::byte>(array.bytes));
-    if (moved) save_bytes("origin", bytes_of(portions_.origin()));
+    if (moved) save_bytes("origin", bytes_of(parts.portions.origin()));
 }
 
-void Training::check_fits(StateReader& from) {
+void check_fits(TrainingParts& parts, StateReader& from) {
     constexpr const char* kMisfit = "the state does not fit this training: ";
     const StateHead& head = from.head();
     const auto& arrays = from.arrays();
     const uint32_t splats = head.report.splats;
-    if (head.sh_degree != portions_.sh_degree() || head.report.step > options_.steps ||
-        splats > options_.max_splats || splats == 0)
+    if (head.sh_degree != parts.portions.sh_degree() || head.report.step > parts.options.steps ||
+        splats > parts.options.max_splats || splats == 0)
         throw InputError(std::string(kMisfit) + "another SH degree, more steps or more splats");
     const bool moved = !arrays.empty() && arrays.back().name == "origin";
     glm::dvec3 origin(0);
     if (moved && arrays.back().bytes == sizeof(origin))
         from.read(arrays.size() - 1, 0, std::as_writable_bytes(std::span(&origin, 1)));
-    if (origin != portions_.origin())
+    if (origin != parts.portions.origin())
         throw InputError(std::string(kMisfit) + "its means are relative to another origin");
     std::vector<StateReader::Array> expected;
-    for (const portions::Array array : portions_.kept())
-        expected.push_back({portions::Portions::name_of(array), portions_.bytes_of(array, splats)});
-    for (const LearnedTable::Array& array : learned_.arrays()) expected.push_back({array.name, array.bytes});
+    for (const portions::Array array : parts.portions.holder().kept())
+        expected.push_back(
+            {portions::name_of(array), portions::bytes_of(array, splats, parts.portions.sh_degree())});
+    for (const LearnedTable::Array& array : parts.learned.arrays())
+        expected.push_back({array.name, array.bytes});
     if (arrays.size() != expected.size() + moved)
         throw InputError(std::string(kMisfit) + "it is of another strategy or has moments of other bits");
     for (size_t i = 0; i < expected.size(); ++i)
@@ -93,61 +113,67 @@ void Training::check_fits(StateReader& from) {
                              " splats");
 }
 
-void Training::restore(StateReader* from) {
-    finish_all();
+void restore(TrainingParts& parts, StateReader* from) {
     StepReport report;
     if (from) report = from->head().report;
-    const auto sent = portions_.sent(std::as_bytes(std::span(&report, 1)));
+    const auto sent = portions::from_rank_0(parts.portions.ranks(), std::as_bytes(std::span(&report, 1)));
     std::memcpy(&report, sent.data(), sizeof(report));
-    portions_.clear(report.splats);
+    parts.portions.clear(report.splats);
     size_t read = 0;  // arrays
-    for (const portions::Array array : portions_.kept()) {
-        portions_.hand_out(
-            array, [&](uint64_t offset, std::span<std::byte> into) { from->read(read, offset, into); });
+    for (const portions::Array array : parts.portions.holder().kept()) {
+        std::vector<uint64_t> sizes;
+        for (int p = 0; p < parts.portions.all(); ++p)
+            sizes.push_back(
+                portions::bytes_of(array, portions::range_of(report.splats, p, parts.portions.all()).splats,
+                                   parts.portions.sh_degree()));
+        portions::hand_out(
+            parts.portions.ranks(), sizes,
+            [&](uint64_t offset, std::span<std::byte> into) { from->read(read, offset, into); },
+            [&](size_t part, std::vector<std::byte> bytes) {
+                parts.portions.holder().give(int(part) - parts.portions.first(), array, std::move(bytes));
+            });
         ++read;
     }
-    for (const LearnedTable::Array& array : learned_.arrays()) {
+    for (const LearnedTable::Array& array : parts.learned.arrays()) {
         std::vector<std::byte> bytes(from ? array.bytes : 0);
         if (from) from->read(read++, 0, bytes);
-        array.buffer->upload(std::span<const std::byte>(portions_.sent(bytes)));
+        array.buffer->upload(
+            std::span<const std::byte>(portions::from_rank_0(parts.portions.ranks(), bytes)));
     }
-    log_.report = report;
-    if (!portions_.streamed())
-        tools_.instance_capacity = std::max(tools_.instance_capacity, first_capacity(report.splats));
+    parts.log.report = report;
+    parts.tools.expect(report.splats);
 }
 
-Gaussians Training::gaussians() {
-    finish_all();
-    if (portions_.streamed())
-        tools_.frame = {};  // the caller may draw the splats: the next step makes another
-    Gaussians gaussians = portions_.gaussians();
-    gaussians.density = plan_.kernel == Footprint::density;
+Gaussians gaussians_of(TrainingParts& parts) {
+    parts.tools.leave_room();  // the caller may draw the splats
+    Gaussians gaussians = parts.portions.gaussians();
+    gaussians.density = parts.plan.kernel == Footprint::density;
     return gaussians;
 }
 
-std::vector<Image> Training::render(std::span<const Camera> asked) {
-    finish_all();
+std::vector<Image> render(TrainingParts& parts, std::span<const Camera> asked) {
     static_assert(std::is_trivially_copyable_v<Camera>);
-    const auto sent = portions_.sent(std::as_bytes(asked));
+    const auto sent = portions::from_rank_0(parts.portions.ranks(), std::as_bytes(asked));
     std::vector<Camera> cameras(sent.size() / sizeof(Camera));
     std::memcpy(cameras.data(), sent.data(), sent.size());
-    Ranks& ranks = portions_.ranks();
+    Ranks& ranks = parts.portions.ranks();
     const auto at_once = size_t(ranks.size());
     std::vector<Image> images;
     for (size_t first = 0; first < cameras.size(); first += at_once) {
         const auto some = std::span(cameras).subspan(first, std::min(at_once, cameras.size() - first));
-        for (Image& image : joined_images(ranks, render_own(some), some)) images.push_back(std::move(image));
+        for (Image& image : joined_images(ranks, render_own(parts, some), some))
+            images.push_back(std::move(image));
     }
     return images;
 }
 
-std::vector<RankFigures> Training::rank_figures() const {
-    const portions::Traffic& traffic = several_.traffic();
-    const double views = std::max(1, log_.times.steps);
+std::vector<RankFigures> rank_figures(const TrainingParts& parts) {
+    const portions::Traffic& traffic = parts.several.traffic();
+    const double views = std::max(1, parts.log.times.steps);
     const std::array<double, 5> own{double(traffic.sent_bytes) / views, traffic.exchange / views,
-                                    traffic.waiting / views, double(log_.most_own_bytes),
-                                    double(peak_device_bytes(*device_))};
-    Ranks& ranks = portions_.ranks();
+                                    traffic.waiting / views, double(parts.log.most_own_bytes),
+                                    double(peak_device_bytes(*parts.device))};
+    Ranks& ranks = parts.portions.ranks();
     const std::vector<uint64_t> all = ranks.gather(std::bit_cast<std::array<uint64_t, 5>>(own));
     std::vector<RankFigures> figures;
     for (size_t i = 0; i < all.size(); i += own.size()) {
@@ -158,12 +184,13 @@ std::vector<RankFigures> Training::rank_figures() const {
     return figures;
 }
 
-std::optional<ChunkFigures> Training::chunk_figures() const {
-    if (!portions_.streamed()) return {};
-    const double steps = std::max(1.0, double(log_.times.steps) / options_.batch);
-    return ChunkFigures{portions_.count(), double(portions_.streamed_bytes()) / steps,
-                        portions_.streaming() / steps, portions_.state_bytes(portions_.splats()),
-                        options_.device_memory_bytes};
+std::optional<ChunkFigures> chunk_figures(const TrainingParts& parts) {
+    if (parts.portions.count() == 1) return {};
+    const double steps = std::max(1.0, double(parts.log.times.steps) / parts.options.batch);
+    return ChunkFigures{parts.portions.count(), double(parts.portions.holder().streaming().bytes) / steps,
+                        parts.portions.holder().streaming().milliseconds / steps,
+                        parts.portions.holder().state_bytes(parts.portions.splats()),
+                        parts.options.device_memory_bytes};
 }
 
 }  // namespace ewa::train

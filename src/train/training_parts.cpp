@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/training.h"
+#include "train/training_parts.h"
 
 #include <algorithm>
-#include <chrono>
-#include <glm/geometric.hpp>
 #include <utility>
 
 #include "ewa/error.h"
@@ -16,12 +14,6 @@ namespace ewa::train {
 using namespace pipeline;
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double milliseconds(Clock::duration time) {
-    return std::chrono::duration<double, std::milli>(time).count();
-}
 
 /// The camera of each frame, from 0: frames whose files have one lens and one size share a camera. If few frames do, as
 /// where each has a calibration of its own, those of one size share it.
@@ -45,20 +37,6 @@ std::vector<uint32_t> cameras_of(const Dataset& dataset, const std::vector<int>&
         if (!lenses || seen.size() * kPhotosPerCamera <= frames.size() || seen.size() == 1) return cameras;
     }
     return {};
-}
-
-/// The middle of the cameras, and the largest distance of one from it. Without end if a camera has parallel rays: its projection is
-/// linear, whatever the size of a splat.
-CameraBall ball_of(const Dataset& dataset, const std::vector<int>& frames) {
-    CameraBall ball;
-    for (const int f : frames)
-        ball.middle += dataset.frames[size_t(f)].camera.position() / double(frames.size());
-    for (const int f : frames) {
-        const Camera& camera = dataset.frames[size_t(f)].camera;
-        if (camera.distortion.lens == Lens::orthographic) ball.radius = double(pipeline::kFarthest);
-        ball.radius = std::max(ball.radius, glm::length(camera.position() - ball.middle));
-    }
-    return ball;
 }
 
 /// Throws InputError where the training needs pinholes, and an image has another lens.
@@ -146,68 +124,77 @@ StepTimes StepLog::means() const {
     return mean;
 }
 
-Training::Training(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
-                   const std::vector<int>& frames, const Gaussians& ready, double extent,
-                   const TrainOptions& options, std::shared_ptr<Ranks> ranks, int portions_of_rank)
-    : device_(std::move(device)),
-      options_(options),
-      schedule_(schedule_for(options, frames.size())),
-      extent_(extent),
-      cameras_(ball_of(dataset, frames)),
-      tools_(*device_),
-      images_(*device_, tools_.cache.config(), dataset, frames, options, ready.origin),
-      plan_(plan_for(plan_request(ready, options, images_.full().any_masked(), frames.size(),
-                                  images_.full().any_cut()))),
-      portions_(*device_, std::move(ranks), ready,
-                {.count = portions_of_rank,
-                 .limit = options.device_memory_bytes,
-                 .moments = plan_.moment_buffers(),
-                 .statistics = plan_.statistics}),
-      several_(portions_, options.bands) {
+TrainingParts::TrainingParts(std::shared_ptr<gpu::Device> on, const Dataset& dataset,
+                             const std::vector<int>& frames, const Gaussians& ready, double extent_of_cameras,
+                             const TrainOptions& resolved, std::shared_ptr<Ranks> ranks, int portions_of_rank)
+    : device(std::move(on)),
+      options(resolved),
+      schedule(schedule_for(options, frames.size())),
+      extent(extent_of_cameras),
+      tools(*device, portions_of_rank > 1),
+      images(*device, tools.cache.config(), dataset, frames, options, ready.origin),
+      plan(plan_for(
+          plan_request(ready, options, images.full().any_masked(), frames.size(), images.full().any_cut()))),
+      portions(*device, std::move(ranks), ready,
+               {.count = portions_of_rank,
+                .limit = options.device_memory_bytes,
+                .moments = plan.moment_buffers(),
+                .statistics = plan.statistics}),
+      several(portions, options.bands) {
     check_lenses(options, dataset, frames);
-    if (options.loss.depth > 0 && !images_.full().any_depths())
+    if (options.loss.depth > 0 && !images.full().any_depths())
         throw InputError(
             "the loss has a term of depth, but no training image has a depth map; they are in depth/ beside "
             "images/, or depth_file_path names them");
-    if (options.loss.sfm_depth > 0 && !images_.full().any_depths())
+    if (options.loss.sfm_depth > 0 && !images.full().any_depths())
         throw InputError(
             "the loss has a term of sfm-depth, but the dataset does not say which point an image shows; "
             "models of COLMAP do");
-    check_bands(options, tools_.cache.config(), images_.lowest());
+    check_bands(options, tools.cache.config(), images.lowest());
     if (options.final_splats > 0)
-        portions::check_portions(std::min(options.final_splats, portions_.splats()), portions_.all());
-    // The first frame says how many there are. With a limit, a capacity for all splats might not fit.
-    tools_.instance_capacity = first_capacity(portions_.streamed() ? 0 : ready.size());
-    if (plan_.appearance != AppearanceModel::none)
-        learned_.appearances =
-            Appearances(*device_, plan_.appearance, cameras_of(dataset, frames), uint32_t(options.batch));
-    if (plan_.appearance == AppearanceModel::ppisp && options.measure_exposures)
-        learned_.appearances.set_exposures(first_exposures(dataset, frames));
-    if (plan_.sky) learned_.sky = LearnedSky(*device_, uint32_t(options.batch));
-    if (plan_.motion) {
+        portions::check_portions(std::min(options.final_splats, portions.splats()), portions.all());
+    tools.expect(ready.size());
+    if (plan.appearance != AppearanceModel::none)
+        learned.appearances =
+            Appearances(*device, plan.appearance, cameras_of(dataset, frames), uint32_t(options.batch));
+    if (plan.appearance == AppearanceModel::ppisp && options.measure_exposures)
+        learned.appearances.set_exposures(first_exposures(dataset, frames));
+    if (plan.sky) learned.sky = LearnedSky(*device, uint32_t(options.batch));
+    if (plan.motion) {
         std::vector<Camera> cameras;
         for (const int index : frames) cameras.push_back(dataset.frames[size_t(index)].camera);
-        learned_.motions = Motions(*device_, motion_bases(cameras, ready, options.refine_focal, extent));
+        learned.motions = Motions(*device, motion_bases(cameras, ready, options.refine_focal, extent));
     }
-    log_.report.splats = portions_.splats();
+    log.report.splats = portions.splats();
 }
 
-StepReport Training::step() {
-    const auto start = Clock::now();
-    StepReport& report = log_.report;
-    const int first = report.step + 1, last = std::min(report.step + options_.batch, options_.steps);
-    optimise(first, last);
-    const auto optimised = Clock::now();
-    for (int step = first; step <= last; ++step) follow_up(step);
-    const auto end = Clock::now();
-    report.step = last;
-    report.splats = portions_.splats();
-    log_.most_own_bytes = std::max(log_.most_own_bytes, portions_.state_bytes(portions_.own_splats()));
-    report.seconds += std::chrono::duration<double>(end - start).count();
-    log_.times.steps += last - first + 1;
-    log_.times.step += milliseconds(end - start);
-    log_.times.refinement += milliseconds(end - optimised);
-    return report;
+TrainingParts::~TrainingParts() {
+    if (options.device_memory_bytes > 0) device->limit_memory(0, {});
+}
+
+FrameRequest TrainingParts::request_of(const CameraUse& camera) const {
+    return {.splats = portions.largest(),
+            .width = camera.width,
+            .height = camera.height,
+            .instances = tools.instance_capacity,
+            .gradients = true,
+            .masks = plan.masks,
+            .appearance = plan.appearance,
+            .overlaid = true,
+            .motion = plan.motion,
+            .readouts = learned.motions.readouts(),
+            .rays = plan.rays(),
+            .loss = plan.loss};
+}
+
+portions::StepParts TrainingParts::step_parts() {
+    return {tools.cache,
+            tools.executor,
+            plan,
+            tools.frame,
+            tools.instance_capacity,
+            [this] { log.add_passes(tools.executor.timings()); },
+            learned.words_of_view()};
 }
 
 }  // namespace ewa::train
