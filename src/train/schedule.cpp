@@ -193,6 +193,27 @@ uint64_t cache_share(const TrainOptions& options, int halvings) {
     return all - smaller;
 }
 
+namespace {
+
+void set_rates(Schedule& s, const TrainOptions& options, size_t photos) {
+    s.means_rate = options.means_rate;
+    s.means_rate_final = options.means_rate_final;
+    s.exposures_rate = options.exposure_rate;
+    s.exposures_rate_final = options.exposure_rate_final;
+    s.poses_rate = options.pose_rate;
+    s.poses_rate_final = options.pose_rate_final;
+    s.skies_rate = options.sky_rate;
+    s.skies_rate_final = options.sky_rate_final;
+    // Published rates are those of values that take a step of Adam with every image. Here they take one with their own, and
+    // Adam divides a gradient that is there in one of n steps by its mean square's root, which is sqrt(n) times smaller.
+    s.cameras_rate = options.appearance_rate;
+    s.appearances_rate = options.appearance_rate * std::sqrt(double(std::min(photos, kMostPhotosOfRate)));
+    s.appearance_warm_up =
+        (options.appearance == AppearanceModel::grid ? kGridWarmUp : kPpispWarmUp) / kFullRun;
+}
+
+}  // namespace
+
 Schedule schedule_for(const TrainOptions& options, size_t photos) {
     const double share = std::min(1.0, options.steps / kFullRun);
     const auto scaled = [&](int steps, int least) {
@@ -242,20 +263,7 @@ Schedule schedule_for(const TrainOptions& options, size_t photos) {
         s.fade_start = std::max(1, int(std::lround((1 - kSettling) * options.steps)));
         s.last_rate = kLastSettling;
     }
-    s.means_rate = options.means_rate;
-    s.means_rate_final = options.means_rate_final;
-    s.exposures_rate = options.exposure_rate;
-    s.exposures_rate_final = options.exposure_rate_final;
-    s.poses_rate = options.pose_rate;
-    s.poses_rate_final = options.pose_rate_final;
-    s.skies_rate = options.sky_rate;
-    s.skies_rate_final = options.sky_rate_final;
-    // Published rates are those of values that take a step of Adam with every image. Here they take one with their own, and
-    // Adam divides a gradient that is there in one of n steps by its mean square's root, which is sqrt(n) times smaller.
-    s.cameras_rate = options.appearance_rate;
-    s.appearances_rate = options.appearance_rate * std::sqrt(double(std::min(photos, kMostPhotosOfRate)));
-    s.appearance_warm_up =
-        (options.appearance == AppearanceModel::grid ? kGridWarmUp : kPpispWarmUp) / kFullRun;
+    set_rates(s, options, photos);
     return s;
 }
 
