@@ -51,10 +51,137 @@ void save(const std::filesystem::path& file, const Rendering& rendering, const B
 
 }  // namespace
 
+/// The splats that are shown, and their renderers.
+class RenderThread::Scene {
+  public:
+    explicit Scene(OpenDevice open) : open_(std::move(open)) {}
+
+    void set(std::shared_ptr<const Gaussians> scene, std::shared_ptr<const Gaussians> coarse) {
+        scene_ = std::move(scene);
+        coarse_ = std::move(coarse);
+        is_up_ = false;
+    }
+    /// Whether the device was not open before.
+    bool open();
+    DeviceInfo device() const { return device_info(*device_); }
+    /// False if there are no splats to draw.
+    bool bring_up();
+    /// Frees everything on the device.
+    void close();
+
+    std::shared_ptr<const RenderedFrame> draw(const RenderRequest& request, uint64_t scene);
+    Image color(const Full& full);
+    std::optional<glm::dvec3> point_at(const Probe& probe);
+
+  private:
+    void upload(bool densities);
+    void fit_to(const Look& look);
+
+    OpenDevice open_;
+    std::shared_ptr<gpu::Device> device_;
+    std::optional<Renderer> renderer_, coarse_renderer_;
+    std::shared_ptr<const Gaussians> scene_, coarse_;
+    bool is_up_ = false;
+    bool densities_are_up_ = false;  // the scene has opacities of Footprint::density
+};
+
+bool RenderThread::Scene::open() {
+    if (device_) return false;
+    renderer_.reset();
+    coarse_renderer_.reset();
+    device_ = open_();
+    return true;
+}
+
+bool RenderThread::Scene::bring_up() {
+    if (scene_ && !is_up_) upload(scene_->density);
+    return renderer_.has_value();
+}
+
+void RenderThread::Scene::close() {
+    renderer_.reset();
+    coarse_renderer_.reset();
+    device_.reset();
+    is_up_ = false;
+}
+
+void RenderThread::Scene::upload(bool densities) {
+    const auto put = [&](const Gaussians& scene, std::optional<Renderer>& renderer) {
+        std::optional<Gaussians> fitted;
+        if (scene.density != densities) fit_opacities(fitted.emplace(scene), densities);
+        const Gaussians& splats = fitted ? *fitted : scene;
+        if (renderer)
+            renderer->replace(splats);
+        else
+            renderer.emplace(device_, splats, RenderOptions{});
+    };
+    is_up_ = false;
+    if (!coarse_) coarse_renderer_.reset();
+    put(*scene_, renderer_);
+    if (coarse_) put(*coarse_, coarse_renderer_);
+    is_up_ = true;
+    densities_are_up_ = densities;
+}
+
+/// Opacities are those of the kernel, so that a scene looks about the same with all kernels.
+void RenderThread::Scene::fit_to(const Look& look) {
+    const bool densities = look.kernel == Footprint::density;
+    if (!look.points && densities != densities_are_up_) upload(densities);
+}
+
+std::shared_ptr<const RenderedFrame> RenderThread::Scene::draw(const RenderRequest& request, uint64_t scene) {
+    const auto start = std::chrono::steady_clock::now();
+    const Look& look = request.look;
+    const Camera camera = downscale(request.camera, request.divisor);
+    fit_to(look);
+    Renderer& renderer = request.coarse && coarse_renderer_ ? *coarse_renderer_ : *renderer_;
+    const DrawOptions options{options_of(look), drawing_for(look.mode), double(look.splat_scale)};
+    auto finished = std::make_shared<RenderedFrame>();
+    finished->request = request;
+    finished->scene = scene;
+    const bool bytes_do = request.file.empty() && (look.mode == Mode::color || look.mode == Mode::ellipsoids);
+    if (bytes_do) {
+        finished->picture = {camera.width, camera.height, renderer.render_bytes(camera, options), 0};
+    } else {
+        const Rendering rendering = renderer.render(camera, options);
+        finished->picture = picture_of(rendering, look.mode);
+        if (!request.file.empty()) save(request.file, rendering, finished->picture, look.mode);
+    }
+    finished->pass_times = renderer.pass_times();
+    finished->skipped_nonfinite = renderer.skipped_nonfinite();
+    finished->splats_drawn = renderer.splats_drawn();
+    finished->device_bytes = device_bytes(*device_);
+    finished->milliseconds =
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    return finished;
+}
+
+std::optional<glm::dvec3> RenderThread::Scene::point_at(const Probe& probe) {
+    const Camera& full = probe.camera;
+    const int divisor =
+        probe.use == PointUse::measure ? 1 : std::max(1, std::min(full.width, full.height) / kProbeSide);
+    const Camera camera = downscale(full, divisor);
+    DrawOptions options{{}, Drawing::median_depth, 1};
+    if (densities_are_up_) options.render.kernel = Footprint::density;
+    const Image depth = renderer_->render(camera, options).median_depth;
+    const int x = std::clamp(int(probe.pixel.x * camera.width / full.width), 0, camera.width - 1);
+    const int y = std::clamp(int(probe.pixel.y * camera.height / full.height), 0, camera.height - 1);
+    if (!(*depth.at(x, y) > 0)) return std::nullopt;
+    return world_point(camera, x + 0.5, y + 0.5, *depth.at(x, y));
+}
+
+Image RenderThread::Scene::color(const Full& full) {
+    fit_to(full.look);
+    const DrawOptions options{options_of(full.look), Drawing::color, double(full.look.splat_scale)};
+    return renderer_->render(full.camera, options).color;
+}
+
 RenderThread::RenderThread(OpenDevice open, std::function<void()> on_news)
-    : open_(std::move(open)),
-      on_news_(std::move(on_news)),
+    : on_news_(std::move(on_news)),
+      scene_(std::make_unique<Scene>(std::move(open))),
       thread_([this](const std::stop_token& stop) { work(stop); }) {}
+
+RenderThread::~RenderThread() = default;
 
 uint64_t RenderThread::set_scene(std::shared_ptr<const Gaussians> gaussians,
                                  std::shared_ptr<const Gaussians> coarse) {
@@ -130,112 +257,30 @@ bool RenderThread::next(const std::stop_token& stop, Work& work) {
     return true;
 }
 
-void RenderThread::prepare(const Work& work) {
-    if (work.scene) {
-        scene_ = work.scene;
-        coarse_ = work.coarse;
-        scene_is_up_ = false;
-    }
-    if (!device_) {
-        renderer_.reset();
-        coarse_renderer_.reset();
-        device_ = open_();
-        report([&](News& news) { news.device = device_info(*device_); });
-    }
-    if (scene_ && !scene_is_up_) upload(scene_->density);
-}
-
-void RenderThread::upload(bool densities) {
-    const auto put = [&](const Gaussians& scene, std::optional<Renderer>& renderer) {
-        std::optional<Gaussians> fitted;
-        if (scene.density != densities) fit_opacities(fitted.emplace(scene), densities);
-        const Gaussians& splats = fitted ? *fitted : scene;
-        if (renderer)
-            renderer->replace(splats);
-        else
-            renderer.emplace(device_, splats, RenderOptions{});
-    };
-    scene_is_up_ = false;
-    if (!coarse_) coarse_renderer_.reset();
-    put(*scene_, renderer_);
-    if (coarse_) put(*coarse_, coarse_renderer_);
-    scene_is_up_ = true;
-    densities_are_up_ = densities;
-}
-
-/// Opacities are those of the kernel, so that a scene looks about the same with all kernels.
-void RenderThread::fit_to(const Look& look) {
-    const bool densities = look.kernel == Footprint::density;
-    if (!look.points && densities != densities_are_up_) upload(densities);
-}
-
 void RenderThread::answer(const Probe& probe, const std::optional<glm::dvec3>& place) {
     report([&](News& news) { news.points.push_back({probe.number, probe.use, place}); });
 }
 
 void RenderThread::carry_out(Work& work) {
-    prepare(work);
-    if (!renderer_) return;
+    if (work.scene) scene_->set(work.scene, work.coarse);
+    if (scene_->open()) report([&](News& news) { news.device = scene_->device(); });
+    if (!scene_->bring_up()) return;
     if (work.probe) {
-        answer(*work.probe, point_at(*work.probe));
+        answer(*work.probe, scene_->point_at(*work.probe));
         work.probe.reset();  // it is not answered again if what follows fails
     }
     if (work.full) {
-        fit_to(work.full->look);
-        const DrawOptions options{options_of(work.full->look), Drawing::color,
-                                  double(work.full->look.splat_scale)};
-        const auto full = std::make_shared<const FullRender>(
-            FullRender{work.full->number, renderer_->render(work.full->camera, options).color});
+        const auto full =
+            std::make_shared<const FullRender>(FullRender{work.full->number, scene_->color(*work.full)});
         report([&](News& news) { news.full = full; });
     }
     if (!work.request) return;
-    const auto finished = draw(*work.request, work.scene_number);
+    const auto finished = scene_->draw(*work.request, work.scene_number);
     report([&](News& news) {
         news.picture = finished;
         news.failure = nullptr;
         if (!work.request->file.empty()) news.written.push_back(work.request->file);
     });
-}
-
-std::shared_ptr<const RenderedFrame> RenderThread::draw(const RenderRequest& request, uint64_t scene) {
-    const auto start = std::chrono::steady_clock::now();
-    const Look& look = request.look;
-    const Camera camera = downscale(request.camera, request.divisor);
-    fit_to(look);
-    Renderer& renderer = request.coarse && coarse_renderer_ ? *coarse_renderer_ : *renderer_;
-    const DrawOptions options{options_of(look), drawing_for(look.mode), double(look.splat_scale)};
-    auto finished = std::make_shared<RenderedFrame>();
-    finished->request = request;
-    finished->scene = scene;
-    const bool bytes_do = request.file.empty() && (look.mode == Mode::color || look.mode == Mode::ellipsoids);
-    if (bytes_do) {
-        finished->picture = {camera.width, camera.height, renderer.render_bytes(camera, options), 0};
-    } else {
-        const Rendering rendering = renderer.render(camera, options);
-        finished->picture = picture_of(rendering, look.mode);
-        if (!request.file.empty()) save(request.file, rendering, finished->picture, look.mode);
-    }
-    finished->pass_times = renderer.pass_times();
-    finished->skipped_nonfinite = renderer.skipped_nonfinite();
-    finished->splats_drawn = renderer.splats_drawn();
-    finished->device_bytes = device_bytes(*device_);
-    finished->milliseconds =
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-    return finished;
-}
-
-std::optional<glm::dvec3> RenderThread::point_at(const Probe& probe) {
-    const Camera& full = probe.camera;
-    const int divisor =
-        probe.use == PointUse::measure ? 1 : std::max(1, std::min(full.width, full.height) / kProbeSide);
-    const Camera camera = downscale(full, divisor);
-    DrawOptions options{{}, Drawing::median_depth, 1};
-    if (densities_are_up_) options.render.kernel = Footprint::density;
-    const Image depth = renderer_->render(camera, options).median_depth;
-    const int x = std::clamp(int(probe.pixel.x * camera.width / full.width), 0, camera.width - 1);
-    const int y = std::clamp(int(probe.pixel.y * camera.height / full.height), 0, camera.height - 1);
-    if (!(*depth.at(x, y) > 0)) return std::nullopt;
-    return world_point(camera, x + 0.5, y + 0.5, *depth.at(x, y));
 }
 
 /// Reports the exception that is being handled.
@@ -257,10 +302,7 @@ void RenderThread::work(const std::stop_token& stop) {
                 break;
             } catch (...) {
                 // The device may be lost, or its memory full of unused buffers. Opening it again solves both.
-                renderer_.reset();
-                coarse_renderer_.reset();
-                device_.reset();
-                scene_is_up_ = false;
+                scene_->close();
                 if (!again) fail(work);
             }
         }

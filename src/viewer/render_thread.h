@@ -72,6 +72,7 @@ class RenderThread {
     /// on_news is called on the thread when take_news() has something new. A lost device is opened again,
     /// once for each frame that fails.
     RenderThread(OpenDevice open, std::function<void()> on_news);
+    ~RenderThread();
 
     /// Sets the scene of all frames requested from now on. coarse: the same with fewer splats, for RenderRequest::coarse; null:
     /// none. Returns the number that RenderedFrame::scene will have.
@@ -101,6 +102,7 @@ class RenderThread {
     News take_news();
 
   private:
+    class Scene;  // what is on the device
     struct Probe {
         Camera camera;
         glm::dvec2 pixel{0};
@@ -123,22 +125,11 @@ class RenderThread {
     bool next(const std::stop_token& stop, Work& work);
     void carry_out(Work& work);
     void fail(const Work& work);
-    void prepare(const Work& work);
-    void upload(bool densities);
-    void fit_to(const Look& look);
-    std::shared_ptr<const RenderedFrame> draw(const RenderRequest& request, uint64_t scene);
-    std::optional<glm::dvec3> point_at(const Probe& probe);
     void answer(const Probe& probe, const std::optional<glm::dvec3>& place);
     void report(const std::function<void(News&)>& change);
 
-    OpenDevice open_;
     std::function<void()> on_news_;
-    // Used by the thread only.
-    std::shared_ptr<gpu::Device> device_;
-    std::optional<Renderer> renderer_, coarse_renderer_;
-    std::shared_ptr<const Gaussians> scene_, coarse_;
-    bool scene_is_up_ = false;
-    bool densities_are_up_ = false;  // the scene has opacities of Footprint::density
+    std::unique_ptr<Scene> scene_;  // used by the thread only
 
     mutable std::mutex mutex_;
     std::condition_variable_any wake_;
