@@ -27,12 +27,12 @@ PathTracer::PathTracer(std::shared_ptr<gpu::Device> device, const pathtracer::Pa
       cache_(*device_),
       variant_{{shared::SPEC_ALPHA_TESTED, scene.alpha_tested ? 1u : 0u}, {shared::SPEC_COLOR_FLOATS, 0}},
       executor_(*device_),
-      nodes_(upload("mesh nodes", scene.nodes, gpu::Texel::rgba32ui)),
-      triangles_(upload("mesh triangles", scene.triangles, gpu::Texel::rgba32ui)),
-      surfaces_(upload("mesh surfaces", scene.surfaces, gpu::Texel::rgba32ui)),
-      materials_(upload("mesh materials", scene.materials, gpu::Texel::rgba32ui)),
-      textures_(upload("mesh textures", scene.textures, gpu::Texel::rgba32ui)),
-      texels_(upload("mesh texels", scene.texels, gpu::Texel::rgba8)),
+      mesh_{upload("mesh nodes", scene.nodes, gpu::Texel::rgba32ui),
+            upload("mesh triangles", scene.triangles, gpu::Texel::rgba32ui),
+            upload("mesh surfaces", scene.surfaces, gpu::Texel::rgba32ui),
+            upload("mesh materials", scene.materials, gpu::Texel::rgba32ui),
+            upload("mesh textures", scene.textures, gpu::Texel::rgba32ui),
+            upload("mesh texels", scene.texels, gpu::Texel::rgba8)},
       lights_(upload("mesh lights", scene.lights, gpu::Texel::rgba32ui)),
       counts_(*device_, "trace counts"),
       sky_(sky),
@@ -41,12 +41,12 @@ PathTracer::PathTracer(std::shared_ptr<gpu::Device> device, const pathtracer::Pa
       light_count_(scene.light_count) {}
 
 passes::MeshBuffers PathTracer::mesh() const {
-    return {.nodes = nodes_,
-            .triangles = triangles_,
-            .surfaces = surfaces_,
-            .materials = materials_,
-            .textures = textures_,
-            .texels = texels_};
+    return {.nodes = mesh_.nodes,
+            .triangles = mesh_.triangles,
+            .surfaces = mesh_.surfaces,
+            .materials = mesh_.materials,
+            .textures = mesh_.textures,
+            .texels = mesh_.texels};
 }
 
 gpu::Buffer PathTracer::upload(const char* name, const std::vector<uint32_t>& words, gpu::Texel texel) {

@@ -40,6 +40,9 @@ class PathTracer {
 
   private:
     gpu::Buffer upload(const char* name, const std::vector<uint32_t>& words, gpu::Texel texel);
+    struct Mesh {
+        gpu::Buffer nodes, triangles, surfaces, materials, textures, texels;
+    };
     struct View {
         gpu::Buffer block, rays;
         passes::Constants variant;
@@ -53,7 +56,8 @@ class PathTracer {
     passes::PassCache cache_;
     passes::Constants variant_;
     gpu::Executor executor_;
-    gpu::Buffer nodes_, triangles_, surfaces_, materials_, textures_, texels_, lights_, sums_;
+    Mesh mesh_;
+    gpu::Buffer lights_, sums_;
     gpu::ReadBack<shared::TraceCounts> counts_;
     scene::Sky sky_;
     glm::dvec3 origin_;
