@@ -262,19 +262,11 @@ void Run::restore(Trainer& trainer) {
     earlier_->reader.reset();
 }
 
-/// The times of the checkpoint, from times.json. One of an earlier version has them itself.
 train::TimesAt Run::restored_times() {
     const train::CheckpointReader& reader = *earlier_->reader;
     const StepReport& report = reader.head().report;
-    train::TimesAt own{report.step, report.seconds, reader.checkpoint().wall_seconds};
-    if (own.wall_seconds == 0) try {
-            train::RunTimes known = train::read_times(folder_.times());
-            for (const train::TimesAt& time : known.checkpoints)
-                if (time.step == own.step) own = time;
-            train::take_times(progress_.metrics, known);
-        } catch (const InputError&) {
-            // What was trained matters more than how long it took.
-        }
+    const train::TimesAt own = train::restored_times(
+        folder_.times(), {report.step, report.seconds, reader.checkpoint().wall_seconds}, progress_.metrics);
     if (own.wall_seconds == 0) {
         report_.remarks.push_back("resumed without its earlier times, since times.json lacks them");
         observer_.on_note(report_.remarks.back());

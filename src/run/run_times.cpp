@@ -74,4 +74,16 @@ RunTimes read_times(const std::filesystem::path& path) {
     return {times_in(field, "metrics"), times_in(field, "checkpoints")};
 }
 
+TimesAt restored_times(const std::filesystem::path& path, TimesAt own, std::vector<MetricsLine>& metrics) {
+    if (own.wall_seconds == 0) try {
+            const RunTimes known = read_times(path);
+            for (const TimesAt& time : known.checkpoints)
+                if (time.step == own.step) own = time;
+            take_times(metrics, known);
+        } catch (const InputError&) {
+            // What was trained matters more than how long it took.
+        }
+    return own;
+}
+
 }  // namespace ewa::train

@@ -46,4 +46,8 @@ void write_times(const std::filesystem::path& path, const RunTimes& times);
 /// Throws InputError if the file is missing, damaged or has a time that is not finite.
 RunTimes read_times(const std::filesystem::path& path);
 
+/// The times of a checkpoint, from such a file. One of an earlier version has them itself: own. The metrics get theirs. Without
+/// wall_seconds where the file lacks them.
+TimesAt restored_times(const std::filesystem::path& path, TimesAt own, std::vector<MetricsLine>& metrics);
+
 }  // namespace ewa::train
