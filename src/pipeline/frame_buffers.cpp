@@ -161,6 +161,37 @@ RadixCut radix_cut(const passes::KernelConfig& config, uint32_t items, uint32_t 
     return cut;
 }
 
+namespace {
+
+/// What the loss and its gradient need.
+void size_loss(Sizes& s, const passes::KernelConfig& config, const FrameRequest& request) {
+    const uint64_t word = 4;
+    const auto groups = passes::LossRows::Work::groups(config, {s.image(), 0, 0, 0, {}});
+    s.partials = groups[0] * groups[1] * groups[2] * (config.element_group / config.subgroup);
+    s.reduce_block = 64 * config.subgroup;
+    s.reduce_blocks = divide_up(s.partials, s.reduce_block);
+    s.target = uint64_t(s.plane_floats) * 3 * word;
+    s.masked = request.masks ? s.target : 0;
+    s.exposed = request.appearance != AppearanceModel::none ? s.target : 0;
+    s.ppisp_blocks = divide_up(request.width * request.height, shared::PPISP_BLOCK);
+    s.grid_parts = grid_parts(request.appearance, request.width, request.height);
+    s.appearance_sums = appearance_sums(request.appearance, s) * word;
+    if (request.loss.ssim > 0) {
+        s.moments = uint64_t(s.plane_floats) * 3 * shared::MOMENT_PLANES * word;
+        s.derivatives = uint64_t(s.plane_floats) * 3 * shared::DERIVATIVE_PLANES * word;
+    }
+    s.image_gradient = uint64_t(s.plane_floats) *
+                       (request.loss.depth > 0   ? 5
+                        : request.loss.alpha > 0 ? 4
+                                                 : 3) *
+                       word;
+    const uint64_t rows = request.loss.l2 > 0 ? 3 : 2;  // see LossBackwardRows
+    s.partial_sums = rows * s.partials * word;
+    s.reduced = rows * s.reduce_blocks * word;
+}
+
+}  // namespace
+
 Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request) {
     Sizes s;
     if (request.width > 1u << 20 || request.height > 1u << 20)
@@ -194,30 +225,7 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
     s.tile_starts = (uint64_t(s.tiles) + 2) * word;
     s.planes = uint64_t(s.plane_floats) * s.image_planes * word;
     if (request.gradients && request.given_gradient) s.image_gradient = uint64_t(s.plane_floats) * 5 * word;
-    if (request.gradients && !request.given_gradient) {
-        const auto groups = passes::LossRows::Work::groups(config, {s.image(), 0, 0, 0, {}});
-        s.partials = groups[0] * groups[1] * groups[2] * (config.element_group / config.subgroup);
-        s.reduce_block = 64 * config.subgroup;
-        s.reduce_blocks = divide_up(s.partials, s.reduce_block);
-        s.target = uint64_t(s.plane_floats) * 3 * word;
-        s.masked = request.masks ? s.target : 0;
-        s.exposed = request.appearance != AppearanceModel::none ? s.target : 0;
-        s.ppisp_blocks = divide_up(request.width * request.height, shared::PPISP_BLOCK);
-        s.grid_parts = grid_parts(request.appearance, request.width, request.height);
-        s.appearance_sums = appearance_sums(request.appearance, s) * word;
-        if (request.loss.ssim > 0) {
-            s.moments = uint64_t(s.plane_floats) * 3 * shared::MOMENT_PLANES * word;
-            s.derivatives = uint64_t(s.plane_floats) * 3 * shared::DERIVATIVE_PLANES * word;
-        }
-        s.image_gradient = uint64_t(s.plane_floats) *
-                           (request.loss.depth > 0   ? 5
-                            : request.loss.alpha > 0 ? 4
-                                                     : 3) *
-                           word;
-        const uint64_t rows = request.loss.l2 > 0 ? 3 : 2;  // see LossBackwardRows
-        s.partial_sums = rows * s.partials * word;
-        s.reduced = rows * s.reduce_blocks * word;
-    }
+    if (request.gradients && !request.given_gradient) size_loss(s, config, request);
     if (request.gradients && request.motion) {
         const uint64_t motion_rows = request.readouts ? shared::READOUT_MOTION_VALUES : shared::MOTION_VALUES;
         shared::UpdatePush push{};
