@@ -3,9 +3,6 @@
 #include "ewa/capture.h"
 
 #include <algorithm>
-#include <array>
-#include <iterator>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -14,7 +11,6 @@
 #include "capture/steps.h"
 #include "capture/times.h"
 #include "core/folders.h"
-#include "core/hash.h"
 #include "core/json.h"
 #include "core/text.h"
 #include "core/typing.h"
@@ -22,8 +18,6 @@
 #include "ewa/error.h"
 #include "folders/run_folder.h"
 #include "io/datasets/dataset_folders.h"
-#include "io/datasets/image_records.h"
-#include "io/datasets/importers/image_finder.h"
 #include "io/splats/place.h"
 #include "io/splats/zip_files.h"
 

@@ -12,7 +12,6 @@
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/training_needs.h"
-#include "io/datasets/image_records.h"
 #include "prepare/appearance_choice.h"
 #include "prepare/blurred_images.h"
 #include "run/first_checks.h"
