@@ -100,7 +100,7 @@ constexpr std::array kRows{
         "Of the joined scene: move=x,y,z, turn=x,y,z,degrees, scale=s, or a matrix of 12 or 16 numbers, row "
         "by "
         "row. Axes are those of a PLY: y down, z forward",
-        transform},
+        transform, "move=x,y,z, turn=x,y,z,degrees or scale=s"},
     Row{"scale-to", "x,y,z,X,Y,Z,LENGTH",
         "Scale the joined scene until these two points are LENGTH apart; they are its points before the "
         "--transform that stands right before. ewa-view measures points",
@@ -109,18 +109,22 @@ constexpr std::array kRows{
         "Keep only splats that pass the filter: COLUMN=LOW..HIGH, box=x,y,z,X,Y,Z or sphere=x,y,z,radius. "
         "One bound is enough. Columns: x, y, z, opacity, scale (the largest), thickness (the smallest "
         "scale), red, green, blue, and of a training run views: the images in which the centre is",
-        where},
-    Row{"crop", "x,y,z,X,Y,Z", "The same as --where box=x,y,z,X,Y,Z", crop},
+        where, "Keep only splats of opacity=0.1.., box=..., sphere=... or the like"},
+    Row{"crop", "x,y,z,X,Y,Z", "The same as --where box=x,y,z,X,Y,Z", crop, "Keep only splats in this box"},
     Row{"remove-invalid", "", "Remove splats with a value that is not finite, or a zero quaternion",
-        [](const std::string&) { return fixed<drawable_splats>("--remove-invalid"); }},
+        [](const std::string&) { return fixed<drawable_splats>("--remove-invalid"); },
+        "Remove splats with a value that is not finite"},
     Row{"remove-floaters", "",
         "Remove groups of fewer than 10 splats that touch no others of about their size",
-        [](const std::string&) { return fixed<grounded_splats>("--remove-floaters"); }},
+        [](const std::string&) { return fixed<grounded_splats>("--remove-floaters"); },
+        "Remove small groups of splats far from others"},
     Row{"largest-cluster", "", "Keep only the largest group of splats that touch others of about their size",
         [](const std::string&) { return fixed<largest_cluster>("--largest-cluster"); }},
-    Row{"max-sh", "0..3", "Reduce the spherical harmonics to this degree", max_sh},
+    Row{"max-sh", "0..3", "Reduce the spherical harmonics to this degree", max_sh,
+        "Reduce the spherical harmonics to this degree"},
     Row{"decimate", "N|P%",
-        "Merge near splats until this number of them is left, or this percentage: 500k, 50%", decimate},
+        "Merge near splats until this number of them is left, or this percentage: 500k, 50%", decimate,
+        "Merge near splats until N or P% are left"},
     Row{"sort", "ORDER",
         "Order of the splats: morton puts neighbours in space next to each other in the file", sort},
 };

@@ -28,6 +28,7 @@ struct Row {
     const char* value;  // what it takes, for the help. Empty: nothing
     const char* help;
     Edit (*parse)(const std::string& value);  // throws InputError that begins with --name
+    const char* brief = "";                   // in the short help; empty: only the whole help has it
 };
 
 std::span<const Row> rows();

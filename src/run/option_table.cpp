@@ -421,7 +421,7 @@ std::vector<Row> rows() {
         {"Output", "", keep_option()},
         {"Output", "", inria_option()},
         {"Device", "",
-         words("device", "NAME|N", "Number of a device, or part of its name (see ewa devices)",
+         words("device", "NAME|N", "Number of a device, or part of its name (see ewa devices) [$EWA_DEVICE]",
                kDoesNotDecide, [](RunOptions& o) -> std::string& { return o.device.selector; }),
          "Device by its number or name (see ewa devices)"},
         {"Device", "",

@@ -96,7 +96,7 @@ const std::vector<std::pair<std::string, Modules>> kLibraries = {
      {"src/core", "src/folders", "src/image", "src/capture", "src/io/splats", "src/io/datasets",
       "src/io/gltf", "src/pathtracer", "src/run", "src/report", "src/live", "check/bench", "src/cli",
       "src/viewer", "python/bindings"}},
-    {"CLI/", {"src/cli", "src/viewer", "check/bench"}}};
+    {"CLI/", {"src/options", "src/cli", "src/viewer", "check/bench"}}};
 
 Modules reached_from(const std::string& module) {
     Modules reached = {module}, next = {module};
