@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <functional>
 #include <memory>
 
 #include "capture/what_is.h"
@@ -19,7 +18,7 @@
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
 #include "folders/run_folder.h"
-#include "io/splats/format_table.h"
+#include "run/option_table.h"
 #include "scene/camera.h"
 #include "scene/looks.h"
 #include "scene/names.h"
@@ -49,26 +48,6 @@ void print_notes(const SyntheticDataset& made, const fs::path& folder) {
 }
 
 }  // namespace
-
-CLI::Validator one_of(const std::vector<std::string>& words) {
-    std::string all;
-    for (const std::string& word : words) all += (all.empty() ? "" : "|") + word;
-    return CLI::Validator([words](std::string& text) { return core::settle_word(text, words); }, all);
-}
-
-CLI::Validator accepted_by(const train::RunOption& option) {
-    return CLI::Validator(
-        [&option](std::string& text) {
-            try {
-                RunOptions scratch;
-                option.set(scratch, text);
-                return std::string();
-            } catch (const InputError& error) {
-                return std::string(error.what());
-            }
-        },
-        "");
-}
 
 core::PixelSize size_of(const std::string& text) {
     constexpr int kLargestSide = 16384;            // px
@@ -123,97 +102,19 @@ Gaussians DrawArguments::load(const fs::path& splats, RenderOptions& options) co
 }
 
 void add_draw_options(CLI::App& app, DrawArguments& arguments) {
-    arguments.background_option =
-        app.add_option("--background", arguments.background,
-                       "Background colour: r,g,b in 0..1, a name such as white, #rrggbb, or a sky.json "
-                       "[that beside SPLATS, if it is there]")
-            ->type_name("COLOUR")
-            ->capture_default_str();
-    const train::RunOption& kernel = train::run_option("kernel");
-    arguments.kernel_option = app.add_option("--kernel", arguments.kernel, kernel.help)
-                                  ->transform(one_of(kernel.choices))
-                                  ->capture_default_str();
-    app.add_flag("--points", arguments.points, train::run_option("points").help);
-    const train::RunOption& nearest = train::run_option("nearest");
-    app.add_option_function<std::string>(
-           "--nearest",
-           [&nearest, &arguments](const std::string& text) {
-               RunOptions drawn;
-               nearest.set(drawn, text);
-               arguments.nearest = drawn.train.render.nearest;
-           },
-           nearest.help)
-        ->check(accepted_by(nearest))
-        ->type_name(nearest.value)
-        ->default_str(std::to_string(RenderOptions().nearest));
-    app.add_option("--sh-degree", arguments.sh_degree, "Highest degree of the spherical harmonics")
-        ->transform(in_range(0, kMaxShDegree))
-        ->type_name("0..3")
-        ->capture_default_str();
-    app.add_option("--integrator", arguments.integrator,
-                   "How splats become a colour: splat blends footprints; fast-ray evaluates each splat on "
-                   "each ray, in "
-                   "the order of splat; ray orders them on each ray; march integrates the volume")
-        ->transform(one_of(core::words_of(scene::kIntegratorWords)))
-        ->capture_default_str();
-    app.add_option("--samples", arguments.samples, "Intervals of a ray, with --integrator march (64)")
-        ->transform(in_range(1, kMostSamples))
-        ->type_name("N");
+    arguments.background_option = options::add(app, "background", arguments.background);
+    arguments.kernel_option = options::add(app, "kernel", arguments.kernel);
+    options::add(app, "points", arguments.points);
+    options::add(app, "nearest", arguments.nearest);
+    options::add(app, "sh-degree", arguments.sh_degree);
+    options::add(app, "integrator", arguments.integrator);
+    options::add(app, "samples", arguments.samples);
 }
 
 void add_device_options(CLI::App& app, DeviceOptions& options) {
-    const train::RunOption& device = train::run_option("device");
     if (const char* named = std::getenv("EWA_DEVICE")) options.selector = named;
-    app.add_option("--device", options.selector, device.help + " [$EWA_DEVICE]")->type_name(device.value);
-    app.add_flag("--validation", options.validation, "Enable the Vulkan validation layer")
-        ->group("For developers");
-}
-
-void add_size_options(CLI::App& app, int& downscale, int& max_width) {
-    app.add_option("--downscale", downscale, train::run_option("downscale").help)
-        ->transform(in_range(1, 1024))
-        ->type_name("K")
-        ->capture_default_str();
-    app.add_option("--max-width", max_width, train::run_option("max-width").help)
-        ->transform(in_range(0, 65535))
-        ->type_name("N")
-        ->capture_default_str();
-}
-
-void add_test_every_option(CLI::App& app, int& test_every) {
-    app.add_option("--test-every", test_every, train::run_option("test-every").help)
-        ->transform(in_range(0, 1000000000))
-        ->type_name("K")
-        ->capture_default_str();
-}
-
-void add_splats(CLI::App& app, fs::path& splats) {
-    app.add_option("SPLATS", splats,
-                   "Splat file (" + io::extension_list(io::Uses::read) + "), or folder of a training run")
-        ->required()
-        ->type_name("");
-}
-
-void add_frames_options(CLI::App& app, std::string& frames, int& test_every) {
-    app.add_option("--frames", frames, "all, train, test, names, or indices in name order such as 0,3 or 5-9")
-        ->type_name("FRAMES")
-        ->capture_default_str();
-    add_test_every_option(app, test_every);
-}
-
-void add_transform_option(CLI::App& app, std::vector<std::string>& steps, const std::string& of) {
-    app.add_option("--transform", steps,
-                   of + ": move=x,y,z, turn=x,y,z,degrees, scale=s, or a matrix of 12 or 16 numbers, "
-                        "row by row. Repeat the option for several steps, applied in order. Axes are those "
-                        "of a PLY: y down, z forward")
-        ->type_name("STEP")
-        ->expected(1)
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-        ->take_all();
-}
-
-void add_quiet_option(CLI::App& app, bool& quiet) {
-    app.add_flag("--quiet", quiet, "Print only errors");
+    options::add(app, "device", options.selector);
+    options::add(app, "validation", options.validation);
 }
 
 std::vector<int> select_frames(const Dataset& dataset, const std::string& which, int test_every) {
@@ -278,45 +179,14 @@ void render_with_progress(const DeviceOptions& device, const fs::path& scene, co
 }
 
 void add_view_positionals(CLI::App& app, ViewArguments& arguments) {
-    add_splats(app, arguments.splats);
-    app.add_option(
-           "DATASET", arguments.dataset,
-           "Images with cameras: a COLMAP folder or transforms.json. Or a glTF file of meshes, which is "
-           "rendered as in ewa train. Or the folder of a training run: its dataset [that of the run SPLATS, "
-           "with "
-           "the run's options]")
-        ->type_name("");
-}
-
-namespace {
-
-/// An option of a training run, with its words and help. take: from a run that has the value.
-void add_word_of_run(CLI::App& app, const std::string& name,
-                     const std::function<void(const RunOptions&)>& take) {
-    const train::RunOption& option = train::run_option(name);
-    app.add_option_function<std::string>(
-           "--" + name,
-           [&option, take](const std::string& text) {
-               RunOptions run;
-               option.set(run, text);
-               take(run);
-           },
-           option.help)
-        ->transform(one_of(option.choices))
-        ->default_str("auto");
-}
-
-}  // namespace
-
-void add_lens_option(CLI::App& app, LensUse& lens) {
-    add_word_of_run(app, "lens", [&lens](const RunOptions& run) { lens = run.lens; });
+    options::add(app, "SPLATS", arguments.splats);
+    options::add(app, "DATASET", arguments.dataset);
 }
 
 void add_view_options(CLI::App& app, ViewArguments& arguments) {
     add_draw_options(app, arguments.draw);
-    add_size_options(app, arguments.downscale, arguments.max_width);
-    add_word_of_run(app, "masks", [&arguments](const RunOptions& run) { arguments.masks = run.masks; });
-    add_lens_option(app, arguments.lens);
+    for (const char* name : {"downscale", "max-width", "masks", "lens"})
+        options::add(app, name, arguments.run);
     add_device_options(app, arguments.device);
 }
 
@@ -334,10 +204,10 @@ Views load_views(const ViewArguments& arguments, const std::string& which, int t
             if (interrupted()) throw Interrupted();
         }
     }
-    Dataset dataset = load_dataset(folder, {.downscale = arguments.downscale,
-                                            .masks = arguments.masks,
-                                            .lens = arguments.lens,
-                                            .max_width = arguments.max_width});
+    Dataset dataset = load_dataset(folder, {.downscale = arguments.run.downscale,
+                                            .masks = arguments.run.masks,
+                                            .lens = arguments.run.lens,
+                                            .max_width = arguments.run.max_width});
     io::RefinedUse refined;
     if (!arguments.refined_cameras.empty())
         refined = io::use_refined_cameras(dataset, arguments.refined_cameras);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Arguments that several commands share, with the same names, ranges and help texts. Also the datasets that they name.
+// Arguments that several commands share, and the datasets that they name.
 #pragma once
 #include <CLI/CLI.hpp>
 
@@ -10,35 +10,21 @@
 
 #include "core/folders.h"
 #include "core/pixel_size.h"
-#include "core/typing.h"
 #include "ewa/dataset.h"
 #include "ewa/device.h"
 #include "ewa/gaussians.h"
 #include "ewa/render_options.h"
+#include "ewa/run_options.h"
 #include "ewa/synthetic_dataset.h"
 #include "io/datasets/refined_cameras.h"
-#include "run/option_table.h"
+#include "options/command_options.h"
 
 namespace ewa::cli {
-
-/// For Option::transform: accepts a number from low to high, and counts such as 7k. The help shows the option's
-/// type name instead of the range.
-template <typename T>
-CLI::Validator in_range(T low, T high) {
-    return CLI::Validator([low, high](std::string& text) { return core::settle_number(text, low, high); },
-                          "");
-}
-
-/// For Option::transform: accepts one of the words, in either spelling of colour. The help lists them.
-CLI::Validator one_of(const std::vector<std::string>& words);
-
-/// The option's own check, which names neither the option nor where it was read.
-CLI::Validator accepted_by(const train::RunOption& option);
 
 /// The size that --size names, such as 1280x720. Throws InputError.
 core::PixelSize size_of(const std::string& text);
 
-/// How a scene is rendered: --background, --kernel, --sh-degree, --points, --nearest, --integrator, --samples.
+/// How a scene is rendered: --background, --kernel, --points, --nearest, --sh-degree, --integrator, --samples.
 struct DrawArguments {
     std::string background = "0,0,0";
     std::string kernel = "peak";
@@ -60,23 +46,8 @@ struct DrawArguments {
 };
 void add_draw_options(CLI::App& app, DrawArguments& arguments);
 
-/// The required positional SPLATS.
-void add_splats(CLI::App& app, std::filesystem::path& splats);
-
 /// --device and --validation.
 void add_device_options(CLI::App& app, DeviceOptions& options);
-
-/// --downscale and --max-width.
-void add_size_options(CLI::App& app, int& downscale, int& max_width);
-/// --frames and --test-every.
-void add_frames_options(CLI::App& app, std::string& frames, int& test_every);
-/// --transform, whose steps edit::parse_transform reads. of: what it moves.
-void add_transform_option(CLI::App& app, std::vector<std::string>& steps, const std::string& of);
-
-void add_quiet_option(CLI::App& app, bool& quiet);
-/// --lens, of a dataset's images or cameras.
-void add_lens_option(CLI::App& app, LensUse& lens);
-void add_test_every_option(CLI::App& app, int& test_every);
 
 /// The indices of the frames that --frames names: "all", "train", "test", or a list that scene::frames_named
 /// reads. Throws InputError, also if there are none.
@@ -104,9 +75,7 @@ struct ViewArguments {
     std::filesystem::path splats, dataset;
     std::filesystem::path refined_cameras = {};  // cameras.json of that run; empty: none
     std::string run_frames = "all";              // --frames of the run SPLATS, if the dataset is its own
-    int downscale = 1, max_width = 0;
-    MaskUse masks = MaskUse::automatic;
-    LensUse lens = LensUse::automatic;
+    RunOptions run = {};                         // --downscale, --max-width, --masks and --lens
     DrawArguments draw;
     DeviceOptions device;
 };

@@ -103,20 +103,17 @@ fs::path heat_map_file(const ImagePair& pair, const CompareArguments& arguments)
 }
 
 /// Throws if an output is also an input, or cannot be written.
-void check_files(const CompareArguments& arguments, const Sides& sides, const ImagePairs& pairs) {
-    const CompareInputs& inputs = arguments.inputs;
+void check_files(const CLI::App& app, const CompareArguments& arguments, const Sides& sides,
+                 const ImagePairs& pairs) {
     const bool maps = !arguments.heat_map.empty() && !pairs.pairs.empty() && !pairs.pairs[0].name.empty();
     if (maps) io::check_output_folder("--heat-map", arguments.heat_map, sides.cameras);
-    std::vector<NamedFile> written = {{"--json", arguments.json}};
-    std::vector<NamedFile> read = {{"A", inputs.a}, {"B", inputs.b}, {"--cameras", inputs.cameras}};
+    std::vector<NamedFile> written, read = scene::files_of(sides.cameras, "--cameras");
     for (const ImagePair& pair : pairs.pairs) {
         written.push_back({"--heat-map", heat_map_file(pair, arguments)});
         if (!sides.a->is_scene) read.push_back({"an image of A", sides.a->place(pair.a)});
         if (!sides.b->is_scene) read.push_back({"an image of B", sides.b->place(pair.b)});
     }
-    const std::vector<NamedFile> dataset = scene::files_of(sides.cameras, "--cameras");
-    read.insert(read.end(), dataset.begin(), dataset.end());
-    check_command_outputs(written, read);
+    check_typed_outputs(app, written, read);
 }
 
 Compared compare(const ImagePair& pair, const Sides& sides, const CompareArguments& arguments,
@@ -169,10 +166,10 @@ void print_unpaired(const ComparedSide& side, const std::vector<fs::path>& names
                    first);
 }
 
-int run(const CompareArguments& arguments) {
+int run(const CLI::App& app, const CompareArguments& arguments) {
     const Sides sides = open_sides(arguments.inputs);
     const ImagePairs pairs = pair_images(*sides.a, *sides.b);
-    check_files(arguments, sides, pairs);
+    check_files(app, arguments, sides, pairs);
     const Meter meter = arguments.metrics.measures().meter;
     std::vector<Compared> all;
     for (const ImagePair& pair : pairs.pairs) {
@@ -243,65 +240,31 @@ bool compares_meshes(const CLI::App& app, const CompareArguments& arguments) {
 
 Action add_compare(CLI::App& app) {
     const auto arguments = std::make_shared<CompareArguments>();
-    app.add_option("A", arguments->inputs.a,
-                   "Image, folder of images, splat file, folder of a training run, or mesh")
-        ->required()
-        ->type_name("");
-    app.add_option("B", arguments->inputs.b,
-                   "What A is compared with: image, folder, splat file, run or mesh")
-        ->required()
-        ->type_name("");
-    app.add_option("--threshold", arguments->threshold,
-                   "Exit with status 1 if the PSNR of an image is lower, over RGB in 0..1 or over all values "
-                   "with alpha, or if an image has no partner")
-        ->transform(in_range(0.0, 1000.0))
-        ->type_name("PSNR");
-    app.add_option(
-           "--max-error", arguments->max_error,
-           "Exit with status 1 if two values, alpha included, differ by more, or if an image has no partner")
-        ->transform(in_range(0.0, 1e9))
-        ->type_name("E");
+    CompareInputs& inputs = arguments->inputs;
+    options::add(app, "A", inputs.a);
+    options::add(app, "B", inputs.b);
+    options::add(app, "threshold", arguments->threshold);
+    options::add(app, "max-error", arguments->max_error);
     add_metric_options(app, arguments->metrics);
-    app.add_option("--json", arguments->json, "Write the results to this file")->type_name("FILE");
-    app.add_option(
-           "--heat-map", arguments->heat_map,
-           "Write the error as an image (.png, .exr); for folders: one image per pair into this folder")
-        ->type_name("OUT");
-    app.add_option(
-           "--distance", arguments->distance,
-           "Of two meshes (.gltf, .glb, .ply, .obj), of which B is the true one, or a scan (a .ply of "
-           "points): "
-           "points within this distance count in the F-score, in the scene's units [0.005 of B's diagonal]")
-        ->transform(in_range(1e-12, 1e12))
-        ->type_name("D");
-    app.add_option("--heat-scale", arguments->heat_scale, "Error that the heat map shows brightest")
-        ->transform(in_range(1e-9, 1e9))
-        ->type_name("E")
-        ->capture_default_str();
-    CLI::Option* cameras =
-        app.add_option(
-               "--cameras", arguments->inputs.cameras,
-               "Dataset whose cameras render splat files. Each render is compared with that of the other "
-               "splat file, or with the image that has the name ewa render would give it, rounded like that "
-               "image [the dataset of a run]")
-            ->type_name("DATASET");
-    const std::vector<CLI::Option*> before = app.get_options();
-    add_frames_options(app, arguments->inputs.frames, arguments->inputs.test_every);
-    add_draw_options(app, arguments->inputs.draw);
-    add_size_options(app, arguments->inputs.downscale, arguments->inputs.max_width);
-    add_lens_option(app, arguments->inputs.lens);
-    add_device_options(app, arguments->inputs.device);
-    for (CLI::Option* option : app.get_options())
-        if (std::find(before.begin(), before.end(), option) == before.end()) option->needs(cameras);
-    return [&app, arguments] {
-        CompareInputs& inputs = arguments->inputs;
+    options::add(app, "json", arguments->json);
+    options::add(app, "heat-map", arguments->heat_map);
+    options::add(app, "distance", arguments->distance);
+    options::add(app, "heat-scale", arguments->heat_scale);
+    options::add(app, "cameras", inputs.cameras);
+    options::add(app, "frames", inputs.frames);
+    options::add(app, "test-every", inputs.test_every);
+    add_draw_options(app, inputs.draw);
+    for (const char* name : {"downscale", "max-width", "lens"}) options::add(app, name, inputs.run);
+    add_device_options(app, inputs.device);
+    return [&app, arguments, &inputs] {
         if (compares_meshes(app, *arguments)) {
+            check_typed_outputs(app);
             compare_meshes({inputs.a, inputs.b, arguments->json, arguments->distance});
             return 0;
         }
         if (!inputs.cameras.empty()) inputs.cameras = dataset_input(inputs.cameras);
         resolve_runs(app, inputs);
-        return run(*arguments);
+        return run(app, *arguments);
     };
 }
 

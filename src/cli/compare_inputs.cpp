@@ -211,7 +211,8 @@ Sides open_sides(const CompareInputs& inputs) {
     if (!scene) return sides;
     sides.options = inputs.draw.options();
     sides.cameras = load_cameras_as_trained(
-        inputs.cameras, {.downscale = inputs.downscale, .max_width = inputs.max_width, .lens = inputs.lens});
+        inputs.cameras,
+        {.downscale = inputs.run.downscale, .max_width = inputs.run.max_width, .lens = inputs.run.lens});
     const std::vector<int> frames = select_frames(sides.cameras, inputs.frames, inputs.test_every);
     const auto device = open_device(inputs.device);
     if (scene_a)

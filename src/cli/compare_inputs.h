@@ -41,8 +41,8 @@ struct CompareInputs {
     std::filesystem::path cameras;
     std::filesystem::path refined_a, refined_b;  // cameras.json of the run of each side; empty: none
     std::string frames = "all";
-    int test_every = 8, downscale = 1, max_width = 0;
-    LensUse lens = LensUse::automatic;
+    int test_every = 8;
+    RunOptions run;  // --downscale, --max-width and --lens
     DrawArguments draw;
     DeviceOptions device;
 };

@@ -30,9 +30,11 @@
 #include "ewa/splat_files.h"
 #include "folders/run_folder.h"
 #include "io/splats/format_table.h"
+#include "io/splats/output_options.h"
 #include "io/splats/place.h"
 #include "io/splats/prepare.h"
 #include "io/splats/scene_page.h"
+#include "options/command_options.h"
 
 namespace ewa::cli {
 namespace {
@@ -199,11 +201,10 @@ Json check(const ConvertArguments& arguments, const Work& work) {
 }
 
 /// Throws if an output is another file of this command, or cannot be written.
-void check_files(const ConvertArguments& arguments) {
+void check_files(const CLI::App& app, const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
     const bool unbundled = arguments.output_options.unbundled;
-    std::vector<NamedFile> inputs,
-        outputs = {{"OUT", out}, {"--json", arguments.json}, {"--dry-run", arguments.editing.picture}};
+    std::vector<NamedFile> inputs, outputs = {{"OUT", out}};
     for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
         inputs.push_back({"an input", arguments.files[i]});
         check_not_a_part(unbundled ? io::levels_of_page(out) : out, arguments.files[i]);
@@ -211,13 +212,13 @@ void check_files(const ConvertArguments& arguments) {
             inputs.push_back({"values of an input", values});
     }
     if (unbundled) outputs.push_back({"the levels of OUT", io::levels_of_page(out)});
-    check_command_outputs(outputs, inputs);
+    check_typed_outputs(app, outputs, inputs);
     const io::FormatRow& row = io::row_to_write(out);
     if (!row.beside) return;
     const io::ValueFiles beside = row.beside(out);
     for (const fs::path& file : beside.written) outputs.push_back({"the file of OUT's values", file});
     for (const fs::path& file : beside.removed) outputs.push_back({"the file of OUT's older values", file});
-    check_command_outputs(outputs, inputs);
+    check_typed_outputs(app, outputs, inputs);
 }
 
 /// Throws unless splats are left to write, or --allow-empty is given. read: the number of splats in the inputs.
@@ -276,7 +277,7 @@ bool edit_scene(const ConvertArguments& arguments, Work& work, std::optional<fol
     return false;
 }
 
-int run(const ConvertArguments& arguments) {
+int run(const CLI::App& app, const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
     Work work;
     io::set_output_options(work.save, out, arguments.output_options);
@@ -287,7 +288,7 @@ int run(const ConvertArguments& arguments) {
     if (!picture.empty() &&
         std::ranges::none_of(edits, [](const edit::Edit& edit) { return bool(edit.filter); }))
         throw InputError("--dry-run: no option removes splats; see --where and others of ewa convert --help");
-    check_files(arguments);
+    check_files(app, arguments);
     read_all(arguments, work);
     const size_t read = work.gaussians.size();
     std::optional<folders::Run> run = arguments.run;
@@ -333,36 +334,22 @@ int run(const ConvertArguments& arguments) {
 
 Action add_convert(CLI::App& app) {
     const auto arguments = std::make_shared<ConvertArguments>();
-    app.add_option(
-           "FILES", arguments->files,
-           "One or more inputs, which are joined, then the output unless -o names it. Formats: " +
-               io::extension_list(io::Uses::both) + ", inputs also " +
-               io::extension_list(io::Uses::only_read) + ", and an output also " +
-               io::extension_text(io::Uses::only_written) +
-               ". A page shows the scene in a browser, and a tileset.json is of 3D Tiles. An input may be "
-               "the folder of a training run. IN:STEP, as in b.ply:move=1,0,0, moves one input alone; "
-               "more steps follow after more colons")
-        ->required()
-        ->expected(1, -1)
-        ->type_name("IN... OUT");
-    app.add_option("-o,--output", arguments->output, "The output; all FILES are then inputs")
-        ->type_name("OUT");
+    io::OutputOptions& output = arguments->output_options;
+    options::add(app, "FILES", arguments->files)->expected(1, -1);
+    options::add(app, "output", arguments->output);
     add_edit_options(app, arguments->editing);
-    add_output_options(app, arguments->output_options);
-    app.add_option("--level", arguments->level,
-                   "Level of the inputs to read, each a lod-meta.json. 0: the finest")
-        ->transform(in_range(0, 31))
-        ->type_name("N");
-    app.add_flag("--bake-sky", arguments->bake_sky,
-                 "Add opaque splats far away in place of the sky of the run: for viewers that have none");
-    app.add_flag("--allow-empty", arguments->allow_empty, "Write the output even if no splat is left");
-    app.add_flag(
-        "--check", arguments->check,
-        "Read the output back and print its error against the scene in memory, also as PSNR of renders");
-    app.add_option("--json", arguments->json,
-                   "Write the inputs, the output, remarks and errors of --check to this file")
-        ->type_name("FILE");
-    add_quiet_option(app, arguments->quiet);
+    options::add(app, "spz-version", output.spz_version);
+    options::add(app, "gltf-spz", output.gltf_spz);
+    options::add(app, "levels", output.levels);
+    options::add(app, "unbundled", output.unbundled);
+    options::add(app, "title", output.title);
+    options::add(app, "geo", output.geo);
+    options::add(app, "level", arguments->level);
+    options::add(app, "bake-sky", arguments->bake_sky);
+    options::add(app, "allow-empty", arguments->allow_empty);
+    options::add(app, "check", arguments->check);
+    options::add(app, "json", arguments->json);
+    options::add(app, "quiet", arguments->quiet);
     return [arguments, &app] {
         arguments->editing.edits = typed_edits(app);
         if (!arguments->output.empty()) arguments->files.push_back(arguments->output);
@@ -380,7 +367,7 @@ Action add_convert(CLI::App& app) {
             arguments->files[i] = splats.file;
             arguments->placements.push_back(input.transform);
         }
-        return run(*arguments);
+        return run(app, *arguments);
     };
 }
 

@@ -4,36 +4,17 @@
 #include <CLI/CLI.hpp>
 #include <map>
 
-#include "cli/arguments.h"
 #include "cli/run_inputs.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
+#include "options/command_options.h"
 #include "scene/framing.h"
 
 namespace ewa::cli {
 
 void add_edit_options(CLI::App& app, EditArguments& arguments) {
-    const size_t others = app.get_options().size();
-    for (const edit::Row& row : edit::rows()) {
-        const std::string name = std::string("--") + row.name;
-        if (*row.value == 0) {
-            app.add_flag(name, row.help)
-                ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-                ->disable_flag_override();
-            continue;
-        }
-        app.add_option(name, row.help)
-            ->type_name(row.value)
-            ->expected(1)
-            ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-            ->take_all();
-    }
-    app.add_option("--dry-run", arguments.picture,
-                   "Write only this picture, in which all that would be removed is red. OUT may be left out, "
-                   "and is not written. Edits that merge or sort splats are left out then")
-        ->type_name("PICTURE");
-    const std::vector<CLI::Option*> all = app.get_options();
-    for (size_t i = others; i < all.size(); ++i) all[i]->group("Edits, in the order typed");
+    for (const edit::Row& row : edit::rows()) options::add(app, row.name);
+    options::add(app, "dry-run", arguments.picture);
 }
 
 std::vector<edit::Edit> typed_edits(const CLI::App& app) {

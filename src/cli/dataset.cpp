@@ -80,55 +80,21 @@ int run(const DatasetArguments& arguments) {
 Action add_dataset(CLI::App& app) {
     const auto arguments = std::make_shared<DatasetArguments>();
     SyntheticOptions& options = arguments->options;
-    app.add_option("SCENE", arguments->scene, "glTF file with meshes (.gltf .glb)")
-        ->required()
-        ->type_name("");
-    app.add_option(
-           "-o,--output", arguments->output,
-           "Folder for images/, depth/, points.ply and transforms.json. An interrupted run continues there")
-        ->required()
-        ->type_name("DIR");
-    app.add_option("--views", arguments->views,
-                   "Number of cameras on a dome over the scene; 0: the cameras of the file "
-                   "[those of the file if it has 8 or more, else 48]")
-        ->transform(in_range(0, 100000))
-        ->type_name("N");
-    app.add_option("--size", arguments->size,
-                   "Width and height in pixels [256x256, for equirectangular 256x128]")
-        ->type_name("WxH");
-    app.add_option("--samples", options.samples, "Paths per pixel")
-        ->transform(in_range(1, 65536))
-        ->type_name("N")
-        ->capture_default_str();
-    app.add_option("--points", options.points, "Points on the surfaces, for initial splats; 0: none")
-        ->transform(in_range(0, 10000000))
-        ->type_name("N")
-        ->capture_default_str();
-    app.add_option("--exposure", arguments->exposure, "Exposure in stops, or auto")
-        ->type_name("EV")
-        ->capture_default_str();
-    app.add_flag(
-        "--vary-appearance", arguments->varied,
-        "Give each image an exposure and colours of its own, and the camera a vignette and a response. "
-        "DIR/appearance.json has them");
-    app.add_option("--through", arguments->lens,
-                   std::string("The lens of all cameras, in place of a pinhole: ") + kLensForms)
-        ->type_name("LENS");
-    app.add_option("--rolling-shutter", arguments->shutter,
-                   "A rolling shutter of all cameras, as DIRECTION:DEGREES[,PERCENT]. The directions are "
-                   "top-to-bottom, "
-                   "bottom-to-top, left-to-right and right-to-left. During the readout each camera turns by "
-                   "DEGREES and moves by PERCENT of its distance to the scene, in directions of its own")
-        ->type_name("SHUTTER");
-    app.add_flag("--sky", options.sky, "Show the sky in the images, which else are transparent there");
-    app.add_option("--seed", options.seed,
-                   "Seed of random numbers. The same seed on the same device gives the same bytes")
-        ->check(accepted_by(train::run_option("seed")))
-        ->type_name("S")
-        ->capture_default_str();
-    app.add_flag("--force", options.force, "Replace DIR's views of another scene or of other options");
+    options::add(app, "SCENE", arguments->scene);
+    options::add(app, "output", arguments->output);
+    options::add(app, "views", arguments->views);
+    options::add(app, "size", arguments->size);
+    options::add(app, "samples", options.samples);
+    options::add(app, "points", options.points);
+    options::add(app, "exposure", arguments->exposure);
+    options::add(app, "vary-appearance", arguments->varied);
+    options::add(app, "through", arguments->lens);
+    options::add(app, "rolling-shutter", arguments->shutter);
+    options::add(app, "sky", options.sky);
+    options::add(app, "seed", options.seed);
+    options::add(app, "force", options.force);
     add_device_options(app, arguments->device);
-    add_quiet_option(app, arguments->quiet);
+    options::add(app, "quiet", arguments->quiet);
     return [arguments] { return run(*arguments); };
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa devices: the devices that --device can name.
 #include <spdlog/fmt/fmt.h>
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <memory>
@@ -11,6 +10,7 @@
 #include "core/messages.h"
 #include "core/text.h"
 #include "ewa/device.h"
+#include "options/command_options.h"
 
 namespace ewa::cli {
 namespace {
@@ -51,7 +51,7 @@ int run(bool json) {
 
 Action add_devices(CLI::App& app) {
     const auto json = std::make_shared<bool>(false);
-    app.add_flag("--json", *json, "Print JSON");
+    options::add(app, "json", *json);
     return [json] { return run(*json); };
 }
 

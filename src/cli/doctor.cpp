@@ -243,10 +243,8 @@ int run(const DoctorArguments& arguments) {
 
 Action add_doctor(CLI::App& app) {
     const auto arguments = std::make_shared<DoctorArguments>();
-    app.add_option("-o,--output", arguments->output, "Folder that a training would write to")
-        ->type_name("DIR")
-        ->capture_default_str();
-    app.add_flag("--json", arguments->json, "Print JSON");
+    options::add(app, "output", arguments->output);
+    options::add(app, "json", arguments->json);
     add_device_options(app, arguments->device);
     return [arguments] { return run(*arguments); };
 }

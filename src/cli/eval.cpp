@@ -69,16 +69,14 @@ void print_figures(const Evaluation& evaluation) {
     fmt::print("{}", figure_table(rows));
 }
 
-int run(const EvalArguments& arguments) {
+int run(const CLI::App& app, const EvalArguments& arguments) {
     RenderOptions options = arguments.views.draw.options();
-    const std::vector<NamedFile> written{{"--json", arguments.json}};
-    check_command_outputs(written,
-                          {{"SPLATS", arguments.views.splats}, {"DATASET", arguments.views.dataset}});
+    check_typed_outputs(app);
     const Measures measures = arguments.metrics.measures();
     const Gaussians gaussians = arguments.views.draw.load(arguments.views.splats, options);
     const auto [dataset, refined, frames, folder] =
         load_views(arguments.views, arguments.split, arguments.test_every);
-    check_command_outputs(written, scene::files_of(dataset, "DATASET"));
+    check_typed_outputs(app, {}, scene::files_of(dataset, "DATASET"));
     const std::vector<Appearance> appearances =
         appearances_of(arguments.appearance, arguments.run, dataset, frames);
 
@@ -124,22 +122,19 @@ int run(const EvalArguments& arguments) {
 Action add_eval(CLI::App& app) {
     const auto arguments = std::make_shared<EvalArguments>();
     add_view_positionals(app, arguments->views);
-    app.add_option("--split", arguments->split, "Frames to evaluate: test, train or all")
-        ->transform(one_of({"test", "train", "all"}))
-        ->capture_default_str();
-    add_test_every_option(app, arguments->test_every);
+    options::add(app, "split", arguments->split);
+    options::add(app, "test-every", arguments->test_every);
     add_appearance_options(app, arguments->appearance);
     arguments->metrics.fitted = true;
     add_metric_options(app, arguments->metrics);
-    add_protocol_option(app, arguments->metrics);
-    app.add_flag("--depth", arguments->depth,
-                 "Compare the depth of the renders with the dataset's depth maps, too");
-    app.add_option("--json", arguments->json, "Write the results to this file")->type_name("FILE");
+    options::add(app, "protocol", arguments->metrics.protocol);
+    options::add(app, "depth", arguments->depth);
+    options::add(app, "json", arguments->json);
     add_view_options(app, arguments->views);
     return [&app, arguments] {
         arguments->run = resolve_views(app, arguments->views);
         arguments->appearance.run = folders::run_of_splats(arguments->views.splats);
-        return run(*arguments);
+        return run(app, *arguments);
     };
 }
 

@@ -15,7 +15,6 @@
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
-#include "run/option_table.h"
 #include "scene/dataset_files.h"
 #include "scene/readout.h"
 #include "scene/splat_arrays.h"
@@ -41,7 +40,7 @@ report::Json motion_json(const CameraMotion& m, bool rolling) {
     return {{"rotation", list(m.rotation)}, {"shift", list(m.shift)}, {"log_focal", m.log_focal}};
 }
 
-int run(const GradArguments& arguments) {
+int run(const CLI::App& app, const GradArguments& arguments) {
     RenderOptions options = arguments.views.draw.options();
     if (format_of_name(arguments.output) != SplatFormat::ply)
         throw InputError("--output " + arguments.output.string() +
@@ -49,13 +48,11 @@ int run(const GradArguments& arguments) {
     if (arguments.output.extension() != ".ply")
         throw InputError("the gradient is written as a PLY: -o " + arguments.output.string() +
                          " does not end in .ply");
-    const std::vector<NamedFile> written{{"--output", arguments.output}, {"--json", arguments.json}};
-    check_command_outputs(written,
-                          {{"SPLATS", arguments.views.splats}, {"DATASET", arguments.views.dataset}});
+    check_typed_outputs(app);
     const Gaussians gaussians = arguments.views.draw.load(arguments.views.splats, options);
     const auto [dataset, refined, frames, folder] = load_views(arguments.views, arguments.frame, 0);
     if (frames.size() > 1) throw InputError("--frame: '" + arguments.frame + "' is more than one frame");
-    check_command_outputs(written, scene::files_of(dataset, "DATASET"));
+    check_typed_outputs(app, {}, scene::files_of(dataset, "DATASET"));
     const int index = frames.front();
     const Frame& frame = dataset.frames[size_t(index)];
     make_folder(arguments.output.parent_path());
@@ -92,35 +89,20 @@ int run(const GradArguments& arguments) {
 Action add_grad(CLI::App& app) {
     const auto arguments = std::make_shared<GradArguments>();
     add_view_positionals(app, arguments->views);
-    app.add_option("--frame", arguments->frame,
-                   "The view: its index over all frames, in name order from 0, or its name")
-        ->required()
+    options::add(app, "frame", arguments->frame)
         ->check(CLI::Validator(
             [](const std::string& text) {
                 const bool below = core::parse_integer<int>(text).value_or(0) < 0;
                 return below ? "'" + text + "' is no frame: frames are numbered from 0" : std::string();
             },
-            ""))
-        ->type_name("I|NAME");
-    app.add_option(
-           "-o,--output", arguments->output,
-           "PLY with the properties of a splat file; each holds the gradient dL/d(stored value). That of a "
-           "density is by its own logit, not by the opacity that is stored for other programs")
-        ->required()
-        ->type_name("OUT.ply");
-    app.add_option("--json", arguments->json, "Write loss, l1, ssim, frame (index) and name to this file")
-        ->type_name("FILE");
-    const train::RunOption& loss = train::run_option("loss");
-    app.add_option_function<std::string>(
-           "--loss", [&loss, arguments](const std::string& text) { loss.set(arguments->run, text); },
-           loss.help)
-        ->check(accepted_by(loss))
-        ->type_name(loss.value)
-        ->default_str(train::value_text(loss, {}));
+            ""));
+    options::add(app, "output", arguments->output);
+    options::add(app, "json", arguments->json);
+    options::add(app, "loss", arguments->run);
     add_view_options(app, arguments->views);
     return [&app, arguments] {
         resolve_views(app, arguments->views);
-        return run(*arguments);
+        return run(app, *arguments);
     };
 }
 

@@ -458,16 +458,10 @@ int run(const InfoArguments& arguments) {
 
 Action add_info(CLI::App& app) {
     const auto arguments = std::make_shared<InfoArguments>();
-    app.add_option("PATH", arguments->path,
-                   "Splat file (" + io::extension_list(io::Uses::read) +
-                       "), COLMAP folder, "
-                       "transforms.json, cameras of another program, zip archive of one of these, "
-                       "glTF file of meshes, image, folder of photos, video, or folder of a training run")
-        ->required();
-    add_test_every_option(app, arguments->test_every);
-    app.add_flag("--json", arguments->json, "Print JSON");
-    app.add_flag("--verbose", arguments->verbose,
-                 "Also print the work that rendering and training skip, and each photo of a dataset");
+    options::add(app, "PATH", arguments->path);
+    options::add(app, "test-every", arguments->test_every);
+    options::add(app, "json", arguments->json);
+    options::add(app, "verbose", arguments->verbose);
     return [arguments] { return run(*arguments); };
 }
 

@@ -6,8 +6,11 @@
 
 #include "core/typing.h"
 #include "ewa/error.h"
+#include "options/option.h"
 
 namespace ewa::cli {
+
+using options::kLensForms;
 
 LensArgument lens_of(const std::string& text) {
     constexpr size_t kShown = 60;  // bytes of the text in an error

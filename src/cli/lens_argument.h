@@ -7,9 +7,6 @@
 
 namespace ewa::cli {
 
-inline constexpr const char* kLensForms =
-    "fisheye[:DEGREES] (180), equirectangular, orthographic or opencv:K1[,K2[,P1,P2]]";
-
 struct LensArgument {
     Distortion lens;
     double fisheye_degrees = 180;  // along the smaller side of a fisheye's image; above 0, at most 360

@@ -62,15 +62,12 @@ std::optional<Dataset> dataset_of_mesh(const MeshArguments& arguments,
     return dataset;
 }
 
-void check_output(const MeshArguments& arguments, const std::optional<Dataset>& dataset) {
+void check_output(const CLI::App& app, const MeshArguments& arguments,
+                  const std::optional<Dataset>& dataset) {
     mesh::check_mesh_name(arguments.output);
     io::check_not_inside_dataset("-o", fs::absolute(arguments.output).parent_path());
-    std::vector<NamedFile> read{{"SPLATS", arguments.splats}, {"--cameras", arguments.cameras}};
-    if (dataset) {
-        const std::vector<NamedFile> more = scene::files_of(*dataset, "the dataset");
-        read.insert(read.end(), more.begin(), more.end());
-    }
-    check_command_outputs({{"the mesh", arguments.output}}, read);
+    check_typed_outputs(app, {},
+                        dataset ? scene::files_of(*dataset, "the dataset") : std::vector<NamedFile>());
 }
 
 /// Whether the surfaces are at the mean depth of the splats, which --loss depth brings onto them; else at the median depth.
@@ -102,7 +99,7 @@ void print(const mesh::Fused& fused, const MeshArguments& arguments, size_t most
                                   triangles));
 }
 
-int make_mesh(const MeshArguments& arguments, const std::optional<folders::Run>& run) {
+int make_mesh(const CLI::App& app, const MeshArguments& arguments, const std::optional<folders::Run>& run) {
     RenderOptions options;
     const DrawArguments draw;
     const glm::dmat4 placement = placement_of(arguments);
@@ -112,7 +109,7 @@ int make_mesh(const MeshArguments& arguments, const std::optional<folders::Run>&
         throw InputError("--up is for .glb and .obj, whose y points up; --transform turns a .ply");
     const Gaussians gaussians = draw.load(arguments.splats, options);
     const std::optional<Dataset> dataset = dataset_of_mesh(arguments, run);
-    check_output(arguments, dataset);
+    check_output(app, arguments, dataset);
     // The splats of a run have seen no more than its images.
     const mesh::Pinholes pinholes = dataset ? mesh::Pinholes(*dataset, !run || !arguments.cameras.empty())
                                             : mesh::cameras_around(gaussians);
@@ -143,55 +140,28 @@ int run(CLI::App& app, MeshArguments& arguments) {
         throw InputError(core::one_line(arguments.splats.string()) +
                          " holds the spheres of --points, which have no surfaces");
     if (input.run) use_options_of(*input.run, app, arguments.cameras);
-    return make_mesh(arguments, input.run);
+    return make_mesh(app, arguments, input.run);
 }
 
 }  // namespace
 
 Action add_mesh(CLI::App& app) {
     const auto arguments = std::make_shared<MeshArguments>();
-    add_splats(app, arguments->splats);
-    app.add_option("-o,--output", arguments->output, "The mesh (.ply, .obj, .glb)")
-        ->required()
-        ->type_name("OUT");
-    app.add_option("--cameras", arguments->cameras,
-                   "Dataset whose cameras see the surfaces [that of the run; without a run, cameras all "
-                   "around the splats]")
-        ->type_name("DATASET");
-    app.add_option("--voxel", arguments->voxel,
-                   "Distance of the mesh's vertices, in the scene's units [two pixels on the surfaces]")
-        ->transform(in_range(1e-12, 1e12))
-        ->type_name("SIZE");
-    app.add_option("--triangles", arguments->triangles,
-                   "At most this many triangles, where the surface needs no more to hang together [all]")
-        ->transform(in_range(4, 1000000000))
-        ->type_name("N");
-    app.add_option(
-           "--depth", arguments->depth,
-           "Where a pixel's surface is: at the median or the mean depth of its splats. auto: the mean if the "
-           "run compared it with depth maps (--loss depth=W), else the median")
-        ->transform(one_of({"auto", "median", "mean"}))
-        ->type_name("auto|median|mean")
-        ->capture_default_str();
-    app.add_flag(
-        "--unbounded", arguments->unbounded,
-        "Also mesh the background, with voxels that grow with the distance from what the cameras look at");
-    app.add_flag("--collision", arguments->collision,
-                 "A mesh for physics: closed, coarse, of at most 10,000 triangles, without colours");
-    add_transform_option(app, arguments->transform, "Of the mesh");
-    app.add_option(
-           "--up", arguments->up,
-           "Axis of the scene that becomes y in a .glb or .obj: x, y, z, or the opposite [-y, as for splats "
-           "in a .glb]")
-        ->type_name("AXIS");
-    app.add_option(
-           "--scale-to", arguments->scale_to,
-           "Scale the mesh until these two points of the scene are LENGTH apart; they are its points before "
-           "--transform. ewa-view measures points")
-        ->type_name("x,y,z,X,Y,Z,LENGTH");
-    add_size_options(app, arguments->downscale, arguments->max_width);
+    options::add(app, "SPLATS", arguments->splats);
+    options::add(app, "output", arguments->output);
+    options::add(app, "cameras", arguments->cameras);
+    options::add(app, "voxel", arguments->voxel);
+    options::add(app, "triangles", arguments->triangles);
+    options::add(app, "depth", arguments->depth);
+    options::add(app, "unbounded", arguments->unbounded);
+    options::add(app, "collision", arguments->collision);
+    options::add(app, "transform", arguments->transform);
+    options::add(app, "up", arguments->up);
+    options::add(app, "scale-to", arguments->scale_to);
+    options::add(app, "downscale", arguments->downscale);
+    options::add(app, "max-width", arguments->max_width);
     add_device_options(app, arguments->device);
-    add_quiet_option(app, arguments->quiet);
+    options::add(app, "quiet", arguments->quiet);
     return [&app, arguments] { return run(app, *arguments); };
 }
 

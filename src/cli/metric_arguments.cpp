@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cli/arguments.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "options/command_options.h"
 
 namespace ewa::cli {
 namespace {
@@ -59,13 +59,9 @@ Measures MetricArguments::measures() const {
 }
 
 void add_metric_options(CLI::App& app, MetricArguments& arguments) {
-    std::string names;
-    for (const Metric& metric : all_metrics()) names += (names.empty() ? "" : ", ") + metric.name;
-    app.add_option(
-           "--metrics", arguments.metrics,
-           "Metrics beside PSNR and SSIM: all, bands, or some of " + names + ", with commas between them")
-        ->transform(CLI::Validator(
-            [](std::string& text) {
+    options::add(app, "metrics", arguments.metrics)
+        ->check(CLI::Validator(
+            [](const std::string& text) {
                 try {
                     metrics_named(text);
                     return std::string();
@@ -73,17 +69,7 @@ void add_metric_options(CLI::App& app, MetricArguments& arguments) {
                     return std::string(error.what());
                 }
             },
-            ""))
-        ->type_name("LIST");
-}
-
-void add_protocol_option(CLI::App& app, MetricArguments& arguments) {
-    app.add_option(
-           "--protocol", arguments.protocol,
-           "How images are compared. ewa: as they are. nerfbaselines, inria: as these round, composite "
-           "and resize, for figures beside theirs")
-        ->transform(one_of({"ewa", "nerfbaselines", "inria"}))
-        ->capture_default_str();
+            ""));
 }
 
 std::string figure_table(const std::vector<FigureRow>& rows) {

@@ -25,8 +25,6 @@ struct MetricArguments {
 };
 /// --metrics.
 void add_metric_options(CLI::App& app, MetricArguments& arguments);
-/// --protocol.
-void add_protocol_option(CLI::App& app, MetricArguments& arguments);
 
 /// The figures of an image, or their means.
 struct FigureRow {

@@ -5,22 +5,27 @@
 #include <nlohmann/json.hpp>
 
 #include <cstdio>
+#include <utility>
 
 #include "core/text.h"
 #include "ewa/error.h"
 #include "folders/run.h"
 #include "folders/run_folder.h"
+#include "options/command_options.h"
 
 namespace ewa::cli {
 
 namespace {
 
-/// Adds the files of each run whose splats are read.
+namespace fs = std::filesystem;
+
+/// Adds the files of each run that is read, or whose splats are.
 void add_run_files(std::vector<NamedFile>& read) {
     for (size_t i = 0, count = read.size(); i < count; ++i) {
-        const auto run = folders::run_of_splats(read[i].path);
-        if (!run) continue;
-        for (const char* name : folders::kRunFiles) read.push_back({"a file of the run", run->folder / name});
+        fs::path folder = read[i].path;
+        if (const auto run = folders::run_of_splats(folder)) folder = run->folder;
+        if (!folders::is_run(folder)) continue;
+        for (const char* name : folders::kRunFiles) read.push_back({"a file of the run", folder / name});
     }
 }
 
@@ -34,6 +39,13 @@ void check_command_outputs(const std::vector<NamedFile>& written, std::vector<Na
                                             "; it would be overwritten; name another file"));
     add_run_files(read);
     core::check_outputs(written, read);
+}
+
+void check_typed_outputs(const CLI::App& app, std::vector<NamedFile> written, std::vector<NamedFile> read) {
+    options::TypedFiles typed = options::typed_files(app);
+    written.insert(written.end(), typed.written.begin(), typed.written.end());
+    typed.read.insert(typed.read.end(), read.begin(), read.end());
+    check_command_outputs(written, std::move(typed.read));
 }
 
 void print_json(const report::Json& json) {

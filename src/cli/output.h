@@ -9,6 +9,10 @@
 #include "core/progress.h"
 #include "report/summary.h"
 
+namespace CLI {
+class App;
+}
+
 namespace ewa::cli {
 
 using core::make_folder;
@@ -18,6 +22,10 @@ using core::write_json;
 
 /// core::check_outputs for every command but `ewa train`. It also refuses outputs that are files of a training run.
 void check_command_outputs(const std::vector<NamedFile>& written, std::vector<NamedFile> read);
+
+/// The same for the files that the command line names, by the roles of its options, and more files.
+void check_typed_outputs(const CLI::App& app, std::vector<NamedFile> written = {},
+                         std::vector<NamedFile> read = {});
 
 /// Prints the value with indentation. Bytes that are not UTF-8 become U+FFFD: text from a file may hold some.
 void print_json(const report::Json& json);

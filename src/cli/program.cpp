@@ -7,16 +7,15 @@
 #include <string>
 #include <vector>
 
-#include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/interrupt.h"
-#include "cli/short_help.h"
 #include "cli/status.h"
 #include "cli/usage.h"
 #include "core/exclusion.h"
 #include "core/folders.h"
 #include "core/terminal.h"
 #include "core/text.h"
+#include "options/command_options.h"
 
 namespace ewa::cli {
 namespace {
@@ -37,6 +36,7 @@ int print_text(const CLI::App& app, const CLI::ParseError& asked) {
 
 int run(const Command& command) {
     return status_of(std::string("ewa ") + command.name, [&] {
+        options::check_typed(*command.app);
         remove_temporary_files_on_signals();
         return command.action();
     });
@@ -100,8 +100,7 @@ int run_arguments(int argc, char** argv) {
     for (Command& command : commands) {
         command.app = app.add_subcommand(command.name, command.description);
         command.action = command.add(*command.app);
-        group_by_subject(*command.app);
-        use_short_help(*command.app);
+        options::arrange_help(*command.app);
     }
     core::refuse_empty_values<CLI::Validator>(app);
 

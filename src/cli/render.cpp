@@ -43,9 +43,9 @@ namespace fs = std::filesystem;
 struct RenderArguments {
     fs::path splats, cameras, output = "out/render";
     std::string frames = "all", format = "png", mode = "color", through, codec;
-    LensUse lens_use = LensUse::automatic;  // of a dataset's cameras
+    RunOptions of_cameras;  // of a dataset: its lens, downscale and max_width
     AppearanceArguments appearance;
-    int test_every = 8, downscale = 1, max_width = 0;
+    int test_every = 8;
     ViewsArguments views;
     PictureArguments picture;
     DrawArguments draw;
@@ -167,7 +167,7 @@ std::vector<fs::path> files_of_frames(const RenderArguments& arguments, const Da
 }
 
 /// Throws if a render would replace a file that is read, or land among photos.
-void check_renders(const RenderArguments& arguments, const std::vector<fs::path>& files,
+void check_renders(const CLI::App& app, const RenderArguments& arguments, const std::vector<fs::path>& files,
                    const Dataset* dataset) {
     // The user names a single file, so its folder may be a dataset.
     const fs::path folder = files[0] == arguments.output ? fs::path() : arguments.output;
@@ -177,15 +177,10 @@ void check_renders(const RenderArguments& arguments, const std::vector<fs::path>
         io::check_output_folder("-o", folder, *dataset);
     else
         io::check_output_folder("-o", folder);
-    std::vector<NamedFile> written, read{{"SPLATS", arguments.splats},
-                                         {"--views", arguments.views.views},
-                                         {"--cameras", arguments.cameras}};
+    std::vector<NamedFile> written;
     for (const fs::path& file : files) written.push_back({"the render", file});
-    if (dataset) {
-        const std::vector<NamedFile> more = scene::files_of(*dataset, "the dataset");
-        read.insert(read.end(), more.begin(), more.end());
-    }
-    check_command_outputs(written, read);
+    check_typed_outputs(app, written,
+                        dataset ? scene::files_of(*dataset, "the dataset") : std::vector<NamedFile>());
 }
 
 /// The view of a frame through another lens. A 360° image is twice as wide as high, and as high as the frame's longer side.
@@ -243,20 +238,20 @@ void check_motion(const RenderArguments& arguments, const ViewPath& views) {
         throw InputError("--shutter: there is no motion; the film has one frame");
 }
 
-int render_dataset_views(RenderArguments arguments) {
+int render_dataset_views(const CLI::App& app, RenderArguments arguments) {
     RenderOptions options = arguments.draw.options();
     const Gaussians gaussians = load_scene(arguments, options);
-    Dataset dataset = load_cameras_as_trained(
-        arguments.cameras,
-        {.downscale = arguments.downscale, .max_width = arguments.max_width, .lens = arguments.lens_use});
+    Dataset dataset = load_cameras_as_trained(arguments.cameras, {.downscale = arguments.of_cameras.downscale,
+                                                                  .max_width = arguments.of_cameras.max_width,
+                                                                  .lens = arguments.of_cameras.lens});
     const fs::path refined = arguments.cameras_of_run ? refined_cameras_of(*arguments.run) : fs::path();
     if (!refined.empty()) io::use_refined_cameras(dataset, refined);
     const std::vector<int> frames = select_frames(dataset, arguments.frames, arguments.test_every);
     const std::vector<fs::path> files = files_of_frames(arguments, dataset, frames);
     const bool path = dataset.frame_rate > 0;
-    check_picture(arguments.picture, arguments.mode, path, core::lower(files[0].extension().string()));
+    check_picture(arguments.picture, path, core::lower(files[0].extension().string()));
     arguments.format = core::lower(files[0].extension().string()).substr(1);
-    check_renders(arguments, files, &dataset);
+    check_renders(app, arguments, files, &dataset);
     const std::string encoder = encoder_of(arguments);
     const std::vector<Appearance> appearances = appearances_of(
         arguments.appearance, arguments.cameras_of_run ? arguments.run : std::nullopt, dataset, frames);
@@ -296,21 +291,21 @@ scene::FramingHints hints_of(const std::optional<Dataset>& dataset) {
 }
 
 /// Without the cameras of a dataset.
-int render_free_views(RenderArguments arguments) {
+int render_free_views(const CLI::App& app, RenderArguments arguments) {
     const ViewsOutput output = views_output(arguments.output);
     const bool film = output == ViewsOutput::film, one_image = output == ViewsOutput::image;
     RenderOptions options = arguments.draw.options();
     check_views(arguments.views);
     const std::string encoder = encoder_of(arguments);
     const bool path = film || arguments.views.orbit > 1 || arguments.views.film_seconds > 0;
-    check_picture(arguments.picture, arguments.mode, path,
+    check_picture(arguments.picture, path,
                   output == ViewsOutput::folder ? "." + arguments.format
                                                 : core::lower(arguments.output.extension().string()));
     if (one_image) arguments.format = core::lower(arguments.output.extension().string()).substr(1);
     const std::optional<Dataset> dataset = dataset_of_run(arguments);
     const Dataset* const known = dataset ? &*dataset : nullptr;
     std::vector<fs::path> files{arguments.output};
-    if (output != ViewsOutput::folder) check_renders(arguments, files, known);
+    if (output != ViewsOutput::folder) check_renders(app, arguments, files, known);
     const NewViewAppearance appearance = appearance_of_new_views(
         arguments.appearance, arguments.run_is_folder ? arguments.run : std::nullopt, known);
     const Gaussians gaussians = load_scene(arguments, options);
@@ -325,7 +320,7 @@ int render_free_views(RenderArguments arguments) {
         files.clear();
         for (size_t i = 0; i < views.cameras.size(); ++i)
             files.push_back(arguments.output / fmt::format("{:05}.{}", i, arguments.format));
-        check_renders(arguments, files, known);
+        check_renders(app, arguments, files, known);
     }
 
     Renderer renderer(open_device(arguments.device), gaussians, options);
@@ -355,8 +350,6 @@ int run(CLI::App& app, RenderArguments& arguments) {
     std::string of_frames;  // a given option that only a dataset's views have
     for (const char* option : {"--frames", "--test-every", "--downscale", "--max-width", "--lens"})
         if (app.count(option) > 0) of_frames = option;
-    if (arguments.mode == "depth" && arguments.draw.integrator == "march")
-        throw InputError("--mode depth: the integrator march draws no depth; the others do");
     if (!arguments.codec.empty() && views_output(arguments.output) != ViewsOutput::film)
         throw InputError("--codec: only a film has one, such as -o film.mp4");
     SplatInput input = splat_input(arguments.splats);
@@ -365,7 +358,7 @@ int run(CLI::App& app, RenderArguments& arguments) {
     if (!arguments.cameras.empty()) arguments.cameras = dataset_input(arguments.cameras);
     if (input.run) use_options_of(*input.run, app, arguments.cameras);
     if (!arguments.through.empty()) arguments.views.lens = lens_of(arguments.through);
-    if (!arguments.cameras.empty()) return render_dataset_views(arguments);
+    if (!arguments.cameras.empty()) return render_dataset_views(app, arguments);
     const ViewsOutput output = views_output(arguments.output);
     const bool free = any_given(arguments.views) || (arguments.views.lens && of_frames.empty()) ||
                       output == ViewsOutput::film || (output == ViewsOutput::image && of_frames.empty());
@@ -373,58 +366,35 @@ int run(CLI::App& app, RenderArguments& arguments) {
         arguments.cameras = dataset_of(*input.run);
         arguments.run = std::move(input.run);
         arguments.cameras_of_run = true;
-        return render_dataset_views(arguments);
+        return render_dataset_views(app, arguments);
     }
     if (!of_frames.empty()) refuse_dataset_options(app, of_frames, input.run.has_value());
     arguments.run_is_folder = input.run.has_value();
     arguments.run = arguments.appearance.run;
-    return render_free_views(arguments);
+    return render_free_views(app, arguments);
 }
 
 }  // namespace
 
 Action add_render(CLI::App& app) {
     const auto arguments = std::make_shared<RenderArguments>();
-    add_splats(app, arguments->splats);
-    CLI::Option* cameras = app.add_option("--cameras", arguments->cameras,
-                                          "Dataset whose cameras to render through [that of a run], or a "
-                                          "camera_path.json of nerfstudio. Without, the whole scene is shown "
-                                          "from the front")
-                               ->type_name("DATASET");
-    app.add_option("-o,--output", arguments->output,
-                   "Folder for the renders, named like the images of the dataset or by number. Or one image "
-                   "(.png, .jpg, .exr). "
-                   "Without --cameras, and of a camera_path.json, also a film (.mp4, .mov, .mkv, .webm) that "
-                   "the program ffmpeg writes")
-        ->type_name("OUT")
-        ->capture_default_str();
-    add_views_options(app, arguments->views, cameras);
-    add_frames_options(app, arguments->frames, arguments->test_every);
-    app.add_option("--format", arguments->format,
-                   "Format in a folder: png, jpg (8 bit, clamped) or exr (float32, not clamped)")
-        ->transform(one_of({"png", "jpg", "exr"}))
-        ->capture_default_str();
-    app.add_option("--mode", arguments->mode,
-                   "color, alpha, depth (mean view z; divided by its maximum in a png), median-depth (of the "
-                   "surface) or normal (of the surface, in world axes; from -1..1 to 0..1 in a png)")
-        ->transform(one_of({"color", "depth", "alpha", "median-depth", "normal"}))
-        ->capture_default_str();
-    app.add_option(
-           "--codec", arguments->codec,
-           "How a film is packed, if ffmpeg can: h264, hevc, av1 or vp9 [ffmpeg's choice for the name: "
-           "h264 in .mp4]")
-        ->transform(one_of({"h264", "hevc", "av1", "vp9"}))
-        ->type_name("CODEC");
+    options::add(app, "SPLATS", arguments->splats);
+    options::add(app, "cameras", arguments->cameras);
+    options::add(app, "output", arguments->output);
+    add_views_options(app, arguments->views);
+    options::add(app, "frames", arguments->frames);
+    options::add(app, "test-every", arguments->test_every);
+    options::add(app, "format", arguments->format);
+    options::add(app, "mode", arguments->mode);
+    options::add(app, "codec", arguments->codec);
     add_picture_options(app, arguments->picture);
     add_draw_options(app, arguments->draw);
-    app.add_option("--through", arguments->through,
-                   std::string("Lens to render through, in place of a pinhole: ") + kLensForms)
-        ->type_name("LENS");
-    add_lens_option(app, arguments->lens_use);
-    add_size_options(app, arguments->downscale, arguments->max_width);
+    options::add(app, "through", arguments->through);
+    for (const char* name : {"lens", "downscale", "max-width"})
+        options::add(app, name, arguments->of_cameras);
     add_appearance_options(app, arguments->appearance);
     add_device_options(app, arguments->device);
-    add_quiet_option(app, arguments->quiet);
+    options::add(app, "quiet", arguments->quiet);
     return [&app, arguments] { return run(app, *arguments); };
 }
 

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cli/arguments.h"
 #include "ewa/error.h"
+#include "options/command_options.h"
 #include "scene/camera.h"
 #include "scene/color.h"
 #include "scene/native_lens.h"
@@ -30,40 +30,17 @@ void divide(Image& sum, int count, bool linear) {
 }  // namespace
 
 void add_picture_options(CLI::App& app, PictureArguments& arguments) {
-    app.add_option("--aperture", arguments.aperture,
-                   "Depth of field: diameter of the lens (world units). What is out of focus becomes blurred")
-        ->transform(in_range(1e-9, 1e9))
-        ->type_name("D");
-    app.add_option("--focus", arguments.focus,
-                   "Distance along the view that is sharp (world units) [that of what the middle of the "
-                   "image shows]")
-        ->transform(in_range(1e-9, 1e9))
-        ->type_name("D");
-    app.add_option("--shutter", arguments.shutter,
-                   "Motion blur of films, orbits and paths: the share of a frame's time that the shutter is "
-                   "open; 0.5 is usual")
-        ->transform(in_range(0.01, 1.0))
-        ->type_name("0..1");
-    app.add_option("--blur-samples", arguments.blur_samples,
-                   "Renders that --aperture and --shutter average for an image")
-        ->transform(in_range(2, 4096))
-        ->type_name("N")
-        ->capture_default_str();
-    app.add_flag("--transparent", arguments.transparent,
-                 "No background: a png has alpha, and an exr colour over black");
+    options::add(app, "aperture", arguments.aperture);
+    options::add(app, "focus", arguments.focus);
+    options::add(app, "shutter", arguments.shutter);
+    options::add(app, "blur-samples", arguments.blur_samples);
+    options::add(app, "transparent", arguments.transparent);
 }
 
-void check_picture(const PictureArguments& arguments, const std::string& mode, bool path,
-                   const std::string& extension) {
-    const bool color = mode == "color" || mode == "alpha";
-    if (arguments.blurs() && !color)
-        throw InputError("--aperture and --shutter average colours: --mode color or alpha");
+void check_picture(const PictureArguments& arguments, bool path, const std::string& extension) {
     if (arguments.shutter > 0 && !path)
         throw InputError("--shutter: there is no motion; it needs a film, --orbit or --film-seconds");
-    if (arguments.focus > 0 && arguments.aperture == 0) throw InputError("--focus needs --aperture");
-    if (!arguments.transparent) return;
-    if (mode != "color") throw InputError("--transparent needs --mode color");
-    if (extension != ".png" && extension != ".exr")
+    if (arguments.transparent && extension != ".png" && extension != ".exr")
         throw InputError("--transparent: " + extension + " has no alpha; a .png and an .exr have");
 }
 

@@ -26,10 +26,9 @@ struct PictureArguments {
 /// --aperture, --focus, --shutter, --blur-samples and --transparent.
 void add_picture_options(CLI::App& app, PictureArguments& arguments);
 
-/// Throws InputError for options that exclude each other. mode: of --mode. path: whether the views are moments of one motion. extension: of
-/// the images in lower case, with its dot.
-void check_picture(const PictureArguments& arguments, const std::string& mode, bool path,
-                   const std::string& extension);
+/// Throws InputError where the images do not go with the options. path: whether the views are moments of one motion. extension: of the
+/// images in lower case, with its dot.
+void check_picture(const PictureArguments& arguments, bool path, const std::string& extension);
 
 /// Takes pictures of views. It keeps the distance of focus that it has found for the first of a path.
 class PictureTaker {

@@ -131,32 +131,13 @@ std::optional<glm::dvec3> parse_up(const std::string& text) {
     return up;
 }
 
-void add_views_options(CLI::App& app, ViewsArguments& arguments, CLI::Option* cameras) {
-    const auto option = [&](const char* name, auto& value, const char* type, const char* help) {
-        return app.add_option(name, value, help)->type_name(type)->excludes(cameras);
-    };
-    option("--size", arguments.size, "WxH",
-           "Size of the renders in px, or of a screen: 720p, 1080p, 1440p, 4k, 8k [1280x720, or that of the "
-           "saved view]");
-    CLI::Option* orbit = option("--orbit", arguments.orbit, "N",
-                                "N views round the scene; a film shows 30 a second [240 for a film]")
-                             ->transform(in_range(1, kMostFrames));
-    CLI::Option* eye = option("--look-at", arguments.look_at, "x,y,z,X,Y,Z",
-                              "Look from x,y,z at X,Y,Z (world units). With --orbit: the first view");
-    option(
-        "--up", arguments.up, "AXIS",
-        "Axis that points up: x, y, z, or the opposite such as --up=-y [guessed: -y unless the ground says "
-        "otherwise; a run's cameras]");
-    option(
-        "--views", arguments.views, "FILE",
-        "Saved views, in the format that ewa-view writes. A folder gets one image of each view, a film goes "
-        "from each view to the next")
-        ->excludes(orbit)
-        ->excludes(eye);
-    option("--film-seconds", arguments.film_seconds, "S",
-           "With --views: seconds from view to view [2]. A folder gets the frames of the film")
-        ->transform(in_range(0.04, 3600.0))
-        ->needs("--views");
+void add_views_options(CLI::App& app, ViewsArguments& arguments) {
+    options::add(app, "size", arguments.size);
+    options::add(app, "orbit", arguments.orbit);
+    options::add(app, "look-at", arguments.look_at);
+    options::add(app, "up", arguments.up);
+    options::add(app, "views", arguments.views);
+    options::add(app, "film-seconds", arguments.film_seconds);
 }
 
 bool any_given(const ViewsArguments& arguments) {

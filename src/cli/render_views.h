@@ -29,8 +29,8 @@ struct ViewsArguments {
     std::optional<glm::dvec3> inside = {};
 };
 
-/// --size, --look-at, --up, --orbit, --views and --film-seconds, which exclude `cameras`.
-void add_views_options(CLI::App& app, ViewsArguments& arguments, CLI::Option* cameras);
+/// --size, --orbit, --look-at, --up, --views and --film-seconds.
+void add_views_options(CLI::App& app, ViewsArguments& arguments);
 
 /// Whether one of these options is given.
 bool any_given(const ViewsArguments& arguments);
@@ -44,7 +44,7 @@ ViewsOutput views_output(const std::filesystem::path& path);
 /// Parses --up. Empty: not given. Throws InputError.
 std::optional<glm::dvec3> parse_up(const std::string& text);
 
-/// Throws InputError for texts that cannot be read, and options that exclude each other. The scene is not needed.
+/// Throws InputError for texts that cannot be read. The scene is not needed.
 void check_views(const ViewsArguments& arguments);
 
 /// The camera through the lens, where middle (world) is what it looks at. A 360° image has its horizon level.

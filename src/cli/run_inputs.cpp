@@ -59,14 +59,8 @@ void use_options_of(const folders::Run& run, CLI::App& app, const fs::path& othe
 }
 
 void add_appearance_options(CLI::App& app, AppearanceArguments& arguments) {
-    app.add_option("--exposures", arguments.file,
-                   "Appearance of training images, as ewa train --appearance writes it. auto: that of the "
-                   "run SPLATS, with its own dataset")
-        ->type_name("auto|none|FILE")
-        ->capture_default_str();
-    app.add_option("--appearance-of", arguments.of,
-                   "Training image whose appearance all images get [each its own, and new ones the mean]")
-        ->type_name("NAME");
+    options::add(app, "exposures", arguments.file);
+    options::add(app, "appearance-of", arguments.of);
 }
 
 namespace {

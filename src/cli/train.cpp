@@ -44,31 +44,6 @@ struct TrainArguments {
     std::string quality;           // empty: not given
 };
 
-void add_run_option(CLI::App& app, const train::RunOption& option, RunOptions& options) {
-    const bool positional = option.name == "dataset";
-    std::string name = positional ? "DATASET" : "--" + option.name;
-    if (option.name == "steps") name += ",--iterations,--iters";  // as other trainers call them
-    if (option.flag) {
-        app.add_flag(name, option.flag(options), option.help);
-        return;
-    }
-    CLI::Option* added = app.add_option_function<std::string>(
-        name, [&option, &options](const std::string& text) { option.set(options, text); }, option.help);
-    if (option.choices.empty())
-        added->check(accepted_by(option))->type_name(positional ? "" : option.value);
-    else
-        added->transform(one_of(option.choices))->type_name(option.value);
-    added->default_str(train::value_text(option, options));
-    if (option.subject.empty()) added->group("");
-}
-
-void add_run_options(CLI::App& app, TrainArguments& arguments) {
-    for (const train::RunOption& option : train::run_options()) {
-        if (option.name == "device") continue;  // comes with --validation
-        add_run_option(app, option, arguments.run);
-    }
-}
-
 /// Reads the config, if there is one. Then sets the steps of --quality, unless they are given themselves. A quality of the
 /// command line goes before steps of the config.
 void apply_config_and_quality(CLI::App& app, TrainArguments& arguments) {
@@ -225,40 +200,22 @@ int run_rank(CLI::App& app, TrainArguments& arguments) {
 
 Action add_train(CLI::App& app, const std::string& command_line) {
     const auto arguments = std::make_shared<TrainArguments>();
-    RunOptions& options = arguments->run;
-    options.command = command_line;
-    app.add_option("-o,--output", options.output,
-                   "Folder for splats.ply, summary.json, metrics.jsonl, report.html, config.json and "
-                   "checkpoint.ewa [out/<name of the dataset>]")
-        ->type_name("DIR");
-    add_run_options(app, *arguments);
-    app.add_option("--quality", arguments->quality,
-                   "low: 2000 steps. medium: 7000. high: 30000, the default. --steps goes before it")
-        ->transform(one_of(core::words_of(train::kQualities)));
-    app.add_option(
-           "--serve", arguments->output.serve,
-           "Let ewa-view and HTTP clients watch by this port (0: any free port). Only this machine can "
-           "connect, unless an address stands before the port. Pausing and saving need the token in "
-           "DIR/live.json")
-        ->type_name("[ADDRESS:]PORT");
-    CLI::Option* resume =
-        app.add_flag("--resume", options.resume,
-                     "Continue the run in DIR, which DATASET may also name, from its "
-                     "checkpoint.ewa, or start if there is none. The run keeps its options; "
-                     "more --steps than before train it further");
-    app.add_flag("--force", options.force,
-                 "Replace the run in DIR. Without --resume or --force it is refused")
-        ->excludes(resume);
-    app.add_option("--config", arguments->config,
-                   "JSON with the names of these options, such as a run's config.json. The command line has "
-                   "precedence")
-        ->type_name("FILE");
-    add_device_options(app, options.device);
+    RunOptions& run = arguments->run;
+    run.command = command_line;
+    options::add(app, "output", run.output);
+    for (const train::RunOption& option : train::run_options())
+        if (option.name != "device")
+            options::add(app, option.name == "dataset" ? "DATASET" : option.name, run);
+    options::add(app, "quality", arguments->quality);
+    options::add(app, "serve", arguments->output.serve);
+    options::add(app, "resume", run.resume);
+    options::add(app, "force", run.force);
+    options::add(app, "config", arguments->config);
+    add_device_options(app, run.device);
     // For ewa-view, which reports wrong options before its window opens.
-    app.add_flag("--check-options", arguments->check_only)->group("");
-    const auto quiet = app.add_flag("--quiet", arguments->output.quiet, "Print only errors");
-    app.add_flag("--verbose", arguments->output.verbose, "Print the plan: what this scene does not need")
-        ->excludes(quiet);
+    options::add(app, "check-options", arguments->check_only);
+    options::add(app, "quiet", arguments->output.quiet);
+    options::add(app, "verbose", arguments->output.verbose);
     return [&app, arguments] { return run_rank(app, *arguments); };
 }
 

@@ -3,43 +3,13 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <map>
 #include <string_view>
 #include <vector>
 
 #include "core/typing.h"
-#include "run/option_table.h"
 
 namespace ewa::cli {
 namespace {
-
-constexpr size_t kFewOptions = 8;  // more are in groups
-
-/// Options that are none of a training. Those have their subject in train::run_options().
-const std::map<std::string, std::string>& subjects() {
-    static const std::map<std::string, std::string> table = [] {
-        std::map<std::string, std::string> made;
-        const auto add = [&made](const char* subject, std::initializer_list<const char*> names) {
-            for (const char* name : names) made[name] = subject;
-        };
-        add("Data", {"cameras",      "frame",        "split",   "transform", "exposures", "appearance-of",
-                     "max-sh",       "sort",         "splats",  "cases",     "decimate",  "level",
-                     "bake-sky",     "views",        "size",    "look-at",   "up",        "orbit",
-                     "film-seconds", "matching",     "visible", "view-time", "aperture",  "focus",
-                     "shutter",      "scene-splats", "geo",     "scale-to",  "through"});
-        add("Quality", {"quality", "integrator", "samples", "runs", "training-steps", "blur-samples"});
-        add("Output",
-            {"output",    "format",    "mode",        "json",      "svg",         "heat-map", "heat-scale",
-             "serve",     "accuracy",  "spz-version", "levels",    "check",       "quiet",    "verbose",
-             "results",   "compare",   "threshold",   "max-error", "resume",      "force",    "allow-empty",
-             "protocol",  "voxel",     "triangles",   "distance",  "transparent", "codec",    "gltf-spz",
-             "unbundled", "unbounded", "collision",   "title"});
-        for (const train::RunOption& option : train::run_options())
-            if (!option.subject.empty()) made[option.name] = option.subject;
-        return made;
-    }();
-    return table;
-}
 
 std::vector<std::string> option_names(const CLI::App& command) {
     std::vector<std::string> names;
@@ -77,17 +47,6 @@ std::string output_hint(const CLI::App& command, const std::vector<std::string>&
 }
 
 }  // namespace
-
-void group_by_subject(CLI::App& command) {
-    const std::vector<CLI::Option*> options = command.get_options();
-    if (options.size() <= kFewOptions) return;
-    for (CLI::Option* option : options) {
-        if (option->get_positional() || option->get_lnames().empty() || option->get_group() != "Options")
-            continue;
-        const auto found = subjects().find(option->get_lnames().front());
-        if (found != subjects().end()) option->group(found->second);
-    }
-}
 
 std::string usage_error(const CLI::App& app, const CLI::App& command, const CLI::Error& error, int argc,
                         char** argv) {
