@@ -9,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "cli/arguments.h"
 #include "core/folders.h"
 #include "core/json.h"
 #include "core/text.h"

@@ -7,16 +7,10 @@
 #include <vector>
 
 #include "core/typing.h"
+#include "options/command_options.h"
 
 namespace ewa::cli {
 namespace {
-
-std::vector<std::string> option_names(const CLI::App& command) {
-    std::vector<std::string> names;
-    for (const CLI::Option* option : command.get_options())
-        for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-    return names;
-}
 
 std::vector<std::string> command_names(const CLI::App& app) {
     std::vector<std::string> names;
@@ -63,7 +57,7 @@ std::string usage_error(const CLI::App& app, const CLI::App& command, const CLI:
         return text + core::did_you_mean(argv[1], commands);
     }
     if (options || dynamic_cast<const CLI::ExtrasError*>(&error))
-        return core::unexpected_arguments(argc, argv, unknown, option_names(command)) +
+        return core::unexpected_arguments(argc, argv, unknown, options::option_names(command)) +
                (options ? std::string() : output_hint(command, unknown));
     if (&app == &command && error.get_name() == "RequiredError") {
         std::string all;

@@ -150,6 +150,13 @@ void arrange_help(CLI::App& command) {
     core::use_help_text<CLI::Formatter>(command, std::move(brief));
 }
 
+std::vector<std::string> option_names(const CLI::App& command) {
+    std::vector<std::string> names;
+    for (const CLI::Option* option : command.get_options())
+        for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    return names;
+}
+
 TypedFiles typed_files(const CLI::App& command) {
     TypedFiles files;
     for (const CLI::Option* given : command.get_options()) {

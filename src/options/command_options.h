@@ -60,6 +60,9 @@ CLI::Option* add(CLI::App& command, std::string_view name);
 /// command, --help shows these alone, and --help-all shows all. Call it when all options of the command are there.
 void arrange_help(CLI::App& command);
 
+/// The options as they are typed, with their dashes.
+std::vector<std::string> option_names(const CLI::App& command);
+
 /// The files that the command line names for options with these roles.
 struct TypedFiles {
     std::vector<core::NamedFile> written, read;

@@ -5,7 +5,6 @@
 #include <cctype>
 
 #include "edit/edits.h"
-#include "options/rows.h"
 #include "run/option_table.h"
 
 namespace ewa::options {

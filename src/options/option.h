@@ -13,8 +13,8 @@ namespace ewa::options {
 
 /// The headings of the help.
 inline constexpr const char *kData = "Data", *kQuality = "Quality", *kOutput = "Output", *kDevice = "Device",
-                            *kEdits = "Edits, in the order typed", *kDevelopers = "For developers",
-                            *kHidden = "";
+                            *kTraining = "Training", *kEdits = "Edits, in the order typed",
+                            *kDevelopers = "For developers", *kHidden = "";
 
 /// What becomes of the file that the value names. An output never replaces an input.
 enum class Role { none, input, output };
@@ -39,6 +39,8 @@ struct Option {
 bool is_positional(const Option& option);
 bool is_flag(const Option& option);
 
+/// The rows of rows.cpp. One without a help is an option of a training run that other commands have, too. It names these.
+std::vector<Option> rows();
 /// Sorted by name. The options of training runs and the edits of scenes are among them.
 const std::vector<Option>& all_options();
 /// The option of a command. Null: the command has none of this name.

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sorted by name, positionals first.
-#include "options/rows.h"
-
+// The options that are not of training runs alone, and no edits. Sorted by name, positionals first.
 #include "ewa/capture.h"
 #include "ewa/gaussians.h"
 #include "ewa/metrics.h"
 #include "ewa/render_options.h"
 #include "io/splats/format_table.h"
+#include "options/option.h"
 #include "run/option_table.h"
 #include "scene/looks.h"
 
@@ -83,6 +82,10 @@ std::vector<Option> positionals() {
             "Folder with photos (JPEG, PNG, TIFF or BMP), a video, or a folder with videos. COLMAP finds the "
             "cameras, ffmpeg reads the video; both must be installed",
             kInput, kRequired),
+        row("PATH", "ewa-view", kData, "",
+            splat_files() + ", dataset, folder of a training run, folder of photos, or video. Without it, "
+                            "the window waits for a file",
+            kInput),
         row("PATH", "info", kData, "",
             splat_files() +
                 ", COLMAP folder, transforms.json, cameras of another program, zip archive of one of these, "
@@ -106,6 +109,8 @@ std::vector<Option> outputs() {
             "Folder for images/, depth/, points.ply and transforms.json. An interrupted run continues there",
             kRequired),
         row("output", "doctor", kOutput, "DIR", "Folder that a training would write to", kUsual),
+        row("output", "ewa-view", kTraining, "DIR",
+            "With --train: folder of the run [out/<name of the dataset>]"),
         row("output", "grad", kOutput, "OUT.ply",
             "PLY with the properties of a splat file; each holds the gradient dL/d(stored value). That of a "
             "density is by its own logit, not by the opacity that is stored for other programs",
@@ -137,10 +142,17 @@ std::vector<Option> from_a_to_l() {
             "Background colour: r,g,b in 0..1, a name such as white, #rrggbb, or a sky.json [that beside "
             "SPLATS, if it is there]",
             kUsual, brief("Colour behind the splats, or a sky.json")),
+        row("background", "ewa-view", kQuality, "COLOUR",
+            "Background colour: r,g,b in 0..1, a name such as white, or #rrggbb"),
         row("bake-sky", "convert", kData, "",
             "Add opaque splats far away in place of the sky of the run: for viewers that have none"),
         row("blur-samples", "render", kQuality, "N",
             "Renders that --aperture and --shutter average for an image", within(2, 4096), kUsual),
+        row("budget", "ewa-view", kQuality, "N",
+            "Splats to show of a lod-meta.json while the view changes: a level with at most so many [1M]",
+            within(1, 4294967296.0)),
+        row("cameras", "ewa-view", kData, "DATASET", "Dataset whose cameras to show and to look through",
+            kInput),
         row("cameras", "compare!", kData, "DATASET",
             "Dataset whose cameras render splat files. Each render is compared with that of the other splat "
             "file, or with the image that has the name ewa render would give it, rounded like that image "
@@ -164,17 +176,20 @@ std::vector<Option> from_a_to_l() {
             words({"h264", "hevc", "av1", "vp9"})),
         row("collision", "mesh", kOutput, "",
             "A mesh for physics: closed, coarse, of at most 10,000 triangles, without colours"),
+        row("compare", "ewa-view", kQuality, "", "Comparison with the image of the camera",
+            words({"none", "beside", "wipe", "difference"})),
         row("config", "train!", kData, "FILE",
             "JSON with the names of these options, such as a run's config.json. The command line has "
             "precedence",
             kInput, brief("Options from a JSON file, such as a config.json")),
+        row("connect", "ewa-view", kTraining, "HOST:PORT", "Show a training that runs with --serve"),
         row("depth", "eval", kOutput, "",
             "Compare the depth of the renders with the dataset's depth maps, too"),
         row("depth", "mesh", kQuality, "",
             "Where a pixel's surface is: at the median or the mean depth of its splats. auto: the mean if "
             "the run compared it with depth maps (--loss depth=W), else the median",
             words({"auto", "median", "mean"}), kUsual),
-        of_run("device", "render! eval grad doctor dataset mesh compare!"),
+        of_run("device", "render! eval grad doctor dataset mesh compare! ewa-view"),
         row("distance", "compare", kOutput, "D",
             "Of two meshes (.gltf, .glb, .ply, .obj), of which B is the true one, or a scan (a .ply of "
             "points): points within this distance count in the F-score, in the scene's units [0.005 of B's "
@@ -190,6 +205,10 @@ std::vector<Option> from_a_to_l() {
             "Appearance of training images, as ewa train --appearance writes it. auto: that of the run "
             "SPLATS, with its own dataset",
             kUsual),
+        row("film", "ewa-view", kOutput, "DIR",
+            "Write a film through the saved views, one PNG per frame, and exit"),
+        row("film-seconds", "ewa-view", kOutput, "S", "Duration of the film from view to view (2)",
+            within(0.04, 3600)),
         row("film-seconds", "render", kData, "S",
             "With --views: seconds from view to view [2]. A folder gets the frames of the film",
             within(0.04, 3600)),
@@ -204,6 +223,8 @@ std::vector<Option> from_a_to_l() {
         row("format", "render!", kOutput, "",
             "Format in a folder: png, jpg (8 bit, clamped) or exr (float32, not clamped)",
             words({"png", "jpg", "exr"}), kUsual, brief("Format of the images in a folder")),
+        row("frame", "ewa-view", kData, "I|NAME",
+            "The camera to start from: its index in name order, or its name (0)"),
         row("frame", "grad", kData, "I|NAME",
             "The view: its index over all frames, in name order from 0, or its name", kRequired),
         row("frames", "cameras", kData, "N",
@@ -233,6 +254,10 @@ std::vector<Option> from_a_to_l() {
         row("json", "eval compare!", kOutput, "FILE", "Write the results to this file", kWritten),
         row("json", "grad", kOutput, "FILE", "Write loss, l1, ssim, frame (index) and name to this file",
             kWritten),
+        row("kernel", "ewa-view", kQuality, "",
+            "Footprint of a splat: peak (3DGS), antialias (Mip-Splatting) or density (EWA) [that of the "
+            "scene]",
+            words(core::words_of(scene::kKernelWords))),
         of_run("kernel", "render! eval grad compare!", brief("Footprint of a splat")),
         of_run("lens", kDrawing),
         row("level", "convert", kData, "N",
@@ -265,6 +290,8 @@ std::vector<Option> from_m_to_z() {
             "Metrics beside PSNR and SSIM: all, bands, or some of " + metric_names() +
                 ", with commas between them",
             brief("Metrics beside PSNR and SSIM, or all")),
+        row("mode", "ewa-view", kQuality, "", "What to show; count is the splats per pixel",
+            words({"color", "depth", "alpha", "count", "ellipsoids", "median-depth", "normal"})),
         row("mode", "render!", kOutput, "",
             "color, alpha, depth (mean view z; divided by its maximum in a png), median-depth (of the "
             "surface) or normal (of the surface, in world axes; from -1..1 to 0..1 in a png)",
@@ -299,6 +326,8 @@ std::vector<Option> from_m_to_z() {
         row("scale-to", "mesh", kData, "x,y,z,X,Y,Z,LENGTH",
             "Scale the mesh until these two points of the scene are LENGTH apart; they are its points before "
             "--transform. ewa-view measures points"),
+        row("screenshot", "ewa-view", kOutput, "FILE",
+            "Write what the window shows, without the panel, as a PNG, and exit", kWritten),
         of_run("seed", "dataset"),
         row("serve", "train!", kOutput, "[ADDRESS:]PORT",
             "Let ewa-view and HTTP clients watch by this port (0: any free port). Only this machine can "
@@ -313,6 +342,8 @@ std::vector<Option> from_m_to_z() {
             within(0.01, 1)),
         row("size", "dataset", kData, "WxH",
             "Width and height in pixels [256x256, for equirectangular 256x128]"),
+        row("size", "ewa-view", kOutput, "WxH",
+            "Size of the window in px [that of the last session, or panel and picture as large as fits]"),
         row("size", "render!", kData, "WxH",
             "Size of the renders in px, or of a screen: 720p, 1080p, 1440p, 4k, 8k [1280x720, or that of the "
             "saved view]",
@@ -333,6 +364,14 @@ std::vector<Option> from_m_to_z() {
             std::string("Lens to render through, in place of a pinhole: ") + kLensForms,
             brief("fisheye[:DEGREES], equirectangular, orthographic or opencv:K1,...")),
         row("title", "convert", kOutput, "TEXT", "Title of a page [the name of its file]"),
+        row("token", "ewa-view", kTraining, "TEXT",
+            "With --connect: allows pause and save. live.json in the folder of the run holds it. Other users "
+            "see it in the list of processes; --token-file and the variable EWA_TOKEN do not show it"),
+        row("token-file", "ewa-view", kTraining, "FILE",
+            "With --connect: a file with the token, such as a copy of live.json"),
+        row("train", "ewa-view", kTraining, "",
+            "Train on the dataset, photos or video, and watch. Other options are passed to ewa train, such "
+            "as --steps"),
         row("transform", "mesh", kData, "STEP",
             "Of the mesh: move=x,y,z, turn=x,y,z,degrees, scale=s, or a matrix of 12 or 16 numbers, row by "
             "row. Repeat the option for several steps, applied in order. Axes are those of a PLY: y down, z "
@@ -360,6 +399,8 @@ std::vector<Option> from_m_to_z() {
         row("vary-appearance", "dataset", kData, "",
             "Give each image an exposure and colours of its own, and the camera a vignette and a response. "
             "DIR/appearance.json has them"),
+        row("verbose", "ewa-view", kOutput, "",
+            "At the end, print the time of the first frame and the frame rate of the moving camera"),
         row("verbose", "info", kOutput, "",
             "Also print the work that rendering and training skip, and each photo of a dataset"),
         row("verbose", "train", kOutput, "", "Print the plan: what this scene does not need"),
@@ -367,6 +408,7 @@ std::vector<Option> from_m_to_z() {
             "Number of cameras on a dome over the scene; 0: the cameras of the file [those of the file if it "
             "has 8 or more, else 48]",
             within(0, 100000)),
+        row("views", "ewa-view", kData, "FILE", "Saved views, in the format that the window writes", kInput),
         row("views", "render!", kData, "FILE",
             "Saved views, in the format that ewa-view writes. A folder gets one image of each view, a film "
             "goes from each view to the next",

@@ -22,7 +22,10 @@ constexpr std::array kRules{
     Rule{"compare",
          "frames test-every background kernel points nearest sh-degree integrator samples downscale "
          "max-width lens device validation",
-         needs, "cameras"}};
+         needs, "cameras"},
+    Rule{"ewa-view", "output", needs, "train"},
+    Rule{"ewa-view", "connect", excludes, "train"},
+    Rule{"ewa-view", "token-file", excludes, "token"}};
 
 }  // namespace
 

@@ -8,7 +8,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <future>
-#include <map>
 #include <new>
 #include <sstream>
 #include <utility>
@@ -24,7 +23,7 @@
 #include "core/words.h"
 #include "ewa/error.h"
 #include "folders/run.h"
-#include "io/splats/format_table.h"
+#include "options/command_options.h"
 #include "run/earlier_run.h"
 #include "scene/dataset_files.h"
 #include "scene/looks.h"
@@ -48,7 +47,7 @@ struct Arguments {
         std::string address, token;
         std::filesystem::path token_file;
     } connect;
-    std::string size, background, frame;
+    std::string size, background, frame, mode, comparison;
     bool train = false;
     std::string kernel;  // empty: that of the scene
     std::vector<std::string> train_options;
@@ -56,14 +55,14 @@ struct Arguments {
     Startup startup;
 };
 
-const std::map<std::string, Mode> kModes = {
-    {"color", Mode::color},  {"depth", Mode::depth},           {"alpha", Mode::opacity},
-    {"count", Mode::count},  {"ellipsoids", Mode::ellipsoids}, {"median-depth", Mode::median_depth},
-    {"normal", Mode::normal}};
-const std::map<std::string, Comparison> kComparisons = {{"none", Comparison::none},
-                                                        {"beside", Comparison::beside},
-                                                        {"wipe", Comparison::wipe},
-                                                        {"difference", Comparison::difference}};
+const core::Words<Mode> kModes = {{"color", Mode::color},           {"depth", Mode::depth},
+                                  {"alpha", Mode::opacity},         {"count", Mode::count},
+                                  {"ellipsoids", Mode::ellipsoids}, {"median-depth", Mode::median_depth},
+                                  {"normal", Mode::normal}};
+const core::Words<Comparison> kComparisons = {{"none", Comparison::none},
+                                              {"beside", Comparison::beside},
+                                              {"wipe", Comparison::wipe},
+                                              {"difference", Comparison::difference}};
 
 int fail(const std::string& what, int status) {
     std::fprintf(stderr, "ewa-view: %s\n", core::one_line(what).c_str());
@@ -165,17 +164,17 @@ OpenedScene open_what(const Arguments& arguments, Startup& startup) {
 }
 
 /// Checks the files of a screenshot or a film against the inputs, and creates their folder.
-void prepare_outputs(const Arguments& arguments, const Startup& startup) {
-    std::vector<core::NamedFile> written, read;
-    if (startup.picture) written.push_back({"--screenshot", *startup.picture});
+void prepare_outputs(const CLI::App& command, const Startup& startup) {
+    auto [written, read] = options::typed_files(command);
     if (startup.film) {
         Film film(startup.views, *startup.film, {}, double(startup.settings.film_seconds));
         for (; !film.finished(); ++film.next) written.push_back({"--film", film.file()});
     }
     if (written.empty()) return;
-    if (startup.scene.dataset) read = scene::files_of(*startup.scene.dataset, "the dataset");
-    read.insert(read.end(),
-                {{"PATH", arguments.path}, {"--cameras", arguments.cameras}, {"--views", arguments.views}});
+    if (startup.scene.dataset) {
+        const std::vector<core::NamedFile> dataset = scene::files_of(*startup.scene.dataset, "the dataset");
+        read.insert(read.begin(), dataset.begin(), dataset.end());
+    }
     for (const char* name : folders::kRunFiles)
         if (!startup.scene.run.empty()) read.push_back({"a file of the run", startup.scene.run / name});
     core::check_outputs(written, read);
@@ -185,6 +184,9 @@ void prepare_outputs(const Arguments& arguments, const Startup& startup) {
 Startup open(const Arguments& arguments) {
     Startup startup = arguments.startup;
     startup.budget = arguments.budget;
+    startup.settings.look.mode = core::find_value(kModes, arguments.mode).value_or(Mode::color);
+    startup.settings.comparison =
+        core::find_value(kComparisons, arguments.comparison).value_or(Comparison::none);
     if (!arguments.size.empty()) startup.size = parse_size(arguments.size);
     if (!arguments.picture.empty()) {
         if (core::lower(arguments.picture.extension().string()) != ".png")
@@ -215,20 +217,6 @@ Startup open(const Arguments& arguments) {
     return startup;
 }
 
-/// Accepts one of the names, in either spelling of colour, and gives the parser its value.
-template <class T>
-CLI::Validator one_of(const std::map<std::string, T>& values) {
-    return CLI::Validator(
-        [&values](std::string& text) {
-            std::vector<std::string> names;
-            for (const auto& [name, value] : values) names.push_back(name);
-            std::string problem = core::settle_word(text, names);
-            if (problem.empty()) text = std::to_string(int(values.at(text)));
-            return problem;
-        },
-        "");
-}
-
 /// What the last session left, where no option says otherwise. Scripts get the same result on every machine.
 void take_settings(const CLI::App& app, Arguments& arguments) {
     Startup& startup = arguments.startup;
@@ -241,13 +229,6 @@ void take_settings(const CLI::App& app, Arguments& arguments) {
     if (app.count("--film-seconds") == 0) startup.settings.film_seconds = kept.film_seconds;
 }
 
-std::vector<std::string> option_names(const CLI::App& app) {
-    std::vector<std::string> names;
-    for (const CLI::Option* option : app.get_options())
-        for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-    return names;
-}
-
 /// --help and --version: what CLI11 prints.
 int print_text(const CLI::App& app, const CLI::ParseError& asked) {
     std::ostringstream text;
@@ -258,78 +239,28 @@ int print_text(const CLI::App& app, const CLI::ParseError& asked) {
 
 void add_options(CLI::App& app, Arguments& arguments) {
     Startup& startup = arguments.startup;
-    const auto option = [&](const char* name, auto& value, const char* type, const std::string& help) {
-        return app.add_option(name, value, help)->type_name(type);
-    };
-    option(
-        "PATH", arguments.path, "",
-        "Splat file (" + io::extension_list(io::Uses::read) +
-            "), "
-            "dataset, folder of a training run, folder of photos, or video. Without it, the window waits for "
-            "a file");
-    CLI::Option* train = app.add_flag("--train", arguments.train,
-                                      "Train on the dataset, photos or video, and watch. Other options are "
-                                      "passed to ewa train, such as --steps");
-    option("-o,--output", arguments.output, "DIR",
-           "With --train: folder of the run [out/<name of the dataset>]")
-        ->needs(train);
-    option("--connect", arguments.connect.address, "HOST:PORT", "Show a training that runs with --serve")
-        ->excludes(train);
-    option(
-        "--token", arguments.connect.token, "TEXT",
-        "With --connect: allows pause and save. live.json in the folder of the run holds it. Other users see "
-        "it in the list of processes; --token-file and the variable EWA_TOKEN do not show it");
-    option("--token-file", arguments.connect.token_file, "FILE",
-           "With --connect: a file with the token, such as a copy of live.json")
-        ->excludes("--token");
-    option("--cameras", arguments.cameras, "DATASET", "Dataset whose cameras to show and to look through");
-    option("--frame", arguments.frame, "I|NAME",
-           "The camera to start from: its index in name order, or its name (0)");
-    option("--mode", startup.settings.look.mode, "color|depth|alpha|count|ellipsoids|median-depth|normal",
-           "What to show; count is the splats per pixel")
-        ->transform(one_of(kModes));
-    option("--compare", startup.settings.comparison, "none|beside|wipe|difference",
-           "Comparison with the image of the camera")
-        ->transform(one_of(kComparisons));
-    option("--background", arguments.background, "COLOUR",
-           "Background colour: r,g,b in 0..1, a name such as white, or #rrggbb");
-    option(
-        "--kernel", arguments.kernel, "peak|antialias|density",
-        "Footprint of a splat: peak (3DGS), antialias (Mip-Splatting) or density (EWA) [that of the scene]")
-        ->transform(CLI::Validator(
-            [](std::string& text) { return core::settle_word(text, core::words_of(scene::kKernelWords)); },
-            ""));
-    option("--budget", arguments.budget, "N",
-           "Splats to show of a lod-meta.json while the view changes: a level with at most so many [1M]")
-        ->transform(CLI::Validator(
-            [](std::string& text) { return core::settle_number(text, size_t(1), size_t(1) << 32); }, ""));
-    option("--size", arguments.size, "WxH",
-           "Size of the window in px [that of the last session, or panel and picture as large as fits]");
-    option("--screenshot", arguments.picture, "FILE",
-           "Write what the window shows, without the panel, as a PNG, and exit");
-    option("--views", arguments.views, "FILE", "Saved views, in the format that the window writes");
-    option("--film", arguments.film, "DIR",
-           "Write a film through the saved views, one PNG per frame, and exit");
-    option("--film-seconds", startup.settings.film_seconds, "S", "Duration of the film from view to view (2)")
-        ->transform(
-            CLI::Validator([](std::string& text) { return core::settle_number(text, 0.04f, 3600.0f); }, ""));
+    options::add(app, "PATH", arguments.path);
+    options::add(app, "train", arguments.train);
+    options::add(app, "output", arguments.output);
+    options::add(app, "connect", arguments.connect.address);
+    options::add(app, "token", arguments.connect.token);
+    options::add(app, "token-file", arguments.connect.token_file);
+    options::add(app, "cameras", arguments.cameras);
+    options::add(app, "frame", arguments.frame);
+    options::add(app, "mode", arguments.mode);
+    options::add(app, "compare", arguments.comparison);
+    options::add(app, "background", arguments.background);
+    options::add(app, "kernel", arguments.kernel);
+    options::add(app, "budget", arguments.budget);
+    options::add(app, "size", arguments.size);
+    options::add(app, "screenshot", arguments.picture);
+    options::add(app, "views", arguments.views);
+    options::add(app, "film", arguments.film);
+    options::add(app, "film-seconds", startup.settings.film_seconds);
     if (const char* named = std::getenv("EWA_DEVICE")) arguments.device.selector = named;
-    option("--device", arguments.device.selector, "NAME|N",
-           "Number of the device that renders, or part of its name (see ewa devices) [$EWA_DEVICE]");
-    app.add_flag("--verbose", startup.verbose,
-                 "At the end, print the time of the first frame and the frame rate of the moving camera");
-}
-
-/// One heading of the help for each subject.
-void group_options(CLI::App& app) {
-    const std::pair<const char*, std::vector<const char*>> subjects[] = {
-        {"Data", {"--cameras", "--frame", "--views"}},
-        {"Training", {"--train", "--output", "--connect", "--token", "--token-file"}},
-        {"Quality", {"--mode", "--compare", "--background", "--kernel", "--budget"}},
-        {"Output", {"--size", "--screenshot", "--film", "--film-seconds", "--verbose"}},
-        {"Device", {"--device"}}};
-    for (const auto& [subject, names] : subjects)
-        for (const char* name : names) app.get_option(name)->group(subject);
+    options::add(app, "device", arguments.device.selector);
+    options::add(app, "verbose", startup.verbose);
+    options::arrange_help(app);
 }
 
 /// Shows the window, and remembers its settings for the next session.
@@ -342,13 +273,14 @@ void show(Startup& startup) {
     write_settings(settings_file(), kept);
 }
 
-int run(const Arguments& arguments) {
+int run(const CLI::App& app, const Arguments& arguments) {
     try {
+        options::check_typed(app);
         // The device opens while the scene is being read. A lost device is opened again.
         auto opening =
             std::async(std::launch::async, [options = arguments.device] { return open_device(options); });
         Startup startup = open(arguments);
-        prepare_outputs(arguments, startup);
+        prepare_outputs(app, startup);
         startup.times.scene_read = startup.times.now();
         std::optional<TrainProcess> trainer;
         if (arguments.train) {
@@ -394,20 +326,20 @@ int main(int argc, char** argv) {
     core::use_help_text<CLI::Formatter>(app);
     Arguments arguments;
     add_options(app, arguments);
-    group_options(app);
     core::refuse_empty_values<CLI::Validator>(app);
     app.allow_extras();
     try {
         app.parse(argc, argv);
         arguments.train_options = app.remaining();
         if (!arguments.train && !arguments.train_options.empty())
-            return fail(core::unexpected_arguments(argc, argv, arguments.train_options, option_names(app)) +
-                            " (see ewa-view --help)",
-                        kWrongUse);
+            return fail(
+                core::unexpected_arguments(argc, argv, arguments.train_options, options::option_names(app)) +
+                    " (see ewa-view --help)",
+                kWrongUse);
     } catch (const CLI::ParseError& error) {
         if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return print_text(app, error);
         return fail(std::string(error.what()) + " (see ewa-view --help)", kWrongUse);
     }
     take_settings(app, arguments);
-    return run(arguments);
+    return run(app, arguments);
 }
