@@ -3,6 +3,7 @@
 #pragma once
 #include <functional>
 #include <string>
+#include <vector>
 
 namespace CLI {
 class App;
@@ -28,5 +29,14 @@ Action add_doctor(CLI::App& app);
 Action add_bench(CLI::App& app);
 Action add_compare(CLI::App& app);
 Action add_mesh(CLI::App& app);
+
+struct Command {
+    std::string name;
+    CLI::App* app;  // its parser
+    Action action;
+};
+
+/// Adds all commands to the parser of `ewa`. command_line: what was typed.
+std::vector<Command> add_commands(CLI::App& app, const std::string& command_line);
 
 }  // namespace ewa::cli

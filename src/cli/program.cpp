@@ -20,13 +20,6 @@
 namespace ewa::cli {
 namespace {
 
-struct Command {
-    const char *name, *description;
-    std::function<Action(CLI::App&)> add;
-    CLI::App* app = nullptr;
-    Action action = {};
-};
-
 /// --help, --help-all and --version: what CLI11 prints.
 int print_text(const CLI::App& app, const CLI::ParseError& asked) {
     std::ostringstream text;
@@ -35,7 +28,7 @@ int print_text(const CLI::App& app, const CLI::ParseError& asked) {
 }
 
 int run(const Command& command) {
-    return status_of(std::string("ewa ") + command.name, [&] {
+    return status_of("ewa " + command.name, [&] {
         options::check_typed(*command.app);
         remove_temporary_files_on_signals();
         return command.action();
@@ -80,8 +73,38 @@ int run_arguments(int argc, char** argv) {
     app.set_version_flag("--version", "ewa " EWA_VERSION);
     app.require_subcommand(1);
     core::use_help_text<CLI::Formatter>(app);
-    const auto add_train_here = [&](CLI::App& train) { return add_train(train, command_line(argc, argv)); };
-    Command commands[] = {
+    const std::vector<Command> commands = add_commands(app, command_line(argc, argv));
+    core::refuse_empty_values<CLI::Validator>(app);
+
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        std::string who = "ewa";
+        const CLI::App* given = &app;
+        for (const Command& command : commands)
+            if (command.app->parsed()) {
+                who += " " + command.name;
+                given = command.app;
+            }
+        const bool unknown = given == &app && argc > 1 && argv[1][0] != '-';
+        if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success) && !unknown)
+            return print_text(app, error);
+        return fail(who, usage_error(app, *given, error, argc, argv) + " (see " + who + " --help)",
+                    kWrongUse);
+    }
+    for (const Command& command : commands)
+        if (command.app->parsed()) return run(command);
+    return kWrongUse;  // not reached: the parser requires a command
+}
+
+}  // namespace
+
+std::vector<Command> add_commands(CLI::App& app, const std::string& command_line) {
+    const auto add_train_here = [&](CLI::App& train) { return add_train(train, command_line); };
+    const struct {
+        const char *name, *description;
+        std::function<Action(CLI::App&)> add;
+    } rows[] = {
         {"train", "Trains splats from images with cameras, photos or a video", add_train_here},
         {"render", "Renders a splat scene: framed by itself, or through the cameras of a dataset",
          add_render},
@@ -97,35 +120,14 @@ int run_arguments(int argc, char** argv) {
         {"mesh", "Makes a mesh of the surfaces in a splat scene", add_mesh},
         {"compare", "Compares two images, folders of images, or splat scenes", add_compare},
     };
-    for (Command& command : commands) {
-        command.app = app.add_subcommand(command.name, command.description);
-        command.action = command.add(*command.app);
-        options::arrange_help(*command.app);
+    std::vector<Command> commands;
+    for (const auto& row : rows) {
+        CLI::App* command = app.add_subcommand(row.name, row.description);
+        commands.push_back({row.name, command, row.add(*command)});
+        options::arrange_help(*command);
     }
-    core::refuse_empty_values<CLI::Validator>(app);
-
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-        std::string who = "ewa";
-        const CLI::App* given = &app;
-        for (const Command& command : commands)
-            if (command.app->parsed()) {
-                who += std::string(" ") + command.name;
-                given = command.app;
-            }
-        const bool unknown = given == &app && argc > 1 && argv[1][0] != '-';
-        if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success) && !unknown)
-            return print_text(app, error);
-        return fail(who, usage_error(app, *given, error, argc, argv) + " (see " + who + " --help)",
-                    kWrongUse);
-    }
-    for (const Command& command : commands)
-        if (command.app->parsed()) return run(command);
-    return kWrongUse;  // not reached: the parser requires a command
+    return commands;
 }
-
-}  // namespace
 
 int run_program(int argc, char** argv) {
     std::vector<std::string> words = usual_arguments(argc, argv);
