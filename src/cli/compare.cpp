@@ -245,7 +245,7 @@ Action add_compare(CLI::App& app) {
     options::add(app, "B", inputs.b);
     options::add(app, "threshold", arguments->threshold);
     options::add(app, "max-error", arguments->max_error);
-    add_metric_options(app, arguments->metrics);
+    options::add(app, "metrics", arguments->metrics.metrics);
     options::add(app, "json", arguments->json);
     options::add(app, "heat-map", arguments->heat_map);
     options::add(app, "distance", arguments->distance);

@@ -126,7 +126,7 @@ Action add_eval(CLI::App& app) {
     options::add(app, "test-every", arguments->test_every);
     add_appearance_options(app, arguments->appearance);
     arguments->metrics.fitted = true;
-    add_metric_options(app, arguments->metrics);
+    options::add(app, "metrics", arguments->metrics.metrics);
     options::add(app, "protocol", arguments->metrics.protocol);
     options::add(app, "depth", arguments->depth);
     options::add(app, "json", arguments->json);

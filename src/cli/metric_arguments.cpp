@@ -8,8 +8,6 @@
 #include <cmath>
 
 #include "core/text.h"
-#include "ewa/error.h"
-#include "options/command_options.h"
 
 namespace ewa::cli {
 namespace {
@@ -56,20 +54,6 @@ Measures MetricArguments::measures() const {
     if (fitted && protocol == "ewa") list.append(list.empty() ? "" : ",").append(kFittedMetric);
     if (!list.empty()) result.meter = Meter(metrics_named(list));
     return result;
-}
-
-void add_metric_options(CLI::App& app, MetricArguments& arguments) {
-    options::add(app, "metrics", arguments.metrics)
-        ->check(CLI::Validator(
-            [](const std::string& text) {
-                try {
-                    metrics_named(text);
-                    return std::string();
-                } catch (const InputError& error) {
-                    return std::string(error.what());
-                }
-            },
-            ""));
 }
 
 std::string figure_table(const std::vector<FigureRow>& rows) {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The metrics of ewa eval and ewa compare beside PSNR and SSIM: their options, tables and JSON.
+// The metrics of ewa eval and ewa compare beside PSNR and SSIM: their tables and JSON.
 #pragma once
-#include <CLI/CLI.hpp>
-
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,8 +21,6 @@ struct MetricArguments {
     /// Throws InputError.
     Measures measures() const;
 };
-/// --metrics.
-void add_metric_options(CLI::App& app, MetricArguments& arguments);
 
 /// The figures of an image, or their means.
 struct FigureRow {

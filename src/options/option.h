@@ -33,7 +33,7 @@ struct Option {
     std::string also = {};   // other spellings, such as ",-o"
     bool is_required = false, repeats = false;
     bool shows_usual = false;               // the help shows the value of an option that is not given
-    const train::RunOption* run = nullptr;  // the row of a training run that it is, too
+    const train::RunOption* run = nullptr;  // the option of a training run that has its values
 };
 
 bool is_positional(const Option& option);

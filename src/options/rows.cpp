@@ -21,6 +21,7 @@ constexpr auto kWritten = [](Option& option) { option.role = Role::output; };
 constexpr auto kRequired = [](Option& option) { option.is_required = true; };
 constexpr auto kRepeats = [](Option& option) { option.repeats = true; };
 constexpr auto kUsual = [](Option& option) { option.shows_usual = true; };
+constexpr auto kCheckedAsInTrain = [](Option& option) { option.run = &train::run_option(option.name); };
 auto within(double low, double high) {
     return [=](Option& option) { option.low = low, option.high = high; };
 }
@@ -289,7 +290,7 @@ std::vector<Option> from_m_to_z() {
         row("metrics", "eval compare!", kOutput, "LIST",
             "Metrics beside PSNR and SSIM: all, bands, or some of " + metric_names() +
                 ", with commas between them",
-            brief("Metrics beside PSNR and SSIM, or all")),
+            kCheckedAsInTrain, brief("Metrics beside PSNR and SSIM, or all")),
         row("mode", "ewa-view", kQuality, "", "What to show; count is the splats per pixel",
             words({"color", "depth", "alpha", "count", "ellipsoids", "median-depth", "normal"})),
         row("mode", "render!", kOutput, "",
