@@ -143,21 +143,21 @@ bool is_scene_file(const fs::path& path) {
 
 }  // namespace
 
-Dataset load_cameras_as_trained(const fs::path& path, const CamerasInput& input) {
+Dataset load_cameras_as_trained(const fs::path& path, const RunOptions& options, bool points) {
     if (is_scene_file(path)) {
         Dataset dataset = scene_cameras(path, {});
         for (Frame& frame : dataset.frames) {
-            if (input.max_width > 0)
-                frame.camera = narrowed(frame.camera, int64_t(input.max_width) * input.downscale);
-            frame.camera = ewa::downscale(frame.camera, input.downscale);
+            if (options.max_width > 0)
+                frame.camera = narrowed(frame.camera, int64_t(options.max_width) * options.downscale);
+            frame.camera = ewa::downscale(frame.camera, options.downscale);
         }
         return dataset;
     }
-    Dataset dataset = load_dataset(path, {.downscale = input.downscale,
-                                          .lens = input.lens,
+    Dataset dataset = load_dataset(path, {.downscale = options.downscale,
+                                          .lens = options.lens,
                                           .need_images = false,
-                                          .need_points = input.points,
-                                          .max_width = input.max_width});
+                                          .need_points = points,
+                                          .max_width = options.max_width});
     auto missing = [](const Frame& frame) { return !frame.image_exists; };
     if (!std::ranges::all_of(dataset.frames, missing)) std::erase_if(dataset.frames, missing);
     return dataset;

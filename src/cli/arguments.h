@@ -57,13 +57,9 @@ std::vector<int> select_frames(const Dataset& dataset, const std::string& which,
 
 /// The cameras of a dataset, whose images may be missing. If only some are, their frames are skipped as in
 /// training, so that the same frames are held out; Dataset::missing_images counts them. A mesh scene has the
-/// views that `ewa train` renders.
-struct CamerasInput {
-    int downscale = 1, max_width = 0;
-    LensUse lens = LensUse::automatic;
-    bool points = false;  // also reads the points
-};
-Dataset load_cameras_as_trained(const std::filesystem::path& path, const CamerasInput& input);
+/// views that `ewa train` renders. options: downscale, max_width and lens count. points: also reads the points.
+Dataset load_cameras_as_trained(const std::filesystem::path& path, const RunOptions& options = {},
+                                bool points = false);
 
 /// Renders a mesh scene into a dataset, with progress, and prints its notes. Throws InputError, RunError, and
 /// Interrupted if Ctrl-C ended it.

@@ -210,9 +210,7 @@ Sides open_sides(const CompareInputs& inputs) {
     if (!scene_b) sides.b = std::make_unique<ImageSide>(inputs.b);
     if (!scene) return sides;
     sides.options = inputs.draw.options();
-    sides.cameras = load_cameras_as_trained(
-        inputs.cameras,
-        {.downscale = inputs.run.downscale, .max_width = inputs.run.max_width, .lens = inputs.run.lens});
+    sides.cameras = load_cameras_as_trained(inputs.cameras, inputs.run);
     const std::vector<int> frames = select_frames(sides.cameras, inputs.frames, inputs.test_every);
     const auto device = open_device(inputs.device);
     if (scene_a)

@@ -16,7 +16,6 @@
 #include "cli/comparison.h"
 #include "cli/convert_edits.h"
 #include "cli/convert_files.h"
-#include "cli/convert_output.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
 #include "cli/splat_statistics.h"
@@ -277,6 +276,18 @@ bool edit_scene(const ConvertArguments& arguments, Work& work, std::optional<fol
     return false;
 }
 
+/// Lets the page of a run show its dataset's cameras, which `cameras` holds, and its background. Adds a remark where they cannot be read.
+void show_run(const folders::Run& run, Dataset& cameras, PageOptions& page,
+              std::vector<std::string>& remarks) {
+    page.background = core::parse_colour(run.text("background")).value_or(page.background);
+    try {
+        cameras = cameras_of_run(run);
+        page.cameras = &cameras;
+    } catch (const InputError& error) {
+        remarks.push_back("the page has no views of photos: " + core::one_line(error.what()));
+    }
+}
+
 int run(const CLI::App& app, const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
     Work work;
@@ -337,7 +348,8 @@ Action add_convert(CLI::App& app) {
     io::OutputOptions& output = arguments->output_options;
     options::add(app, "FILES", arguments->files)->expected(1, -1);
     options::add(app, "output", arguments->output);
-    add_edit_options(app, arguments->editing);
+    for (const edit::Row& row : edit::rows()) options::add(app, row.name);
+    options::add(app, "dry-run", arguments->editing.picture);
     options::add(app, "spz-version", output.spz_version);
     options::add(app, "gltf-spz", output.gltf_spz);
     options::add(app, "levels", output.levels);

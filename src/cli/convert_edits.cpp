@@ -7,15 +7,9 @@
 #include "cli/run_inputs.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
-#include "options/command_options.h"
 #include "scene/framing.h"
 
 namespace ewa::cli {
-
-void add_edit_options(CLI::App& app, EditArguments& arguments) {
-    for (const edit::Row& row : edit::rows()) options::add(app, row.name);
-    options::add(app, "dry-run", arguments.picture);
-}
 
 std::vector<edit::Edit> typed_edits(const CLI::App& app) {
     std::vector<edit::Edit> edits;

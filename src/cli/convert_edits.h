@@ -19,9 +19,6 @@ struct EditArguments {
     std::filesystem::path picture;  // of what would be removed, with --dry-run; empty: none
 };
 
-/// The options of all rows, and --dry-run.
-void add_edit_options(CLI::App& app, EditArguments& arguments);
-
 /// The edits of a command line that was parsed, in its order. Throws InputError for a value that cannot be read.
 std::vector<edit::Edit> typed_edits(const CLI::App& app);
 

@@ -287,7 +287,7 @@ void print_support(const Dataset& dataset, const std::vector<CameraSupport>& sup
 /// named: what the user calls it.
 void info_dataset(const fs::path& path, const fs::path& named, const InfoArguments& arguments) {
     const int test_every = arguments.test_every;
-    const Dataset dataset = load_cameras_as_trained(path, {.points = true});
+    const Dataset dataset = load_cameras_as_trained(path, {}, true);
     const Split split = split_frames(dataset, test_every);
     std::vector<int> every(dataset.frames.size());
     std::iota(every.begin(), every.end(), 0);

@@ -37,9 +37,9 @@ struct MeshArguments {
     fs::path splats, cameras, output;
     std::string scale_to, up;
     std::vector<std::string> transform;
-    double voxel = 0;   // 0: not given
-    int triangles = 0;  // 0: not given
-    int downscale = 1, max_width = 0;
+    double voxel = 0;            // 0: not given
+    int triangles = 0;           // 0: not given
+    RunOptions of_cameras;       // --downscale and --max-width
     std::string depth = "auto";  // or median, mean
     bool unbounded = false, collision = false;
     DeviceOptions device;
@@ -53,10 +53,9 @@ std::optional<Dataset> dataset_of_mesh(const MeshArguments& arguments,
     if (path.empty() && run) path = dataset_of(*run);
     if (path.empty()) return std::nullopt;
     const bool own = run && arguments.cameras.empty();
-    const LensUse lens = own && run->text("lens") == "native" ? LensUse::native : LensUse::automatic;
-    Dataset dataset = load_cameras_as_trained(
-        dataset_input(path),
-        {.downscale = arguments.downscale, .max_width = arguments.max_width, .lens = lens});
+    RunOptions options = arguments.of_cameras;
+    if (own && run->text("lens") == "native") options.lens = LensUse::native;
+    Dataset dataset = load_cameras_as_trained(dataset_input(path), options);
     const fs::path refined = own ? refined_cameras_of(*run) : fs::path();
     if (!refined.empty()) io::use_refined_cameras(dataset, refined);
     return dataset;
@@ -158,8 +157,8 @@ Action add_mesh(CLI::App& app) {
     options::add(app, "transform", arguments->transform);
     options::add(app, "up", arguments->up);
     options::add(app, "scale-to", arguments->scale_to);
-    options::add(app, "downscale", arguments->downscale);
-    options::add(app, "max-width", arguments->max_width);
+    options::add(app, "downscale", arguments->of_cameras);
+    options::add(app, "max-width", arguments->of_cameras);
     add_device_options(app, arguments->device);
     options::add(app, "quiet", arguments->quiet);
     return [&app, arguments] { return run(app, *arguments); };

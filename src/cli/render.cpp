@@ -241,9 +241,7 @@ void check_motion(const RenderArguments& arguments, const ViewPath& views) {
 int render_dataset_views(const CLI::App& app, RenderArguments arguments) {
     RenderOptions options = arguments.draw.options();
     const Gaussians gaussians = load_scene(arguments, options);
-    Dataset dataset = load_cameras_as_trained(arguments.cameras, {.downscale = arguments.of_cameras.downscale,
-                                                                  .max_width = arguments.of_cameras.max_width,
-                                                                  .lens = arguments.of_cameras.lens});
+    Dataset dataset = load_cameras_as_trained(arguments.cameras, arguments.of_cameras);
     const fs::path refined = arguments.cameras_of_run ? refined_cameras_of(*arguments.run) : fs::path();
     if (!refined.empty()) io::use_refined_cameras(dataset, refined);
     const std::vector<int> frames = select_frames(dataset, arguments.frames, arguments.test_every);
@@ -278,7 +276,7 @@ int render_dataset_views(const CLI::App& app, RenderArguments arguments) {
 /// The dataset of the run, if it can be read. Else the scene is framed as one of which nothing is known.
 std::optional<Dataset> dataset_of_run(const RenderArguments& arguments) try {
     if (!arguments.run || arguments.run->dataset.empty()) return std::nullopt;
-    return load_cameras_as_trained(arguments.run->dataset, {});
+    return load_cameras_as_trained(arguments.run->dataset);
 } catch (const InputError&) {
     return std::nullopt;
 }
@@ -381,13 +379,24 @@ Action add_render(CLI::App& app) {
     options::add(app, "SPLATS", arguments->splats);
     options::add(app, "cameras", arguments->cameras);
     options::add(app, "output", arguments->output);
-    add_views_options(app, arguments->views);
+    ViewsArguments& views = arguments->views;
+    options::add(app, "size", views.size);
+    options::add(app, "orbit", views.orbit);
+    options::add(app, "look-at", views.look_at);
+    options::add(app, "up", views.up);
+    options::add(app, "views", views.views);
+    options::add(app, "film-seconds", views.film_seconds);
     options::add(app, "frames", arguments->frames);
     options::add(app, "test-every", arguments->test_every);
     options::add(app, "format", arguments->format);
     options::add(app, "mode", arguments->mode);
     options::add(app, "codec", arguments->codec);
-    add_picture_options(app, arguments->picture);
+    PictureArguments& picture = arguments->picture;
+    options::add(app, "aperture", picture.aperture);
+    options::add(app, "focus", picture.focus);
+    options::add(app, "shutter", picture.shutter);
+    options::add(app, "blur-samples", picture.blur_samples);
+    options::add(app, "transparent", picture.transparent);
     add_draw_options(app, arguments->draw);
     options::add(app, "through", arguments->through);
     for (const char* name : {"lens", "downscale", "max-width"})

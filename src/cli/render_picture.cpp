@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "ewa/error.h"
-#include "options/command_options.h"
 #include "scene/camera.h"
 #include "scene/color.h"
 #include "scene/native_lens.h"
@@ -28,14 +27,6 @@ void divide(Image& sum, int count, bool linear) {
 }
 
 }  // namespace
-
-void add_picture_options(CLI::App& app, PictureArguments& arguments) {
-    options::add(app, "aperture", arguments.aperture);
-    options::add(app, "focus", arguments.focus);
-    options::add(app, "shutter", arguments.shutter);
-    options::add(app, "blur-samples", arguments.blur_samples);
-    options::add(app, "transparent", arguments.transparent);
-}
 
 void check_picture(const PictureArguments& arguments, bool path, const std::string& extension) {
     if (arguments.shutter > 0 && !path)

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pictures of ewa render that consist of several renders: depth of field and motion blur. Also transparent ones.
 #pragma once
-#include <CLI/CLI.hpp>
-
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -14,6 +12,7 @@
 
 namespace ewa::cli {
 
+/// --aperture, --focus, --shutter, --blur-samples and --transparent.
 struct PictureArguments {
     double aperture = 0, focus = 0;  // world units; 0: not given
     double shutter = 0;              // share of a frame's time; 0: no motion blur
@@ -22,9 +21,6 @@ struct PictureArguments {
 
     bool blurs() const { return aperture > 0 || shutter > 0; }
 };
-
-/// --aperture, --focus, --shutter, --blur-samples and --transparent.
-void add_picture_options(CLI::App& app, PictureArguments& arguments);
 
 /// Throws InputError where the images do not go with the options. path: whether the views are moments of one motion. extension: of the
 /// images in lower case, with its dot.

@@ -131,15 +131,6 @@ std::optional<glm::dvec3> parse_up(const std::string& text) {
     return up;
 }
 
-void add_views_options(CLI::App& app, ViewsArguments& arguments) {
-    options::add(app, "size", arguments.size);
-    options::add(app, "orbit", arguments.orbit);
-    options::add(app, "look-at", arguments.look_at);
-    options::add(app, "up", arguments.up);
-    options::add(app, "views", arguments.views);
-    options::add(app, "film-seconds", arguments.film_seconds);
-}
-
 bool any_given(const ViewsArguments& arguments) {
     return !arguments.size.empty() || !arguments.look_at.empty() || !arguments.up.empty() ||
            !arguments.views.empty() || arguments.orbit > 0;

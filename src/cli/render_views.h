@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The views of ewa render without a dataset: the scene framed by itself, an orbit, given eyes and saved views.
 #pragma once
-#include <CLI/CLI.hpp>
-
 #include <filesystem>
 #include <functional>
 #include <glm/vec3.hpp>
@@ -19,6 +17,7 @@
 
 namespace ewa::cli {
 
+/// --size, --look-at, --up, --views, --orbit, --film-seconds and --through.
 struct ViewsArguments {
     std::string size, look_at, up;
     std::filesystem::path views;
@@ -28,9 +27,6 @@ struct ViewsArguments {
     // World: where a 360° image is taken unless an option names the eye. Empty: in the middle of the scene.
     std::optional<glm::dvec3> inside = {};
 };
-
-/// --size, --orbit, --look-at, --up, --views and --film-seconds.
-void add_views_options(CLI::App& app, ViewsArguments& arguments);
 
 /// Whether one of these options is given.
 bool any_given(const ViewsArguments& arguments);

@@ -21,7 +21,7 @@ namespace {
 /// px of the widest image that the run was trained on; 0 where its dataset is not found.
 int trained_width(const folders::Run& run, int downscale) try {
     int width = 0;
-    for (const Frame& frame : load_cameras_as_trained(dataset_of(run), {}).frames)
+    for (const Frame& frame : load_cameras_as_trained(dataset_of(run)).frames)
         width = std::max(width, std::max(frame.source.width, frame.camera.width) / downscale);
     return width;
 } catch (const InputError&) {
@@ -174,7 +174,7 @@ std::optional<folders::Run> resolve_views(CLI::App& app, ViewArguments& argument
 }
 
 Dataset cameras_of_run(const folders::Run& run) {
-    Dataset dataset = load_cameras_as_trained(dataset_of(run), {});
+    Dataset dataset = load_cameras_as_trained(dataset_of(run));
     const std::filesystem::path refined = refined_cameras_of(run);
     if (!refined.empty()) io::use_refined_cameras(dataset, refined);
     return dataset;
