@@ -12,8 +12,8 @@
 namespace ewa::options {
 namespace {
 
-constexpr const char* kDrawing =
-    "render eval grad compare";  // the commands that draw splats as people choose
+/// The commands that draw splats as people choose.
+constexpr const char* kDrawing = "render eval grad compare";
 
 // What only some rows have.
 constexpr auto kInput = [](Option& option) { option.role = Role::input; };
@@ -98,40 +98,7 @@ std::vector<Option> positionals() {
     };
 }
 
-/// --output of each command.
-std::vector<Option> outputs() {
-    std::vector<Option> all{
-        row("output", "cameras", kOutput, "DIR",
-            "Folder for the dataset: images/, sparse/0 and colmap/log.txt. An interrupted run continues "
-            "there",
-            kRequired),
-        row("output", "convert!", kOutput, "OUT", "The output; all FILES are then inputs"),
-        row("output", "dataset", kOutput, "DIR",
-            "Folder for images/, depth/, points.ply and transforms.json. An interrupted run continues there",
-            kRequired),
-        row("output", "doctor", kOutput, "DIR", "Folder that a training would write to", kUsual),
-        row("output", "ewa-view", kTraining, "DIR",
-            "With --train: folder of the run [out/<name of the dataset>]"),
-        row("output", "grad", kOutput, "OUT.ply",
-            "PLY with the properties of a splat file; each holds the gradient dL/d(stored value). That of a "
-            "density is by its own logit, not by the opacity that is stored for other programs",
-            kWritten, kRequired),
-        row("output", "mesh", kOutput, "OUT", "The mesh (.ply, .obj, .glb)", kWritten, kRequired),
-        row("output", "render!", kOutput, "OUT",
-            "Folder for the renders, named like the images of the dataset or by number. Or one image (.png, "
-            ".jpg, .exr). Without --cameras, and of a camera_path.json, also a film (.mp4, .mov, .mkv, "
-            ".webm) that the program ffmpeg writes",
-            kUsual, brief("Folder for the renders, one image, or a film")),
-        row("output", "train!", kOutput, "DIR",
-            "Folder for splats.ply, summary.json, metrics.jsonl, report.html, config.json and checkpoint.ewa "
-            "[out/<name of the dataset>]",
-            brief("Folder of the run [out/<name of the dataset>]")),
-    };
-    for (Option& output : all) output.also = ",-o";
-    return all;
-}
-
-std::vector<Option> from_a_to_l() {
+std::vector<Option> from_a_to_o() {
     return {
         row("allow-empty", "convert", kOutput, "", "Write the output even if no splat is left"),
         row("aperture", "render", kData, "D",
@@ -272,11 +239,6 @@ std::vector<Option> from_a_to_l() {
         row("look-at", "render!", kData, "x,y,z,X,Y,Z",
             "Look from x,y,z at X,Y,Z (world units). With --orbit: the first view"),
         of_run("loss", "grad"),
-    };
-}
-
-std::vector<Option> from_m_to_z() {
-    return {
         of_run("masks", "eval grad"),
         row("matching", "cameras", kData, "",
             "Which photos to compare. unordered: each with each. sequence: each with those that follow it in "
@@ -302,6 +264,44 @@ std::vector<Option> from_m_to_z() {
         row("orbit", "render!", kData, "N",
             "N views round the scene; a film shows 30 a second [240 for a film]", within(1, 100000),
             brief("N views round the scene")),
+    };
+}
+
+/// --output of each command.
+std::vector<Option> outputs() {
+    std::vector<Option> all{
+        row("output", "cameras", kOutput, "DIR",
+            "Folder for the dataset: images/, sparse/0 and colmap/log.txt. An interrupted run continues "
+            "there",
+            kRequired),
+        row("output", "convert!", kOutput, "OUT", "The output; all FILES are then inputs"),
+        row("output", "dataset", kOutput, "DIR",
+            "Folder for images/, depth/, points.ply and transforms.json. An interrupted run continues there",
+            kRequired),
+        row("output", "doctor", kOutput, "DIR", "Folder that a training would write to", kUsual),
+        row("output", "ewa-view", kTraining, "DIR",
+            "With --train: folder of the run [out/<name of the dataset>]"),
+        row("output", "grad", kOutput, "OUT.ply",
+            "PLY with the properties of a splat file; each holds the gradient dL/d(stored value). That of a "
+            "density is by its own logit, not by the opacity that is stored for other programs",
+            kWritten, kRequired),
+        row("output", "mesh", kOutput, "OUT", "The mesh (.ply, .obj, .glb)", kWritten, kRequired),
+        row("output", "render!", kOutput, "OUT",
+            "Folder for the renders, named like the images of the dataset or by number. Or one image (.png, "
+            ".jpg, .exr). Without --cameras, and of a camera_path.json, also a film (.mp4, .mov, .mkv, "
+            ".webm) that the program ffmpeg writes",
+            kUsual, brief("Folder for the renders, one image, or a film")),
+        row("output", "train!", kOutput, "DIR",
+            "Folder for splats.ply, summary.json, metrics.jsonl, report.html, config.json and checkpoint.ewa "
+            "[out/<name of the dataset>]",
+            brief("Folder of the run [out/<name of the dataset>]")),
+    };
+    for (Option& output : all) output.also = ",-o";
+    return all;
+}
+
+std::vector<Option> from_p_to_z() {
+    return {
         row("points", "dataset", kData, "N", "Points on the surfaces, for initial splats; 0: none",
             within(0, 10000000), kUsual),
         of_run("points", kDrawing),
@@ -424,7 +424,7 @@ std::vector<Option> from_m_to_z() {
 
 std::vector<Option> rows() {
     std::vector<Option> all = positionals();
-    for (const std::vector<Option>& more : {from_a_to_l(), outputs(), from_m_to_z()})
+    for (const std::vector<Option>& more : {from_a_to_o(), outputs(), from_p_to_z()})
         all.insert(all.end(), more.begin(), more.end());
     return all;
 }

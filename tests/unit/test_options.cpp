@@ -197,6 +197,10 @@ TEST(OptionTable, ValuesAreCheckedByTheRow) {
     EXPECT_EQ(nearest, 12);
 }
 
+TEST(OptionTable, RowsAreSortedByName) {
+    EXPECT_TRUE(std::ranges::is_sorted(options::rows(), {}, &options::Option::name));
+}
+
 TEST(OptionTable, AnotherCommandHasNoRow) {
     EXPECT_EQ(options::find_option("devices", "steps"), nullptr);
     EXPECT_EQ(options::find_option("nothing", "json"), nullptr);
