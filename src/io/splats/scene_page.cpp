@@ -52,9 +52,9 @@ std::string settings_text(const ScenePage& page) {
         settings["budget"] = kBudget;
     }
     for (const PageView& view : page.views) {
-        PageJson json = view_json(view.camera);
-        json["name"] = view.name;
-        settings["cameras"].push_back(std::move(json));
+        PageJson camera = view_json(view.camera);
+        camera["name"] = view.name;
+        settings["cameras"].push_back(std::move(camera));
     }
     std::string text = settings.dump(-1, ' ', true, PageJson::error_handler_t::replace);
     for (size_t at = 0; (at = text.find('<', at)) != std::string::npos;) text.replace(at, 1, "\\u003c");
