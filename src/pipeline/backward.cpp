@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline/backward.h"
 
-#include "passes/passes.h"
 #include "pipeline/adam.h"
 #include "pipeline/appearances.h"
+#include "pipeline/methods.h"
 #include "shared/constants.h"
 
 namespace ewa::pipeline {
@@ -172,63 +172,27 @@ void FramePasses::loss(const gpu::Buffer& photo, bool masked, const AppearanceUs
     if (appearance) appearance_backward(*appearance);
 }
 
-namespace {
-
-passes::BlendBackwardBuffers blend_buffers(const FrameBuffers& frame, const Sorted& sorted) {
-    return {{.records = frame.records,
-             .splats = *sorted.splats,
-             .tile_starts = frame.tile_starts,
-             .planes = frame.planes},
-            frame.image_gradient,
-            frame.slots};
-}
-
-}  // namespace
-
-/// A driver may limit the iterations of an invocation: each strip of the tiles has its own dispatch.
-template <class Backward>
-void FramePasses::integrate_backward(const Sorted& sorted, const passes::Constants& variant) const {
-    const shared::BlendPush blend = blend_push(cache.config(), frame, inputs.background);
-    recording.fill(frame.slots, 0, 0, frame.sizes.slots);
-    for (uint32_t strip = 0; strip < passes::strips_of(cache.config()); ++strip)
-        record(Backward{{blend_buffers(frame, sorted), frame.rays, camera(), frame.counts}},
-               {.blend = blend, .samples = inputs.samples, .strip = strip}, variant);
-}
-
-/// The same in the order of the tile's list.
-void FramePasses::fast_rays_backward(const Sorted& sorted) const {
-    recording.fill(frame.slots, 0, 0, frame.sizes.slots);
-    record(passes::BlendFastRaysBackward{{blend_buffers(frame, sorted), frame.rays, camera(), frame.counts}},
-           blend_push(cache.config(), frame, inputs.background), {kernel(), lenses()});
-}
-
 /// Gradients of blending, which are left in frame.slots.
 void FramePasses::blend_backward(const Sorted& sorted) const {
-    const passes::BlendBackwardBuffers buffers = blend_buffers(frame, sorted);
-    const shared::BlendPush push = blend_push(cache.config(), frame, inputs.background);
     const bool depth = plan.loss.depth > 0;
-    const gpu::SpecConstant mode{shared::SPEC_MODE,
-                                 (plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0) |
-                                     (plan.loss.alpha > 0 || depth ? shared::BLEND_BACKWARD_ALPHA : 0) |
-                                     (depth ? shared::BLEND_BACKWARD_FOURTH : 0)};
-    const uint32_t group = march_group(inputs.samples, 8);
-    if (plan.integrator == Integrator::ray)
-        integrate_backward<passes::BlendRaysBackward>(sorted, {kernel(), lenses()});
-    else if (plan.integrator == Integrator::fast_ray)
-        fast_rays_backward(sorted);
-    else if (plan.integrator == Integrator::march)
-        integrate_backward<passes::MarchRaysBackward>(sorted,
-                                                      {kernel(), {shared::SPEC_MODE, group}, lenses()});
-    else if (plan.points())
-        record(passes::BlendPointsBackward{buffers}, push, {mode, {shared::SPEC_NEAREST, plan.nearest}});
-    else
-        record(passes::BlendBackward{buffers}, push, {mode, kernel(), wrap()});
+    passes_of(*plan.method)
+        .blend_backward(
+            *this,
+            {{.records = frame.records,
+              .splats = *sorted.splats,
+              .tile_starts = frame.tile_starts,
+              .planes = frame.planes},
+             frame.image_gradient,
+             frame.slots},
+            blend_push(cache.config(), frame, inputs.background),
+            {shared::SPEC_MODE, (plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0) |
+                                    (plan.loss.alpha > 0 || depth ? shared::BLEND_BACKWARD_ALPHA : 0) |
+                                    (depth ? shared::BLEND_BACKWARD_FOURTH : 0)});
 }
 
 void FramePasses::backward(const Model& model, const Sorted& sorted, const Rates& rates,
                            const MotionUse* motion) const {
     blend_backward(sorted);
-    const shared::UpdatePush push = update_push(model, frame, rates);
     const gpu::Buffer& moments2 = model.second_moments();
     // Packed moments and a gradient alone have no buffer of second moments, and a gradient no statistics. The kernel
     // does not use those bindings, but they need a buffer.
@@ -246,11 +210,8 @@ void FramePasses::backward(const Model& model, const Sorted& sorted, const Rates
                                         .moments2_out = moments2,
                                         .statistics = plan.statistics ? model.statistics : frame.partials,
                                         .sorted_indices = *sorted.indices};
-    const gpu::SpecConstant mode{shared::SPEC_MODE, update_mode(plan)};
-    if (plan.points()) return record(passes::UpdatePoints{buffers}, push, {degree(), mode});
-    if (plan.rays()) return record(passes::UpdateRays{buffers}, push, {degree(), mode, kernel(), lenses()});
-    record(passes::Update{buffers, plan.motion ? frame.motion_sums : frame.partials}, push,
-           {degree(), mode, kernel(), lenses()});
+    passes_of(*plan.method)
+        .update(*this, buffers, update_push(model, frame, rates), {shared::SPEC_MODE, update_mode(plan)});
     if (plan.motion) record_motion_sums(*this, frame, inputs.camera.lenses == shared::LENSES_ROLLING);
     if (motion) record_motion_update(*this, frame, *motion);
 }

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline/forward.h"
 
-#include <algorithm>
-#include <bit>
-
-#include "passes/passes.h"
+#include "pipeline/methods.h"
 #include "pipeline/sorting.h"
 
 namespace ewa::pipeline {
@@ -107,10 +104,6 @@ void record_tile_order(const passes::Recorder& on, bool gradients, const FrameBu
 
 }  // namespace
 
-uint32_t march_group(uint32_t samples, uint32_t most) {
-    return std::min(std::bit_ceil(samples), most);
-}
-
 shared::BlendPush blend_push(const passes::KernelConfig& config, const FrameBuffers& frame,
                              const std::array<float, 3>& background) {
     const Sizes& s = frame.sizes;
@@ -146,21 +139,10 @@ void FramePasses::project(const Model& model) const {
                                          .depth_keys = frame.depth_keys[0],
                                          .tile_counts = frame.tile_counts,
                                          .counts = frame.counts};
-    const shared::ProjectPush push{.splats = model.splats,
-                                   .planes = model.planes(),
-                                   .log_scale_shift = plan.rays() ? 0 : plan.log_scale_shift};
-    const gpu::SpecConstant debug{shared::SPEC_MODE, plan.debug ? shared::PROJECT_DEBUG : 0};
-    const uint32_t rays = plan.integrator == Integrator::march      ? shared::PROJECT_RAYS_DEEP
-                          : plan.integrator == Integrator::fast_ray ? shared::PROJECT_RAYS_BY_MEAN
-                                                                    : 0;
-    if (plan.rays())
-        record(passes::ProjectRays{buffers, frame.rays}, push,
-               {degree(), kernel(), {shared::SPEC_MODE, rays}, lenses(), wrap()});
-    else if (plan.points())
-        record(passes::ProjectPoints{buffers}, push, {degree(), debug});
-    else
-        record(passes::Project{buffers}, push,
-               {degree(), {shared::SPEC_MODE, project_mode(plan)}, kernel(), lenses(), wrap()});
+    passes_of(*plan.method)
+        .project(*this, buffers,
+                 {.splats = model.splats, .planes = model.planes(), .log_scale_shift = plan.log_scale_shift},
+                 {shared::SPEC_MODE, project_mode(plan)});
 }
 
 Sorted FramePasses::draw(uint32_t splats) const {
@@ -169,23 +151,9 @@ Sorted FramePasses::draw(uint32_t splats) const {
                                        .splats = frame.instance_splats[1],
                                        .tile_starts = frame.tile_starts,
                                        .planes = frame.planes};
-    const shared::BlendPush push = blend_push(cache.config(), frame, inputs.background);
-    const gpu::SpecConstant mode{shared::SPEC_MODE, kBlendModes[size_t(plan.drawing)]};
-    if (plan.rays()) {
-        const passes::AlongRays along{buffers, frame.rays, camera(), frame.counts};
-        const shared::RayPush rays{.blend = push, .samples = inputs.samples, .strip = 0};
-        const uint32_t group = march_group(inputs.samples, cache.config().texel_buffers ? 16 : 8);
-        if (plan.integrator == Integrator::ray)
-            record(passes::BlendRays{along}, rays, {kernel(), mode, lenses()});
-        else if (plan.integrator == Integrator::fast_ray)
-            record(passes::BlendFastRays{along}, push, {kernel(), mode, lenses()});
-        else
-            record(passes::MarchRays{along}, rays, {kernel(), {shared::SPEC_MODE, group}, lenses()});
-    } else if (plan.points()) {
-        record(passes::BlendPoints{buffers}, push, {mode, {shared::SPEC_NEAREST, plan.nearest}});
-    } else {
-        record(passes::Blend{buffers}, push, {mode, kernel(), wrap()});
-    }
+    passes_of(*plan.method)
+        .blend(*this, buffers, blend_push(cache.config(), frame, inputs.background),
+               {shared::SPEC_MODE, kBlendModes[size_t(plan.drawing)]});
     if (inputs.sky.texels) add_sky();
     return {.splats = &frame.instance_splats[1],
             .indices = plan.gradients ? &frame.sorted_indices[1] : nullptr};

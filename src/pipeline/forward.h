@@ -88,13 +88,16 @@ struct FramePasses : passes::Recorder {
     void update_views(const Model& model, const ViewBuffers& buffers, const Rates& rates,
                       uint32_t bands = 1) const;
 
-  private:
+    // What the passes of a method read: see methods.h.
+
     gpu::BufferPart camera() const;
-    void add_sky() const;
     gpu::SpecConstant degree() const;
     gpu::SpecConstant lenses() const { return {shared::SPEC_LENSES, inputs.camera.lenses}; }
     gpu::SpecConstant wrap() const { return {shared::SPEC_WRAP, inputs.camera.wraps ? 1u : 0u}; }
     gpu::SpecConstant kernel() const { return {shared::SPEC_KERNEL, uint32_t(plan.kernel)}; }
+
+  private:
+    void add_sky() const;
     void compare(const gpu::Buffer& image, const shared::LossPush& push, float share) const;
     void compare_alpha(const gpu::Buffer& photo, bool cut, const shared::MaskPush& at,
                        const shared::LossPush& loss) const;
@@ -104,9 +107,6 @@ struct FramePasses : passes::Recorder {
     void apply_appearance(const AppearanceUse& use) const;
     void appearance_backward(const AppearanceUse& use) const;
     void blend_backward(const Sorted& sorted) const;
-    template <class Backward>
-    void integrate_backward(const Sorted& sorted, const passes::Constants& variant) const;
-    void fast_rays_backward(const Sorted& sorted) const;
 };
 
 /// The part between projection and blending: depth order, instances, tile order, tile starts. It reads frame's records,
@@ -115,9 +115,6 @@ struct FramePasses : passes::Recorder {
 /// wraps: as in CameraUse.
 void record_tile_lists(const passes::Recorder& on, bool gradients, uint32_t splats, const FrameBuffers& frame,
                        bool wraps = false);
-
-/// Intervals of a ray that a march evaluates together; most: a power of two.
-uint32_t march_group(uint32_t samples, uint32_t most);
 
 shared::BlendPush blend_push(const passes::KernelConfig& config, const FrameBuffers& frame,
                              const std::array<float, 3>& background);

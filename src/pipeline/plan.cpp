@@ -13,34 +13,20 @@ namespace ewa::pipeline {
 
 namespace {
 
-void check_integrator(const PlanRequest& request) {
-    const Integrator integrator = request.render.integrator;
-    if (integrator == Integrator::splat) return;
-    const std::string name = core::word_for(scene::kIntegratorWords, integrator);
-    const auto refuse = [&](const std::string& why) {
-        throw InputError("the integrator " + name + " " + why);
+void check_method(const PlanRequest& request, const scene::Method& method) {
+    const auto need = [&](const scene::Lack& lack) {
+        if (lack) throw InputError(std::string(method.subject).append(" ").append(lack.why));
     };
-    scene::check_look({.render = request.render});
-    if (integrator == Integrator::march && request.purpose == Purpose::training)
-        refuse("cannot train; the others do");
-    if (request.drawing == Drawing::count || request.drawing == Drawing::ellipsoids)
-        refuse("draws neither counts nor ellipsoids; splat does");
-    if (integrator == Integrator::march && request.drawing == Drawing::depth)
-        refuse("draws no depth; the others do");
-    if (request.debug && request.splat_scale != 1)
-        refuse("draws splats at their own scale; splat draws others");
-    if (integrator == Integrator::march &&
-        (request.render.samples < 1 || request.render.samples > kMostSamples))
-        refuse("takes 1 to " + std::to_string(kMostSamples) + " samples, not " +
-               std::to_string(request.render.samples));
-}
-
-void check_surface(const PlanRequest& request) {
-    if (request.drawing != Drawing::median_depth && request.drawing != Drawing::normal) return;
-    const std::string what = request.drawing == Drawing::normal ? "normals" : "the median depth";
-    if (request.render.points) throw InputError("--points draws no surface, so " + what + " cannot be drawn");
-    if (request.render.integrator != Integrator::splat)
-        throw InputError("only the integrator splat draws " + what);
+    if (method.rays) scene::check_look({.render = request.render});
+    if (request.purpose == Purpose::training) need(method.no_training);
+    if (request.drawing == Drawing::count || request.drawing == Drawing::ellipsoids) need(method.no_counts);
+    if (request.drawing == Drawing::depth) need(method.no_depth);
+    if (request.debug && request.splat_scale != 1) need(method.no_scale);
+    const bool normals = request.drawing == Drawing::normal;
+    if ((normals || request.drawing == Drawing::median_depth) && method.no_surface) {
+        std::string why(method.no_surface.why);
+        throw InputError(why.replace(why.find("{}"), 2, normals ? "normals" : "the median depth"));
+    }
 }
 
 }  // namespace
@@ -50,15 +36,15 @@ uint32_t Plan::evaluated_degree(int wanted) const {
 }
 
 Plan plan_for(const PlanRequest& request) {
-    check_integrator(request);
-    check_surface(request);
+    const scene::Method& method = scene::method_of(request.render);
+    check_method(request, method);
     Plan plan;
     plan.stored_degree = request.scene_degree;
     plan.kernel = request.render.kernel;
     // An ellipsoid of equal scales is the sphere itself.
     const bool solid = request.purpose == Purpose::image && request.drawing == Drawing::ellipsoids;
-    if (request.render.points && !solid) plan.nearest = uint32_t(request.render.nearest);
-    plan.integrator = request.render.integrator;
+    if (!solid) plan.method = &method;
+    plan.nearest = uint32_t(request.render.nearest);
     if (request.purpose == Purpose::image) {
         plan.stored_degree = std::clamp(request.render.sh_degree, 0, request.present_degree);
         plan.drawing = request.drawing;
@@ -68,18 +54,15 @@ Plan plan_for(const PlanRequest& request) {
     }
     plan.gradients = true;
     plan.loss = request.loss;
-    // Spheres and integration along rays have no gradient by the transmittance.
-    if (!request.alpha || request.render.points || plan.rays())
+    if (!request.alpha || method.no_alpha_gradient)
         plan.loss.alpha = 0;
     else if (plan.loss.alpha == kAutomaticAlphaWeight)
         plan.loss.alpha = kUsualAlphaWeight;
-    // The depth of spheres and along rays has no gradient.
-    if (!request.depths || request.render.points || plan.rays()) plan.loss.depth = 0;
+    if (!request.depths || method.no_depth_gradient) plan.loss.depth = 0;
     if (plan.loss.depth > 0) plan.drawing = Drawing::depth;
     plan.masks = request.masks;
     plan.appearance = request.appearance;
-    // Spheres and integration along rays have no gradient by the camera.
-    plan.motion = request.motion && !request.render.points && !plan.rays();
+    plan.motion = request.motion && !method.no_camera_gradient;
     if (request.purpose == Purpose::training) {
         plan.adam = true;
         plan.sky = request.sky;
@@ -90,6 +73,19 @@ Plan plan_for(const PlanRequest& request) {
         plan.pruned = request.pruned;
     }
     return plan;
+}
+
+FrameRequest frame_request(const Plan& plan, uint32_t width, uint32_t height) {
+    return {.width = width,
+            .height = height,
+            .gradients = plan.gradients,
+            .fifth_plane = plan.fifth_plane(),
+            .masks = plan.masks,
+            .appearance = plan.appearance,
+            .overlaid = plan.gradients,
+            .motion = plan.motion,
+            .rays = plan.rays(),
+            .loss = plan.loss};
 }
 
 std::vector<PlanLine> describe(const Plan& plan, int scene_degree, uint64_t splats) {
@@ -111,7 +107,7 @@ std::vector<PlanLine> describe(const Plan& plan, int scene_degree, uint64_t spla
         lines.push_back({"sums of absolute gradients", "not asked for (--absgrad)", 0});
     if (!plan.regularised && plan.adam)
         lines.push_back({"opacity and scale regularisers", "the strategy has none", 0});
-    if (!plan.pruned && plan.adam && !plan.points())
+    if (!plan.pruned && plan.adam && !plan.method->no_opacity)
         lines.push_back({"largest weights of splats in the training images",
                          "all splats stay (--final-splats)", sizeof(float) * splats});
     if (plan.drawing != Drawing::depth)
@@ -128,11 +124,11 @@ std::vector<PlanLine> describe(const Plan& plan, int scene_degree, uint64_t spla
     if (plan.gradients && plan.appearance == AppearanceModel::none)
         lines.push_back(
             {"appearance of images, its passes and the image as shown", "not asked for (--appearance)", 0});
-    if (plan.gradients && !plan.motion && !plan.points() && !plan.rays())
+    if (plan.gradients && !plan.motion && !plan.method->no_camera_gradient)
         lines.push_back({"gradient of the camera and its passes", "not asked for (--refine-poses)", 0});
     if (plan.gradients && !plan.sky)
         lines.push_back({"sky and its passes", "not asked for (--background sky)", 0});
-    if (plan.points()) {
+    if (plan.method->no_opacity) {
         lines.push_back({"opacities and rotations", "a sphere has none (--points)", 0});
         return lines;
     }

@@ -10,6 +10,8 @@
 #include "ewa/loss_weights.h"
 #include "ewa/plan.h"
 #include "ewa/render_options.h"
+#include "pipeline/frame_buffers.h"
+#include "scene/methods.h"
 
 namespace ewa::pipeline {
 
@@ -50,8 +52,8 @@ struct PlanRequest {
 struct Plan {
     int stored_degree = 0;  // SH degree in the device's parameters; a frame evaluates at most this
     Footprint kernel = Footprint::peak;
-    uint32_t nearest = 0;  // spheres at a pixel; 0: splats are drawn as footprints
-    Integrator integrator = Integrator::splat;
+    const scene::Method* method = &scene::method_of(scene::MethodKind::splat);
+    uint32_t nearest = 0;  // spheres at a pixel, if the method draws them
     Drawing drawing = Drawing::color;
     bool debug = false;
     float log_scale_shift = 0;    // with debug: added to every log scale
@@ -69,7 +71,6 @@ struct Plan {
     bool sky = false;     // a sky that is learned
 
     bool operator==(const Plan&) const = default;
-    bool points() const { return nearest > 0; }
     /// Buffers of moments, which have the size of the parameters. A gradient takes the place of one.
     int moment_buffers() const { return adam && !packed_moments ? 2 : gradients ? 1 : 0; }
     /// Whether the image has a fifth plane: depth, count or median depth.
@@ -78,8 +79,8 @@ struct Plan {
     }
     /// Whether the surfaces of splats are drawn in place of their colours.
     bool surface() const { return drawing == Drawing::median_depth || drawing == Drawing::normal; }
-    /// Whether splats are integrated along rays.
-    bool rays() const { return integrator != Integrator::splat; }
+    /// Whether a frame has the buffer of how rays meet each splat.
+    bool rays() const { return method->rays; }
     /// The SH degree that a frame evaluates.
     uint32_t evaluated_degree(int wanted) const;
 };
@@ -88,6 +89,9 @@ struct Plan {
 /// and a training store all: every stored coefficient has a gradient. Inputs that do not apply to
 /// the purpose are ignored.
 Plan plan_for(const PlanRequest& request);
+
+/// The buffers of a frame of an image with width * height pixels. Splats, instances and readouts are the caller's.
+FrameRequest frame_request(const Plan& plan, uint32_t width, uint32_t height);
 
 /// What a plan skips, and the bytes that this saves for `splats` splats of a scene with `scene_degree`.
 std::vector<PlanLine> describe(const Plan& plan, int scene_degree, uint64_t splats);

@@ -175,12 +175,9 @@ void Renderer::State::submit(const Camera& camera, const Plan& plan, const Rende
         inputs.background = {};
     else
         inputs.sky = sky_of(look);
-    const FrameRequest size{.splats = model.splats,
-                            .width = inputs.camera.width,
-                            .height = inputs.camera.height,
-                            .instances = std::max(frame.instance_capacity, first_capacity(model.splats)),
-                            .fifth_plane = plan.fifth_plane(),
-                            .rays = plan.rays()};
+    FrameRequest size = frame_request(plan, inputs.camera.width, inputs.camera.height);
+    size.splats = model.splats;
+    size.instances = std::max(frame.instance_capacity, first_capacity(model.splats));
     if (!parts.empty()) {
         if (plan.surface())
             throw RunError("a scene that is larger than the device's limit shows no surfaces");
@@ -199,11 +196,8 @@ Plan Renderer::State::plan_of(const DrawOptions& o) const {
     if (!(o.splat_scale > 0) || !std::isfinite(o.splat_scale))
         throw InputError("a splat scale of " + std::to_string(o.splat_scale) + ", not above zero");
     PlanRequest drawing = request;
-    drawing.render.kernel = o.render.kernel;
-    drawing.render.points = o.render.points;
-    drawing.render.nearest = o.render.nearest;
-    drawing.render.integrator = o.render.integrator;
-    drawing.render.samples = o.render.samples;
+    drawing.render = o.render;
+    drawing.render.sh_degree = request.render.sh_degree;
     drawing.drawing = o.drawing;
     drawing.debug = true;
     drawing.splat_scale = o.splat_scale;
@@ -388,17 +382,10 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
     const SkyTexels sky = options.sky ? SkyTexels(*device, *options.sky) : SkyTexels();
     FrameInputs inputs = inputs_of(block, camera, options);
     if (options.sky) inputs.sky = sky.use();
-    const FrameRequest size{.splats = model.splats,
-                            .width = inputs.camera.width,
-                            .height = inputs.camera.height,
-                            .instances = first_capacity(model.splats),
-                            .gradients = true,
-                            .masks = plan.masks,
-                            .overlaid = true,
-                            .motion = plan.motion,
-                            .readouts = scene::moves(camera),
-                            .rays = plan.rays(),
-                            .loss = plan.loss};
+    FrameRequest size = frame_request(plan, inputs.camera.width, inputs.camera.height);
+    size.splats = model.splats;
+    size.instances = first_capacity(model.splats);
+    size.readouts = scene::moves(camera);
     FrameBuffers frame;
     const shared::Counts counts =
         run_until_it_fits(cache, executor, frame, size, [&](const passes::Recorder& recorder) {

@@ -8,6 +8,7 @@
 #include "ewa/renderer.h"
 #include "scene/dataset_files.h"
 #include "scene/depth_map.h"
+#include "scene/methods.h"
 
 namespace ewa::train {
 namespace {
@@ -56,7 +57,7 @@ DepthErrors depth_errors(const Image& drawn, const Image& map) {
 
 void check_depth_evaluation(const Dataset& dataset, const std::vector<int>& frames,
                             const RenderOptions& options) {
-    if (options.points || options.integrator != Integrator::splat)
+    if (scene::method_of(options).no_surface)
         throw InputError(
             "--depth compares the surfaces of splats: neither --points nor other integrators draw them");
     const std::vector<const Frame*> with_maps = frames_with_maps(dataset, frames);

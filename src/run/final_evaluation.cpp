@@ -15,6 +15,7 @@
 #include "report/views.h"
 #include "run/refined_cameras.h"
 #include "run/wrong_cameras.h"
+#include "scene/methods.h"
 #include "scene/statistics.h"
 
 namespace ewa::train {
@@ -112,8 +113,8 @@ void FinalEvaluation::evaluate_test_views() {
 bool FinalEvaluation::can_align() const {
     const RunOptions& options = input_.options;
     // What --refine-poses cannot do either, and what may not fit on the device beside the renderer.
-    return options.train.render.integrator == Integrator::splat && !options.train.render.points &&
-           !scene_.sky && options.train.device_memory_bytes == 0 && options.ranks->size() == 1;
+    return !scene::method_of(options.train.render).no_camera_gradient && !scene_.sky &&
+           options.train.device_memory_bytes == 0 && options.ranks->size() == 1;
 }
 
 std::vector<CameraMotion> FinalEvaluation::motions_of(const std::vector<int>& frames, double extent) const {

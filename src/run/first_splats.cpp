@@ -92,7 +92,7 @@ void make_opaque(Gaussians& splats) {
 /// distance to their neighbours.
 void adjust_start(const RunOptions& options, Gaussians& start) {
     const RunOptions usual;
-    if (options.train.render.points) {
+    if (!has_opacities(options.train)) {
         // The radius is the distance to the neighbours.
         for (float& scale : start.log_scales) scale -= float(std::log(shared::ELLIPSOID_REACH));
         make_opaque(start);
@@ -134,7 +134,7 @@ size_t dense_start_size(const RunOptions& options, const Dataset& dataset, const
     const bool few = double(points) < kFewPoints * pixels && !few_photos(train, frames.size());
     const int most_steps = few ? kDenseStartStepsOfFewPoints : kDenseStartSteps;
     if (options.dense_start == DenseStart::automatic &&
-        (train.strategy != Strategy::adc || train.steps > most_steps || train.render.points))
+        (train.strategy != Strategy::adc || train.steps > most_steps || !has_opacities(train)))
         return 0;
     const auto wanted = size_t(pixels / kPixelsOfDenseStart);
     return train.max_splats == kAutomaticMaxSplats ? wanted : std::min(wanted, size_t(train.max_splats));
@@ -179,7 +179,7 @@ Gaussians splats_of_file(const RunOptions& options, const std::filesystem::path&
     refuse_dense_start(options, options.init);
     Gaussians start = load_splats(file);
     set_sh_degree(start, options.train.sh_degree);
-    if (options.train.render.points) make_opaque(start);
+    if (!has_opacities(options.train)) make_opaque(start);
     const RunOptions usual;
     if (options.init_opacity != usual.init_opacity || options.init_scale != usual.init_scale)
         throw InputError("--init-opacity and --init-scale are for first splats without their own; " +

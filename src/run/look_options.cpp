@@ -11,6 +11,7 @@
 #include "ewa/error.h"
 #include "run/option_rows.h"
 #include "scene/looks.h"
+#include "scene/methods.h"
 
 namespace ewa::train {
 
@@ -61,7 +62,9 @@ RunOption background_option() {
 RunOption integrator_option() {
     static const core::Words<Integrator> trained = [] {
         core::Words<Integrator> words = scene::kIntegratorWords;
-        std::erase_if(words, [](const auto& word) { return word.second == Integrator::march; });
+        std::erase_if(words, [](const auto& word) {
+            return bool(scene::method_of({.integrator = word.second}).no_training);
+        });
         return words;
     }();
     RunOption option = choice<Integrator>(

@@ -11,6 +11,7 @@
 
 #include "core/parallel.h"
 #include "scene/frame_images.h"
+#include "train/schedule.h"
 
 namespace ewa::train {
 namespace {
@@ -67,7 +68,7 @@ std::optional<std::array<float, 3>> mean_colour(const Dataset& dataset, const st
 void choose_background(RunOptions& options, const Dataset& dataset, const std::vector<int>& frames) {
     TrainOptions& train = options.train;
     const bool automatic = std::exchange(options.automatic_background, false);
-    const bool chosen = train.sky || train.random_background || train.render.points ||
+    const bool chosen = train.sky || train.random_background || !has_opacities(train) ||
                         train.render.background != RenderOptions().background;
     // Where splats are still transparent, the noise would move cameras, and look like what single images show.
     if (!automatic || chosen || train.refine_poses || options.robust) return;

@@ -68,17 +68,10 @@ class Alignment {
                                       .rate = float(rate),
                                       .extent = float(extent_),
                                       .visit = uint32_t(step)};
-        const pipeline::FrameRequest size{
-            .splats = model_.splats,
-            .width = base.width,
-            .height = base.height,
-            .instances = std::max(frame_.instance_capacity, pipeline::first_capacity(model_.splats)),
-            .gradients = true,
-            .masks = plan_.masks,
-            .overlaid = true,
-            .motion = true,
-            .readouts = motions_.readouts(),
-            .loss = plan_.loss};
+        pipeline::FrameRequest size = pipeline::frame_request(plan_, base.width, base.height);
+        size.splats = model_.splats;
+        size.instances = std::max(frame_.instance_capacity, pipeline::first_capacity(model_.splats));
+        size.readouts = motions_.readouts();
         run_until_it_fits(cache_, executor_, frame_, size, [&](const passes::Recorder& recorder) {
             const pipeline::FrameInputs inputs{
                 .camera = record_move_camera(recorder, motions_, use.photo, base),

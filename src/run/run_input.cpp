@@ -19,6 +19,8 @@
 #include "run/pose_options.h"
 #include "run/region_option.h"
 #include "scene/lens.h"
+#include "scene/looks.h"
+#include "scene/methods.h"
 #include "scene/names.h"
 #include "train/schedule.h"
 
@@ -257,9 +259,14 @@ bool adds_by_gradient(const RunOptions& options) {
     return options.train.strategy == Strategy::adc || options.train.strategy == Strategy::automatic;
 }
 
-bool draws_points(const RunOptions& options) {
-    return options.train.render.points;
-}
+using RunDemand = scene::Demand<RunOptions>;
+
+/// What the method of drawing must be able to do for an option.
+constexpr std::array kRunDemands{
+    RunDemand{"--init-opacity",
+              [](const RunOptions& o) { return o.init_opacity != RunOptions().init_opacity; },
+              &scene::Method::no_opacity, true},
+    RunDemand{"--robust", [](const RunOptions& o) { return o.robust; }, &scene::Method::no_faintness, true}};
 
 constexpr std::array kRunExclusions{
     RunExclusion{"--resume", [](const RunOptions& o) { return o.resume; }, Relation::excludes, "--force",
@@ -271,14 +278,6 @@ constexpr std::array kRunExclusions{
     RunExclusion{"--region", [](const RunOptions& o) { return o.train.region.has_value(); },
                  Relation::excludes, "--strategy none",
                  [](const RunOptions& o) { return o.train.strategy == Strategy::none; }, "it adds no splats"},
-    RunExclusion{"--init-opacity",
-                 [](const RunOptions& o) { return o.init_opacity != RunOptions().init_opacity; },
-                 Relation::excludes, "--points", draws_points, "a sphere has no opacity"},
-    RunExclusion{"--robust", [](const RunOptions& o) { return o.robust; }, Relation::excludes, "--points",
-                 draws_points, "spheres show no passer-by faintly"},
-    RunExclusion{"--nearest",
-                 [](const RunOptions& o) { return o.train.render.nearest != RenderOptions().nearest; },
-                 Relation::needs, "--points", draws_points},
     RunExclusion{"--refine-focal", [](const RunOptions& o) { return o.train.refine_focal; }, Relation::needs,
                  "--refine-poses", [](const RunOptions& o) { return o.train.refine_poses; }},
     RunExclusion{"--rolling-shutter", [](const RunOptions& o) { return o.rolling_shutter.has_value(); },
@@ -303,6 +302,9 @@ fs::path output_folder(const RunOptions& options) {
 
 void check_options(const RunOptions& options) {
     core::check_exclusions(train::kRunExclusions, options);
+    const RenderOptions& render = options.train.render;
+    scene::check_demands(train::kRunDemands, options, scene::method_of(render));
+    scene::check_look({.render = render, .nearest = render.nearest != RenderOptions().nearest});
     train::check_training(options.train, options.ranks->size());
 }
 

@@ -3,9 +3,9 @@
 
 #include <array>
 
-#include "core/exclusion.h"
 #include "ewa/error.h"
 #include "ewa/sky_map.h"
+#include "scene/methods.h"
 #include "scene/readout.h"
 
 namespace ewa {
@@ -26,58 +26,40 @@ void check(const RenderOptions& options) {
 namespace scene {
 namespace {
 
-using core::Relation;
-using Row = core::Exclusion<Look>;
-
 template <Footprint kernel>
 bool drawn_with(const Look& look) {
     return look.render.kernel == kernel;
 }
-template <Integrator integrator>
-bool integrated_by(const Look& look) {
-    return look.render.integrator == integrator;
-}
-bool points(const Look& look) {
-    return look.render.points;
-}
 
-constexpr std::string_view kNoFootprint = "a sphere has no footprint";
-constexpr std::array kRows{
-    Row{"--points", points, Relation::excludes, "--kernel antialias", drawn_with<Footprint::antialias>,
-        kNoFootprint},
-    Row{"--points", points, Relation::excludes, "--kernel density", drawn_with<Footprint::density>,
-        kNoFootprint},
-    Row{"--points", points, Relation::excludes, "--integrator",
-        [](const Look& look) { return look.render.integrator != Integrator::splat; },
-        "spheres are blended on the image"},
-    Row{"--integrator march", integrated_by<Integrator::march>, Relation::excludes, "--kernel antialias",
-        drawn_with<Footprint::antialias>, "the others antialias"},
-    Row{"--nearest", [](const Look& look) { return look.nearest; }, Relation::needs, "--points", points},
-    Row{"--samples", [](const Look& look) { return look.samples; }, Relation::needs, "--integrator march",
-        integrated_by<Integrator::march>}};
+constexpr std::array kKernels{
+    Demand<Look>{"--kernel antialias", drawn_with<Footprint::antialias>, &Method::no_antialias},
+    Demand<Look>{"--kernel density", drawn_with<Footprint::density>, &Method::no_density}};
 
 }  // namespace
 
 void check_look(const Look& look) {
-    core::check_exclusions(kRows, look);
+    const Method& method = method_of(look.render);
+    check_demands(kKernels, look, method);
+    const auto belongs = [&](bool given, std::string_view option, MethodKind to) {
+        if (given && method.kind != to)
+            throw InputError(std::string(option).append(" is an option of ").append(method_of(to).full));
+    };
+    belongs(look.nearest, "--nearest", MethodKind::points);
+    belongs(look.samples, "--samples", MethodKind::march);
 }
 
 void check_lens(const RenderOptions& render, const Camera& camera) {
     check(render);
-    if (camera.distortion.none() && !moves(camera)) return;
-    const std::string_view option = render.points                            ? "--points"
-                                    : render.integrator != Integrator::splat ? "--integrator"
-                                                                             : "";
-    if (moves(camera) && (!option.empty() || render.sky))
-        throw InputError(std::string(option.empty() ? "--background sky" : option) +
-                         " draws no images of a rolling shutter");
-    const bool shot = render.integrator != Integrator::splat && camera.distortion.lens != Lens::orthographic;
-    if (option == "--integrator" && !shot)
-        throw InputError(
-            "--integrator splat alone draws parallel rays; the others need a lens with a centre");
-    if (!option.empty() && !shot)
-        throw InputError(std::string(option) +
-                         " draws through pinholes only; take --lens undistort for images of another lens");
+    const Method& method = method_of(render);
+    const auto need = [&](const Lack& lack) {
+        if (lack) throw InputError(std::string(method.option).append(" ").append(lack.why));
+    };
+    if (moves(camera)) {
+        need(method.no_rolling_shutter);
+        if (render.sky) throw InputError("--background sky draws no images of a rolling shutter");
+    }
+    if (camera.distortion.lens == Lens::orthographic) return need(method.no_parallel_rays);
+    if (!camera.distortion.none()) need(method.no_lens);
 }
 
 }  // namespace scene

@@ -240,18 +240,12 @@ MemoryEstimate MemoryEstimator::up_to(uint32_t max_splats) {
         uint32_t rows = 0;
         for (const Band& band : bands_of(config, uint32_t(frame.camera.height), options.bands))
             rows = std::max(rows, band.rows);
-        const FrameRequest request{.splats = estimate.splats,
-                                   .width = uint32_t(frame.camera.width),
-                                   .height = rows > 0 ? rows : uint32_t(frame.camera.height),
-                                   .instances = instances_needed,
-                                   .gradients = true,
-                                   .masks = frame.alpha_weighs(),
-                                   .appearance = plan.appearance,
-                                   .overlaid = true,
-                                   .motion = plan.motion,
-                                   .readouts = frame.camera.readout.has_value(),
-                                   .rays = plan.rays(),
-                                   .loss = plan.loss};
+        FrameRequest request = frame_request(plan, uint32_t(frame.camera.width),
+                                             rows > 0 ? rows : uint32_t(frame.camera.height));
+        request.splats = estimate.splats;
+        request.instances = instances_needed;
+        request.masks = frame.alpha_weighs();
+        request.readouts = frame.camera.readout.has_value();
         const Sizes sizes = sizes_for(config, request);
         const uint64_t instances = sizes.overlay + 2 * sizes.instance_words;
         const uint64_t second = grows ? array + kRefineBytes * estimate.splats : 0;

@@ -15,8 +15,6 @@ using namespace pipeline;
 
 namespace {
 
-// Factor of the threshold that adds splats, with points: edges of opaque spheres have larger gradients than soft footprints.
-constexpr float kPointsThreshold = 8;
 constexpr double kResetOpacity = 0.01;  // 3DGS: upper bound of opacities after a reset
 double logit(double p) {
     return std::log(p / (1 - p));
@@ -88,11 +86,11 @@ void Refinement::control_density(int step) {
         DensifyRules rules;
         rules.grow_gradient = float(parts_.plan.absolute ? parts_.options.grow_gradient_absolute
                                                          : parts_.options.grow_gradient);
-        if (parts_.options.render.points) rules.grow_gradient *= kPointsThreshold;
+        rules.grow_gradient *= parts_.plan.method->grow_threshold;
         rules.split = parts_.schedule.even_splits ? shared::SPLIT_EVEN : shared::SPLIT_DRAWN;
         rules.split_scale = float(parts_.options.split_scale * parts_.extent);
-        rules.prune_logit = parts_.options.render.points ? -std::numeric_limits<float>::infinity()
-                                                         : float(logit(parts_.options.prune_opacity));
+        rules.prune_logit = parts_.plan.method->no_opacity ? -std::numeric_limits<float>::infinity()
+                                                           : float(logit(parts_.options.prune_opacity));
         rules.prune_scale =
             parts_.schedule.was_reset(step) ? float(parts_.options.prune_scale * parts_.extent) : 0.0f;
         rules.seed = parts_.options.seed;

@@ -61,9 +61,13 @@ LossWeights pipeline_loss(LossWeights loss) {
 
 }  // namespace
 
+bool has_opacities(const TrainOptions& options) {
+    return !scene::method_of(options.render).no_opacity;
+}
+
 bool few_photos(const TrainOptions& options, size_t photos) {
     return photos <= size_t(options.few_photos) && options.strategy != Strategy::mcmc &&
-           !options.render.points && !options.refine_poses;
+           has_opacities(options) && !options.refine_poses;
 }
 
 pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& options, bool masks,
@@ -88,6 +92,9 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
 void check_exclusions(const TrainOptions& options, int ranks) {
     const std::array<bool, divisions> divided{ranks > 1, options.batch > 1, options.bands > 1,
                                               options.device_memory_bytes > 0};
+    const scene::Method& method = scene::method_of(options.render);
+    for (size_t by = 0; by < divisions; ++by)
+        if (divided[by]) scene::refuse(method, method.no_division, kDivisions[by], true);
     for (const Exclusion& row : kExclusions)
         for (size_t by = 0; by < divisions; ++by)
             if (row.used(options) && divided[by] && row.excludes[by])
@@ -108,9 +115,7 @@ void check_training(const TrainOptions& options, int ranks) {
     if (options.bands < 1) throw InputError("--bands: a view has at least one band");
     check_exclusions(options, ranks);
     scene::check_look({.render = options.render});
-    core::check_exclusions(kPointExclusions, options);
-    core::check_exclusions(kDepthExclusions, options);
-    core::check_exclusions(kRayExclusions, options);
+    scene::check_demands(kDemands, options, scene::method_of(options.render));
     core::check_exclusions(kSkyExclusions, options);
 }
 
@@ -233,10 +238,9 @@ Schedule schedule_for(const TrainOptions& options, size_t photos) {
     s.relocate_every = scaled(options.refine_every, std::min(options.refine_every, kLeastRelocateEvery));
     s.growth = std::pow(options.growth, std::max(1.0, s.relocate_every / (share * options.refine_every)));
     s.copy_spread = (1 - share) * options.copy_spread;
-    s.even_splits = options.steps <= kLongestEvenRun && !options.render.points;
-    s.bounded = options.steps <= kLongestBoundedRun && !options.render.points &&
-                options.render.integrator == Integrator::splat;
-    if (options.opacity_reset_every > 0 && !options.render.points)
+    s.even_splits = options.steps <= kLongestEvenRun && has_opacities(options);
+    s.bounded = options.steps <= kLongestBoundedRun && !scene::method_of(options.render).no_footprint;
+    if (options.opacity_reset_every > 0 && has_opacities(options))
         s.opacity_reset_every =
             scaled(options.opacity_reset_every, std::min(options.opacity_reset_every, kLeastResetEvery));
     if (options.final_splats > 0) s.prune_step = std::max(1, int(std::lround(kPruneShare * options.steps)));
@@ -278,7 +282,7 @@ namespace {
 bool starts_coarse(const TrainOptions& options, const Dataset& dataset,
                    const std::vector<int>& train_frames) {
     if (options.steps < train::kLeastCoarseRun || options.steps > train::kLongestCoarseRun ||
-        options.strategy != Strategy::adc || options.render.points ||
+        options.strategy != Strategy::adc || !train::has_opacities(options) ||
         train_frames.size() <= size_t(options.few_photos) || dataset.points.positions.empty())
         return false;
     return std::ranges::all_of(train_frames, [&](int frame) {
@@ -293,7 +297,7 @@ bool starts_coarse(const TrainOptions& options, const Dataset& dataset,
 
 TrainOptions resolve(TrainOptions options, const Dataset& dataset, const std::vector<int>& train_frames) {
     check(dataset, train_frames);
-    const bool adc_asked_for = options.absolute_gradients || options.render.points;
+    const bool adc_asked_for = options.absolute_gradients || !train::has_opacities(options);
     if (options.strategy == Strategy::automatic)
         options.strategy = adc_asked_for ? Strategy::adc : strategy_for(options.steps);
     if (options.sh_degree == kAutomaticShDegree)

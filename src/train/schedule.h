@@ -95,6 +95,9 @@ struct Schedule {
 /// level above it, and the full resolution gets the rest.
 uint64_t cache_share(const TrainOptions& options, int halvings);
 
+/// Whether the method of drawing gives splats an opacity, and so an edge that fades.
+bool has_opacities(const TrainOptions& options);
+
 /// Whether adc or none has so few training photos that the run is regularised, and may fade. Not one that refines poses:
 /// its splats have to follow the cameras.
 bool few_photos(const TrainOptions& options, size_t photos);

@@ -255,8 +255,8 @@ Gaussians Trainer::gaussians() const {
     return train::gaussians_of(call(*training_, Call::gaussians).finished());
 }
 std::vector<Image> Trainer::render(std::span<const Camera> cameras) const {
-    if (training_->plan().points())
-        throw InputError("a trainer of points does not draw pictures: a Renderer of its splats does");
+    if (const scene::Lack lack = training_->plan().method->no_trainer_image)
+        throw InputError(std::string(lack.why));
     return train::render(call(*training_, Call::render).finished(), cameras);
 }
 std::vector<RankFigures> Trainer::rank_figures() const {

@@ -173,18 +173,11 @@ TrainingParts::~TrainingParts() {
 }
 
 FrameRequest TrainingParts::request_of(const CameraUse& camera) const {
-    return {.splats = portions.largest(),
-            .width = camera.width,
-            .height = camera.height,
-            .instances = tools.instance_capacity,
-            .gradients = true,
-            .masks = plan.masks,
-            .appearance = plan.appearance,
-            .overlaid = true,
-            .motion = plan.motion,
-            .readouts = learned.motions.readouts(),
-            .rays = plan.rays(),
-            .loss = plan.loss};
+    FrameRequest request = frame_request(plan, camera.width, camera.height);
+    request.splats = portions.largest();
+    request.instances = tools.instance_capacity;
+    request.readouts = learned.motions.readouts();
+    return request;
 }
 
 portions::StepParts TrainingParts::step_parts() {
