@@ -204,11 +204,11 @@ Startup open(const Arguments& arguments) {
     startup.frame = frame_of(arguments.frame, startup.scene.dataset.get());
     startup.settings.cameras = startup.scene.gaussians->size() == 0;
     Look& look = startup.settings.look;
-    look.kernel = core::find_value(scene::kKernelWords, arguments.kernel).value_or(startup.scene.look.kernel);
-    look.points = startup.scene.look.points && arguments.kernel.empty();
-    look.nearest = startup.scene.look.nearest;
-    look.background = startup.scene.look.background;
-    look.sky = startup.scene.look.sky;
+    look.mode = std::exchange(look, startup.scene.look).mode;
+    if (const auto kernel = core::find_value(scene::kKernelWords, arguments.kernel)) {
+        look.kernel = *kernel;
+        look.points = false;
+    }
     if (arguments.background.empty()) return startup;
     look.sky.reset();
     const auto background = core::parse_colour(arguments.background);

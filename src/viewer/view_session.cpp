@@ -2,6 +2,7 @@
 #include "viewer/view_session.h"
 
 #include <cstdio>
+#include <utility>
 
 #include "core/process.h"
 #include "core/text.h"
@@ -33,11 +34,9 @@ void ViewSession::adopt(OpenedScene opened, std::optional<int> frame) {
     OpenedScene& scene = state_.scene = std::move(opened);
     scene.set_gaussians(scene.gaussians);
     Look& look = state_.settings.look;
-    look.kernel = scene.look.kernel;
-    look.points = scene.look.points;
-    look.nearest = scene.look.nearest;
-    look.background = scene.look.background;
-    look.sky = scene.look.sky;
+    const Look before = std::exchange(look, scene.look);
+    look.mode = before.mode;
+    look.splat_scale = before.splat_scale;
     look.sh_degree = scene.sh_degree;
     state_.message.note.clear();
     if (!scene.remark.empty()) state_.say(scene.remark);
