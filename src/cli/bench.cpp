@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -14,6 +15,7 @@
 #include "cli/status.h"
 #include "core/atomic_file.h"
 #include "core/bench_options.h"
+#include "core/json_field.h"
 #include "core/process.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -30,6 +32,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr uint32_t kMaxSplats = 40000;
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr int kEvaluations = 6;
 
 struct BenchArguments {
@@ -134,8 +137,8 @@ report::WorkPrecision rendering_diagram(const report::Json& measured) {
         const report::Json &series = rendering.at("series")[i], &style = measured.at("styles").at(i);
         report::WorkSeries one{series.at("name"), true, {}, style.at("dashed"), style.at("hue")};
         for (const report::Json& point : series.at("points"))
-            one.points.push_back({point.at("name"), report::number_or_nan(point, "time"),
-                                  report::number_or_nan(point, "error")});
+            one.points.push_back({point.at("name"), core::number_in(point, "time").value_or(kUnknown),
+                                  core::number_in(point, "error").value_or(kUnknown)});
         diagram.series.push_back(std::move(one));
     }
     return diagram;

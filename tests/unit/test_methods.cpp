@@ -112,7 +112,8 @@ TEST(Methods, OfTrainingsSayWhatTheyLack) {
     const auto poses = [](TrainOptions& o) { o.refine_poses = true; };
     EXPECT_EQ(training(kSpheres, poses),
               points + "--refine-poses" + each + "spheres have no gradient by the camera");
-    EXPECT_EQ(training(kByRay, poses), rays + "--refine-poses" + each + "rays have no gradient by the camera");
+    EXPECT_EQ(training(kByRay, poses),
+              rays + "--refine-poses" + each + "rays have no gradient by the camera");
     EXPECT_EQ(training(kSpheres, [](TrainOptions& o) { o.loss.depth = 1; }),
               "--loss depth and --points" + each + "the depth of a sphere has no gradient");
     EXPECT_EQ(training(kByRay, [](TrainOptions& o) { o.loss.sfm_depth = 1; }),

@@ -72,8 +72,8 @@ TEST(Report, MetricsHaveTestFiguresOnlyWhereEvaluated) {
     line.train_psnr = 25.5;
     EXPECT_EQ(to_json(line)["train_psnr"], 25.5);
     const auto read_back = [](const MetricsLine& written) {
-        const auto json = nlohmann::json::parse(to_json(written).dump());
-        return metrics_line({json, "a line"});
+        const auto parsed = nlohmann::json::parse(to_json(written).dump());
+        return metrics_line({parsed, "a line"});
     };
     EXPECT_EQ(read_back(line).train_psnr, 25.5);
     line.test_figures = {{"cc_psnr", 21.5}, {"ms_ssim", std::nan("")}};
