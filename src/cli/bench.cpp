@@ -22,6 +22,7 @@
 #include "ewa/evaluation.h"
 #include "ewa/splat_files.h"
 #include "ewa/trainer.h"
+#include "options/option.h"
 #include "report/chart.h"
 #include "scene/readout.h"
 #include "scene/scene_file.h"
@@ -218,6 +219,20 @@ void check_modes(const CLI::App& app) {
 
 }  // namespace
 
+namespace {
+
+void group_options(CLI::App& app) {
+    for (const char* name : {"--cases", "--list", "--large", "--splats"})
+        app.get_option(name)->group(options::kData);
+    for (const char* name : {"--runs", "--training-steps", "--stability"})
+        app.get_option(name)->group(options::kQuality);
+    for (const char* name : {"--json", "--svg", "--accuracy", "--check", "--compare", "--results"})
+        app.get_option(name)->group(options::kOutput);
+    for (const char* name : {"--device", "--kernels"}) app.get_option(name)->group(options::kDevice);
+}
+
+}  // namespace
+
 Action add_bench(CLI::App& app) {
     const auto arguments = std::make_shared<BenchArguments>();
     core::add_bench_options<CLI::Validator>(app, arguments->options);
@@ -234,6 +249,7 @@ Action add_bench(CLI::App& app) {
                    "With --accuracy: write the diagram of rendering to FILE, and that of training to "
                    "NAME_training.svg beside it")
         ->type_name("FILE");
+    group_options(app);
     return [&app, arguments] {
         check_modes(app);
         const core::BenchOptions& options = arguments->options;

@@ -24,7 +24,7 @@ void add_run_files(std::vector<NamedFile>& read) {
     for (size_t i = 0, count = read.size(); i < count; ++i) {
         fs::path folder = read[i].path;
         if (const auto run = folders::run_of_splats(folder)) folder = run->folder;
-        if (!folders::is_run(folder)) continue;
+        if (!folders::find_run(folder)) continue;
         for (const char* name : folders::kRunFiles) read.push_back({"a file of the run", folder / name});
     }
 }

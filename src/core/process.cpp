@@ -206,7 +206,10 @@ std::filesystem::path find_program(const std::string& name) {
 
 std::filesystem::path own_program() {
     std::error_code unknown;
-    return std::filesystem::canonical(std::bit_cast<const char*>(getauxval(AT_EXECFN)), unknown);
+    const auto program =
+        std::filesystem::canonical(std::bit_cast<const char*>(getauxval(AT_EXECFN)), unknown);
+    if (unknown) throw RunError("cannot find where this program is: " + unknown.message());
+    return program;
 }
 
 pid_t start_program(std::vector<std::string> command, const std::vector<std::string>& environment,

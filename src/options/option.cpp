@@ -14,7 +14,7 @@ namespace {
 void join(Option& row, const train::RunOption& run) {
     row.commands += run.brief.empty() ? " train" : " train!";
     row.subject = run.subject;
-    row.value = run.flag ? "" : run.value;
+    row.value = run.flag || is_positional(row) ? "" : run.value;
     row.help = run.help;
     row.choices = run.choices;
     row.run = &run;

@@ -109,7 +109,7 @@ std::vector<Option> from_a_to_o() {
         row("background", "render! eval grad compare!", kQuality, "COLOUR",
             "Background colour: r,g,b in 0..1, a name such as white, #rrggbb, or a sky.json [that beside "
             "SPLATS, if it is there]",
-            kUsual, brief("Colour behind the splats, or a sky.json")),
+            kInput, kUsual, brief("Colour behind the splats, or a sky.json")),
         row("background", "ewa-view", kQuality, "COLOUR",
             "Background colour: r,g,b in 0..1, a name such as white, or #rrggbb"),
         row("bake-sky", "convert", kData, "",
@@ -172,7 +172,7 @@ std::vector<Option> from_a_to_o() {
         row("exposures", "render eval", kData, "auto|none|FILE",
             "Appearance of training images, as ewa train --appearance writes it. auto: that of the run "
             "SPLATS, with its own dataset",
-            kUsual),
+            kInput, kUsual),
         row("film", "ewa-view", kOutput, "DIR",
             "Write a film through the saved views, one PNG per frame, and exit"),
         row("film-seconds", "ewa-view", kOutput, "S", "Duration of the film from view to view (2)",

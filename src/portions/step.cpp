@@ -222,7 +222,24 @@ Turn Step::list_views(const StepParts& parts, const Views& of) {
     return turn;
 }
 
+/// From the model itself: the passes of rays read what they know of a splat by its number in the model.
+bool Step::draw_whole(const StepParts& parts, const StepView& view) {
+    const Model& model = portions_.holder().use(0, Need::params);
+    for (;;) {
+        reserve(parts, view.request, model.splats);
+        gpu::Recording recording(parts.cache.device().limits());
+        FramePasses{{recording, parts.cache}, parts.plan, parts.frame, view.inputs}.forward(model);
+        const shared::Counts counts = run(parts, recording);
+        if (counts.instances <= parts.frame.instance_capacity) {
+            check_rays_finished(counts);
+            return true;
+        }
+        parts.instance_capacity = grown_capacity(counts.instances);
+    }
+}
+
 bool Step::draw_views(const StepParts& parts, std::span<const StepView> views) {
+    if (portions_.alone()) return draw_whole(parts, views.front());
     const Views of{views, 1};
     const int own = portions_.ranks().rank();
     const Turn turn = list_views(parts, of);

@@ -92,6 +92,7 @@ class Step {
     std::vector<float> weights_of(const StepParts& parts, const Views& of, const Turn& turn);
     void return_sums(const StepParts& parts, const Turn& turn);
     Turn list_views(const StepParts& parts, const Views& of);
+    bool draw_whole(const StepParts& parts, const StepView& view);
 
     Portions& portions_;
     CountedRanks ranks_;

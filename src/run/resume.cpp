@@ -2,6 +2,7 @@
 #include "run/resume.h"
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "core/hash.h"
@@ -42,13 +43,13 @@ Json parse_settings(const std::filesystem::path& path, const std::string& stored
 /// A value of "reached", which only a run continued with another number of steps has. Wrong values count as absent.
 int reached(const Json& settings, const char* name, int absent, int most) {
     const double value = core::number_in(settings.value("reached", Json()), name).value_or(absent);
-    return value >= 0 && value <= most ? int(value) : absent;
+    return value >= 0 && value <= most && value == std::floor(value) ? int(value) : absent;
 }
 
 /// The largest number of splats that a run may have had. 0 if it is not known.
 uint32_t cap_of(const Json& settings) {
     const double cap = core::number_in(settings, "cap").value_or(0);
-    return cap >= 0 && cap <= UINT32_MAX ? uint32_t(cap) : 0;
+    return cap >= 0 && cap <= UINT32_MAX && cap == std::floor(cap) ? uint32_t(cap) : 0;
 }
 
 /// The value as to_config writes it: "1.0,1,1" and "1,1,1" are the same background.

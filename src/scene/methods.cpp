@@ -43,7 +43,8 @@ constexpr Method march() {
 }
 
 /// In the order of MethodKind.
-static_assert(MethodKind(Integrator::march) == MethodKind::march &&
+static_assert(MethodKind(Integrator::ray) == MethodKind::ray &&
+              MethodKind(Integrator::march) == MethodKind::march &&
               MethodKind(Integrator::fast_ray) == MethodKind::fast_ray);
 constexpr std::array kMethods{
     Method{}, along_rays(MethodKind::ray, "--integrator ray", "the integrator ray"), march(),

@@ -20,8 +20,7 @@ namespace fs = std::filesystem;
 namespace {
 
 std::vector<std::string> command_of(const std::vector<std::string>& arguments, const fs::path& output) {
-    std::error_code error;
-    const fs::path program = fs::read_symlink("/proc/self/exe", error).parent_path() / "ewa";
+    const fs::path program = core::own_program().parent_path() / "ewa";
     std::vector<std::string> words{program.string(), "train"};
     words.insert(words.end(), arguments.begin(), arguments.end());
     words.insert(words.end(), {"--serve", "0", "-o", output.string()});

@@ -14,6 +14,7 @@
 #include "scene/depth_map.h"
 #include "support/temp_folder.h"
 #include "support/thread_ranks.h"
+#include "train/divided.h"
 #include "train/synthetic.h"
 
 namespace ewa::test {
@@ -137,6 +138,29 @@ TEST(Depths, HaveTheSameBytesHoweverTheTrainingIsDivided) {
     TrainOptions options = quick(12);
     options.loss.depth = 0.5;
     expect_same_bytes(train_depths(options, 12), train_on_ranks(options, 2));
+}
+
+/// In chunks, of which a part is in host memory.
+TEST(Depths, HaveTheSameBytesWhereSplatsLeaveTheDevice) {
+    const Dataset& dataset = measured().dataset;
+    TrainOptions options = quick(4);
+    options.strategy = Strategy::none;
+    options.sh_degree = 3;
+    options.loss.depth = 0.5;
+    options.bands = 2;  // whose kernels are those of chunks
+    const auto train = [&](uint64_t limit) {
+        options.device_memory_bytes = limit;
+        Trainer trainer(open_test_device(false), dataset, all_frames(dataset), tall_scene(28000), options);
+        while (trainer.steps_done() < 4) trainer.step();
+        EXPECT_EQ(limit > 0, trainer.chunk_figures().has_value());
+        return trainer.state();
+    };
+    const TrainerState whole = train(0);
+    uint64_t bytes = 0;
+    for (const TrainerArray& array : whole.arrays) bytes += array.bytes.size();
+    expect_same_bytes(whole, train(bytes / 4));
+    options.loss.depth = 0;
+    EXPECT_NE(train(0).report.loss, whole.report.loss);
 }
 
 /// The bands of a view count the pixels of the whole view.

@@ -76,6 +76,22 @@ TEST(RayTraining, ResumesWithTheSameBytes) {
     }
 }
 
+/// Some splats are outside the view, or behind the camera.
+TEST(RayTraining, DrawsWhatARendererDraws) {
+    for (const Integrator integrator : {Integrator::ray, Integrator::fast_ray}) {
+        TrainOptions options = quick(2);
+        options.render.integrator = integrator;
+        const Dataset& dataset = small_capture().dataset;
+        Trainer trainer(device(), dataset, all_frames(dataset), shaken_start(small_capture(), 0.5, 12, 0),
+                        options);
+        trainer.step();
+        Camera camera = dataset.frames[0].camera;
+        camera.cx += 0.4 * camera.width;
+        Renderer renderer(device(), trainer.gaussians(), options.render);
+        EXPECT_EQ(trainer.render({&camera, 1})[0].pixels, renderer.render(camera).color.pixels);
+    }
+}
+
 TEST(RayTraining, LearnsThroughLenses) {
     for (const Lens lens : {Lens::fisheye, Lens::equirectangular, Lens::brown}) {
         Synthetic scene;

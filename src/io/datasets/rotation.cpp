@@ -51,8 +51,13 @@ void set_pose(Camera& camera, const glm::dmat3& axes, const glm::dvec3& center) 
 }
 
 void read_opengl_pose(const core::JsonField& field, const char* key, Camera& camera) {
-    const size_t count = field.at(key).value().size() == 3 ? 12 : 16;
-    const std::vector<double> m = field.numbers(key, count, count, "3 or 4 rows of 4 finite numbers");
+    const size_t parts = field.at(key).value().size(), count = parts == 3 ? 12 : 16;
+    const char* form = "3 or 4 rows of 4 finite numbers";
+    const std::vector<double> m = field.numbers(key, count, count, form);
+    // A list of 16 numbers may go row by row or column by column. Its last row then has the translation.
+    const bool by_columns = parts == 16 && (m[12] != 0 || m[13] != 0 || m[14] != 0);
+    if (by_columns || (parts != 3 && parts != 4 && parts != 16))
+        field.fail(std::string("\"") + key + "\" is not " + form);
     const glm::dmat3 axes(m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]);
     if (const std::string fault = rotation_fault(axes); !fault.empty())
         field.fail(std::string("\"") + key + "\" is not a rotation: " + fault);

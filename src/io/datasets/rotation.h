@@ -26,7 +26,8 @@ inline glm::dmat3 from_opengl(const glm::dmat3& axes) {
     return {axes[0], -axes[1], -axes[2]};
 }
 
-/// The pose of a matrix, row by row, from a camera with OpenGL's axes to the world. Its last row says nothing and may be missing.
+/// The pose of a matrix, row by row, from a camera with OpenGL's axes to the world. The last row may be missing, and the rows may follow each
+/// other in one list.
 /// Throws InputError.
 void read_opengl_pose(const core::JsonField& field, const char* key, Camera& camera);
 
