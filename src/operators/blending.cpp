@@ -6,7 +6,7 @@
 #include "operators/context.h"
 #include "operators/device_lists.h"
 #include "passes/passes.h"
-#include "pipeline/forward.h"
+#include "pipeline/frame_passes.h"
 
 namespace ewa {
 namespace operators {

@@ -7,7 +7,7 @@
 #include "passes/passes.h"
 #include "pipeline/adam.h"
 #include "pipeline/appearances.h"
-#include "pipeline/forward.h"
+#include "pipeline/frame_passes.h"
 #include "shared/constants.h"
 
 namespace ewa::pipeline {

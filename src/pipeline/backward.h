@@ -3,7 +3,7 @@
 #pragma once
 #include <cstdint>
 
-#include "pipeline/forward.h"
+#include "pipeline/frame_passes.h"
 #include "pipeline/motions.h"
 
 namespace ewa::pipeline {

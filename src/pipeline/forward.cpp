@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pipeline/forward.h"
+#include "pipeline/frame_passes.h"
 
 #include "pipeline/methods.h"
 #include "pipeline/sorting.h"

@@ -2,7 +2,7 @@
 // The passes of each method of scene/methods.h, which FramePasses records between those that all methods have in common.
 #pragma once
 #include "passes/passes.h"
-#include "pipeline/forward.h"
+#include "pipeline/frame_passes.h"
 
 namespace ewa::pipeline {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "ewa/sky_map.h"
-#include "pipeline/forward.h"
+#include "pipeline/frame_passes.h"
 #include "pipeline/learned_table.h"
 
 namespace ewa::pipeline {

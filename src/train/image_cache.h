@@ -10,8 +10,8 @@
 #include "ewa/train_options.h"
 #include "gpu/buffer.h"
 #include "passes/kernel_config.h"
-#include "pipeline/forward.h"
 #include "pipeline/frame_inputs.h"
+#include "pipeline/frame_passes.h"
 
 namespace ewa::train {
 

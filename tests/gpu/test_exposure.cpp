@@ -9,8 +9,8 @@
 #include "gpu/guarded.h"
 #include "gpu/reference_inputs.h"
 #include "pipeline/appearances.h"
-#include "pipeline/forward.h"
 #include "pipeline/frame_inputs.h"
+#include "pipeline/frame_passes.h"
 #include "reference/loss.h"
 #include "reference/training.h"
 

@@ -96,6 +96,7 @@ TEST(Methods, OfPlansSayWhatTheyLack) {
 TEST(Methods, OfTrainingsSayWhatTheyLack) {
     const auto training = [](const RenderOptions& render, const std::function<void(TrainOptions&)>& change) {
         TrainOptions options;
+        options.strategy = Strategy::none;
         options.render = render;
         change(options);
         return said_by([&] { train::check_training(options, 1); });

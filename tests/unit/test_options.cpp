@@ -154,7 +154,7 @@ TEST(OptionTable, FilesAreReadOrWrittenByTheirRoles) {
     const options::TypedFiles files = options::typed_files(
         grad.parsed("grad s.ply d --frame 0 -o g.ply --json g.json --background sky.json"));
     EXPECT_EQ(names(files.written), (Names{"--output g.ply", "--json g.json"}));
-    EXPECT_EQ(names(files.read), (Names{"SPLATS s.ply", "DATASET d"}));
+    EXPECT_EQ(names(files.read), (Names{"SPLATS s.ply", "DATASET d", "--background sky.json"}));
     const options::TypedFiles drawn =
         options::typed_files(render.parsed("render s.ply --views v.json -o out"));
     EXPECT_EQ(names(drawn.written), Names{});
