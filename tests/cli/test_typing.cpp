@@ -79,7 +79,7 @@ TEST_F(Typed, MistypedWordsAreRecognised) {
     expect_failure(run_ewa({"--screenshto", "x.png", "s.ply"}, viewer), 2,
                    "unexpected arguments: --screenshto s.ply; did you mean --screenshot?");
     expect_failure(run_ewa({"s.ply", "--mode", "smell"}, viewer), 2,
-                   "--mode: 'smell' is not one of alpha, color, count, depth, ellipsoids");
+                   "--mode: 'smell' is not one of color, depth, alpha, count, ellipsoids");
     expect_failure(run_ewa({folder / "absent.ply", "--mode", "colour", "--background", "#fff"}, viewer), 2,
                    "absent.ply");
     expect_failure(run_ewa({folder / "s.ply", "--background", "whit"}, viewer), 2, "did you mean white?");
