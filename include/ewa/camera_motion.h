@@ -13,7 +13,8 @@ struct CameraMotion {
     double log_focal = 0;          // f
     glm::dvec3 shift{0.0};         // s: world units, along the camera's axes before the motion
     glm::dvec3 readout_turn{0.0};  // radians, camera axes
-    /// World units, along the axes of the moved camera at the middle of the readout.
+    /// How much further the camera moves from the first row's readout to the last one's: world units, along the axes of the moved
+    /// camera at the middle of the readout.
     glm::dvec3 readout_shift{0.0};
     bool operator==(const CameraMotion&) const = default;
 };

@@ -53,7 +53,7 @@ CLI::Option* add(CLI::App& command, std::string_view name, T& variable) {
 }
 /// Adds an option of a training run, which sets its member.
 CLI::Option* add(CLI::App& command, std::string_view name, RunOptions& variable);
-/// Adds an option whose values the command takes from the parser.
+/// Adds an option without a variable. The command reads its values from the result after the parsing.
 CLI::Option* add(CLI::App& command, std::string_view name);
 
 /// Puts the options of the help under their subjects. A command with few has one heading. Where rows are in the short help of the

@@ -28,7 +28,7 @@ bool finished(const std::future<Result>& future) {
 template <class Request, class Result>
 class Latest {
   public:
-    /// make runs on the thread and never throws. on_news is called there when result() has changed.
+    /// Starts a thread that calls make for the newest request. make never throws. The thread calls on_news after result() has changed.
     Latest(std::function<Result(const Request&)> make, std::function<void()> on_news)
         : make_(std::move(make)),
           on_news_(std::move(on_news)),

@@ -52,7 +52,8 @@ class Fluency {
     std::map<int, uint64_t> by_divisor_;
 };
 
-/// The times of a session in seconds after the start of the program, for the panel and for --verbose.
+/// When the window has opened a file, shown its first picture and so on, in seconds after the start of the program. The panel and
+/// --verbose print it.
 class SessionTimes {
   public:
     double scene_read = 0, device_open = 0, window_open = 0;
