@@ -79,7 +79,7 @@ bool JsonField::has(const char* key) const {
 
 const nlohmann::json& JsonField::member(const char* key) const {
     if (!key) return *value_;
-    if (!value_->is_object()) fail("is not a JSON object" + advice_);
+    if (!value_->is_object()) fail("is not a JSON object with " + quoted(key) + advice_);
     if (!has(key)) fail(quoted(key) + " is missing" + advice_);
     const auto found = value_->find(key);
     return found != value_->end() && !found->is_null() ? *found : *other_->find(key);

@@ -59,6 +59,7 @@ void FramePasses::appearance_backward(const AppearanceUse& use) const {
     const auto [bias1, bias2] = adam_biases(use.visit);
     if (a.model != AppearanceModel::ppisp) {
         const shared::GridPush push = grid_push(frame, use);
+        const uint32_t cells = a.layout.row_floats / shared::GRID_CELL_FLOATS;
         record(passes::GridGradient{.image = frame.planes,
                                     .grids = a.values,
                                     .image_gradient = frame.image_gradient,
@@ -77,7 +78,7 @@ void FramePasses::appearance_backward(const AppearanceUse& use) const {
                 .photo = use.photo,
                 .parts = push.parts,
                 .rate = use.rate,
-                .pull = kGridPull / float(a.layout.row_floats / shared::GRID_CELL_FLOATS),
+                .pull = kGridPull / float(cells),
                 .bias1 = bias1,
                 .bias2 = bias2,
                 .instance_capacity = frame.instance_capacity});

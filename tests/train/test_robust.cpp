@@ -217,6 +217,7 @@ TEST(Robust, AShortRunHasNoScout) {
     RunOptions plain = visited().run(folder / "plain", false),
                robust = visited().run(folder / "robust", true);
     plain.train.steps = robust.train.steps = kFewestSteps - 1;
+    plain.automatic_background = false;  // as with robust
     run_training(plain);
     Notes notes;
     run_training(robust, notes);
