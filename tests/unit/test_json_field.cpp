@@ -67,7 +67,7 @@ TEST(JsonField, SaysWhereAValueIs) {
     field_refuses([&] { field.part("a").number("c"); }, "\"a\": \"c\" is missing; it is damaged");
     field_refuses([&] { field.items("list")[1].number(nullptr); }, "\"list\" 1: is not a finite number");
     field_refuses([&] { field.items("list")[0].number("x"); },
-                  "\"list\" 0: is not a JSON object; it is damaged");
+                  "\"list\" 0: is not a JSON object with \"x\"; it is damaged");
     field_refuses([&] { field.members("list"); }, "\"list\" is not a JSON object");
     field_refuses([&] { field.list("a"); }, "\"a\" is not a list");
     EXPECT_EQ(field.items("list")[1].text(nullptr), "x");
