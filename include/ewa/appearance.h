@@ -28,13 +28,14 @@ enum class AppearanceModel {
 using Exposure = std::array<float, 12>;
 inline constexpr Exposure kIdentityExposure{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
-/// PPISP: an image's exposure and colour map, and its camera's vignette and response, in this order
-/// (shaders/lib/ppisp.glsl has the formulas). Without arguments it changes no colour of 0 to 1.
+/// PPISP: an image's exposure and colour map, and its camera's vignette and response, in this order (shaders/lib/ppisp.glsl has the
+/// formulas). A default-constructed Ppisp leaves colours from 0 to 1 unchanged.
 struct Ppisp {
-    /// Exposure in stops; then latent offsets x, y of the colours that blue, red, green and grey become.
+    /// An image's values: its exposure in stops, then latent x, y offsets of the four colours to which blue, red, green and grey
+    /// map.
     std::array<float, 9> photo{};
-    /// Nine values for each channel. The vignette has a centre x, y from the image's middle, in units of the larger side, and
-    /// factors of r^2, r^4 and r^6. The response has toe, shoulder, gamma and middle, before softplus and sigmoid.
+    /// A camera's values, nine for each colour channel. The vignette has a centre x, y from the image's middle, in units of the
+    /// larger side, and factors of r^2, r^4 and r^6. The response has toe, shoulder, gamma and middle, before softplus and sigmoid.
     std::array<float, 27> camera = neutral_camera();
 
     /// The values of `camera` that change no colour.
@@ -53,13 +54,13 @@ struct ColorGrid {
 
 using Appearance = std::variant<Exposure, Ppisp, ColorGrid>;
 
-/// Throws InputError unless a ColorGrid has all of its cells. Functions that take an Appearance call it.
+/// Throws InputError unless a ColorGrid has all of its cells. Functions that take an Appearance call this check.
 void check(const Appearance& appearance);
-/// Checks each of them. Throws InputError also unless all have one model.
+/// Checks each appearance. Also throws InputError unless all appearances have one model.
 void check(const std::vector<Appearance>& appearances);
 
-/// Applies the appearance to the first three channels, colours as the splats have them. Other channels stay. Ppisp clamps to 0..1.
-/// Throws InputError for fewer than 3 channels.
+/// Applies the appearance to the first three channels, which are RGB as the splats store it. Other channels stay unchanged. Ppisp
+/// clamps to 0..1. Throws InputError for fewer than 3 channels.
 Image with_appearance(Image image, const Appearance& appearance);
 
 /// The appearance of views that training has not seen. Neighbouring images of a camera with automatic exposure look alike. So a new
@@ -68,7 +69,7 @@ Image with_appearance(Image image, const Appearance& appearance);
 /// appearance for all places, all views get that one: the mean over all images, or with Exposure none, the splats' own colours.
 class NewViewAppearance {
   public:
-    /// Without appearances.
+    /// Has no appearances: at() returns no value.
     NewViewAppearance() = default;
     /// centers: of the images' cameras, in world coordinates; empty: unknown. Throws InputError for appearances of several models,
     /// for another number of centres, and for centres that are not finite.
@@ -86,11 +87,11 @@ class NewViewAppearance {
     std::optional<Appearance> of_all_;
 };
 
-/// The appearances of training images under their Frame::name: appearance.json of a run's folder, or the exposures.json of older
-/// ones. Throws InputError if the file cannot be read, or values are missing or not finite.
+/// Reads the appearances of training images, by Frame::name, from a run's appearance.json, or from the exposures.json of an older
+/// run. Throws InputError if the file cannot be read, or values are missing or not finite.
 std::map<std::string, Appearance> load_appearances(const std::filesystem::path& path);
-/// Writes appearance.json. names: one for each of the appearances, which have one model. Throws RunError (disk), InputError
-/// (others).
+/// Writes appearance.json. names: one for each appearance. All appearances have one model. Throws RunError (disk), InputError
+/// (other faults).
 void save_appearances(const std::filesystem::path& path, const std::vector<std::string>& names,
                       const std::vector<Appearance>& appearances);
 

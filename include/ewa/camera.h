@@ -25,7 +25,7 @@ enum class Lens {
 /// Description"). Parameters that a lens does not have are zero.
 struct Distortion {
     double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0, k4 = 0, k5 = 0, k6 = 0;
-    /// Thin prism: s1 and s3 of the squared radius, s2 and s4 of its square.
+    /// Thin prism: s1 and s3 are coefficients of the radius to the power of 2, s2 and s4 of that to the power of 4.
     double s1 = 0, s2 = 0, s3 = 0, s4 = 0;
     Lens lens = Lens::brown;
     double skew = 0;  // shears the image: x grows by skew times y, in focal lengths
@@ -37,11 +37,12 @@ struct Distortion {
 /// Where the sensor of a rolling shutter begins to read the image.
 enum class ReadoutFrom { top, bottom, left, right };
 
-/// A rolling shutter, which reads one row or column after another. Camera's own pose is that at the border where the readout begins.
-/// Between the poses the camera turns at a constant rate about one axis, and its centre moves along a line.
+/// A rolling shutter, which reads one row or column after another. Camera::rotation and Camera::translation are the pose at the
+/// start of the readout. From there to the pose at its end, the camera turns at a constant rate about one axis, and its centre
+/// moves along a line.
 struct Readout {
     ReadoutFrom from = ReadoutFrom::top;
-    // The pose when the readout reaches the opposite border: world to camera, as Camera's.
+    // The pose at the end of the readout, at the opposite border: world to camera, as in Camera.
     glm::dmat3 rotation{1.0};
     glm::dvec3 translation{0.0};
 };
@@ -64,7 +65,7 @@ struct Camera {
 /// InputError for a factor below 1.
 Camera downscale(const Camera& camera, int factor);
 
-/// The same view in an image of another size in px: focal lengths and principal point follow it, per axis.
+/// The same view at another image size, in px. Focal lengths and principal point scale with the image's width and height.
 Camera resized(const Camera& camera, int width, int height);
 
 }  // namespace ewa

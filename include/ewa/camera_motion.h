@@ -12,14 +12,13 @@ struct CameraMotion {
     glm::dvec3 rotation{0.0};      // w: axis times angle, radians, camera axes
     double log_focal = 0;          // f
     glm::dvec3 shift{0.0};         // s: world units, along the camera's axes before the motion
-    glm::dvec3 readout_turn{0.0};  // radians, camera axes
-    /// How much further the camera moves from the first row's readout to the last one's: world units, along the axes of the moved
-    /// camera at the middle of the readout.
+    glm::dvec3 readout_turn{0.0};  // during the readout: axis times angle, radians, camera axes
+    /// A further shift of the centre during the readout, in world units along the axes of the moved camera at mid-readout.
     glm::dvec3 readout_shift{0.0};
     bool operator==(const CameraMotion&) const = default;
 };
 
-/// The camera after the motion. The turn of a readout is clamped to shared::READOUT_TURN_LEARNED.
+/// The camera after the motion. The angle of its turn during a readout is clamped to shared::READOUT_TURN_LEARNED radians.
 Camera moved(const Camera& camera, const CameraMotion& motion);
 
 /// The distance between two cameras of one image, at the middle of the readout.
@@ -28,7 +27,7 @@ struct CameraDistance {
     double length = 0;   // between their centres, world units
     double focal = 1;    // factor of the focal length
 };
-/// focal: that of `to` divided by that of `from`, by fx.
+/// Measures the change from camera `from` to camera `to`. CameraDistance::focal is fx of `to` divided by fx of `from`.
 CameraDistance distance_between(const Camera& from, const Camera& to);
 
 }  // namespace ewa

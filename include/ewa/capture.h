@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Photos without cameras, and videos, become datasets: ffmpeg extracts frames, and COLMAP finds the cameras. Both are
-// run as the programs that they are.
+// Photos without cameras, and videos, become datasets: ffmpeg extracts frames, and COLMAP finds the cameras. ewa runs both as
+// separate programs.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -30,28 +30,28 @@ struct CaptureOptions {
     bool level = true;  // false: the world keeps COLMAP's axes
 };
 
-/// The work, in this order. Without a video there are no frames.
+/// The phases of make_dataset, in this order. The phase `frames` occurs only with videos.
 enum class CapturePhase { photos, frames, features, matches, cameras };
 
 /// The progress of make_dataset.
 struct CaptureProgress {
     CapturePhase phase = CapturePhase::photos;
     std::string what;  // a verb, such as "placed"
-    std::string unit;  // its plural, such as "photos"
+    std::string unit;  // the plural of what is counted, such as "photos"
     int done = 0, total = 0;
-    std::string note;          // a line for the user, which comes once; usually empty
-    double left = -1;          // s, of all parts; -1: not known before the first photo is searched
-    double photo_seconds = 0;  // that COLMAP takes to search one; 0: not known
+    std::string note;          // a line for the user, in one call only; usually empty
+    double left = -1;          // s to the end of all phases; -1: not known before the first photo is searched
+    double photo_seconds = 0;  // s in which COLMAP searches one photo for features; 0: not known
 };
 
 /// The outcome of make_dataset.
 struct Capture {
-    int images = 0;                       // that COLMAP got
-    int placed = 0;                       // that have a camera
+    int images = 0;                       // that COLMAP received
+    int placed = 0;                       // those for which COLMAP found a camera
     bool interrupted = false;             // true: the other members are not known
     std::vector<std::string> not_placed;  // names of images without a camera
     std::vector<std::string> remarks;     // for the user: a line each
-    /// A line on the world's axes and scale. Empty: they are COLMAP's, or of an earlier search.
+    /// A line on the world's axes and scale. Empty: both are COLMAP's, or an earlier search has set them.
     std::string axes;
 };
 
@@ -90,16 +90,16 @@ std::shared_ptr<const void> read_archive(
 /// for a video that cannot be read.
 ImageSize smallest_image(const std::filesystem::path& input);
 
-/// The dataset that `folder` is the images folder of, and that has their cameras. Empty: there is none.
+/// The path of the dataset whose images are in `folder`, and which has their cameras. Empty if there is no such dataset.
 std::filesystem::path dataset_of_images(const std::filesystem::path& folder);
 
-/// Throws InputError that says what the path is, unless is_capture holds or it has the files of a dataset. Also for a
-/// folder of images whose cameras a dataset has, which the message names.
+/// Throws InputError, which says what the path is, unless is_capture(path) is true or the path has a dataset's files. Also throws
+/// for a folder of images whose cameras are in a dataset, and names that dataset.
 void check_training_input(const std::filesystem::path& path);
 
 /// Makes a dataset of a folder of photos, a video, a folder of videos, or a zip archive. Photos are JPEG, PNG, TIFF or BMP, and
-/// HEIC or AVIF where a program converts them. Subfolders count. An archive is
-/// unpacked into unpacked/. If it holds a dataset, that becomes the folder's, and nothing is searched.
+/// HEIC or AVIF where a program converts them. Subfolders count. An archive is unpacked into unpacked/. If the archive holds a
+/// dataset, `folder` gets that dataset, and COLMAP does not run.
 /// - images: the frames of the videos, or a link to the photos' folder, or a folder with converted photos and the others beside them.
 /// - masks: those that lie among the photos, or in masks/ beside their folder.
 /// - sparse/0: COLMAP's model, made last. A lens has one radial term, or OpenCV's radial and tangential terms where many photos

@@ -35,7 +35,7 @@ enum class LensUse {
     undistort  // images are resampled to those of a pinhole
 };
 
-/// The result of load_frame_image, for a Frame with the same `downscale` and `left_out`.
+/// A cached result of load_frame_image. It applies to a Frame with the same `downscale` and `left_out`.
 struct KeptImage {
     Image image;
     int downscale = 1;
@@ -55,22 +55,22 @@ struct Frame {
     std::filesystem::path mask_path;   // empty: none
     MaskUse masks = MaskUse::cut;      // the use of the file's alpha and mask; never automatic
     std::filesystem::path depth_path;  // a depth map of the file, .exr in world units or .png; empty: none
-    double depth_unit = 0.001;         // world units of a level of a .png
+    double depth_unit = 0.001;         // world units per level of a .png depth map
     /// A further mask of `camera`'s image, of one channel and any size. Black pixels do not count and grey ones count
     /// less, whatever `masks` says. Null: none.
     std::shared_ptr<const Image> left_out;
-    /// With left_out, if `masks` cuts: the colour of pixels that are cut out. Empty: they do not count.
+    /// With left_out and MaskUse::cut: the colour of pixels that the mask cuts out. Empty: these pixels do not count.
     std::optional<std::array<float, 3>> behind;
     /// Indices in Dataset::points of the points that the reconstruction saw in this image. Null: the dataset does not say.
     std::shared_ptr<const std::vector<uint32_t>> seen;
-    /// The median reprojection error of these points. In px of the reconstruction's image, which may have another size than the
-    /// file. 0: not known.
+    /// The median reprojection error of the points in `seen`, in px of the reconstruction's image. That image may have another size
+    /// than the file. 0: not known.
     float point_error = 0;
-    Distortion distortion;  // of the file, which load_frame_image takes out; none with LensUse::native
+    Distortion distortion;  // of the file; load_frame_image removes it; none with LensUse::native
     Camera pinhole;         // `camera` before downscaling
     int downscale = 1;      // factor that is applied to the file, which may be a smaller copy already
     int split = 0;          // 1 train, 2 test; 0: split_frames decides
-    /// The frame's image, while another owner caches it. load_frame_image then needs not read the file again.
+    /// The frame's decoded image, while another owner keeps it in memory. scene::image_of then does not read the file again.
     std::weak_ptr<const KeptImage> kept;
 
     /// Whether alpha in load_frame_image's result is the weight of pixels.
@@ -89,7 +89,7 @@ struct UsedOf {
     /// The images' folder, relative to the dataset's. Empty: images/.
     std::string where = {};
     uint64_t used = 0, found = 0;
-    std::string why = {};  // the first that is not used, and why; empty: all are
+    std::string why = {};  // the first one that is not used, and the reason; empty: all are used
 };
 
 /// A dataset: cameras, image files and points. Images are not decoded.
@@ -105,7 +105,7 @@ struct Dataset {
     /// False if the dataset has "view_dependent": false. Then SH degree 0 suffices.
     bool color_depends_on_view = true;
     std::string format, program;  // of the cameras; the program may be unknown, and empty
-    /// Frames per second, if the cameras are the path of a film, which has no images. 0: they are not.
+    /// Frames per second, if the cameras are the path of a film and have no images. 0: they are no such path.
     double frame_rate = 0;
     std::vector<std::string> notes;  // contents of the cameras' file that are skipped, one line each
     std::vector<UsedOf> used;        // counts of each kind that the dataset has
@@ -120,7 +120,7 @@ struct DatasetOptions {
     MaskUse masks = MaskUse::automatic;
     LensUse lens = LensUse::automatic;
     bool need_images = true;  // false: only cameras; frames without a file are kept if the size is known
-    /// False: the points of a transforms.json are not read. They are in a file of their own.
+    /// False: skips the separate file of points that a transforms.json names.
     bool need_points = true;
     /// Images that are wider after `downscale` are reduced to this width, px. 0: none are.
     int max_width = 0;
@@ -134,27 +134,27 @@ struct DatasetOptions {
 /// - One of these files. src/io/datasets/transforms.cpp has the dialects, and src/io/datasets/importers/ the other formats.
 ///
 /// Images are searched in images/, input/ and the folder itself. Their names may differ in extension and case from those of the
-/// cameras' file, and folders in its paths may be gone.
+/// cameras' file, and folders in the paths of that file may be missing.
 ///
-/// Camera axes follow the OpenCV convention; the world frame is the file's own. With need_images, frames
-/// without a file are skipped and counted. Each other file has the model's size, or that size resized by one
-/// factor, which the intrinsics then follow. As in COLMAP, cameras belong to the pixels as stored. EXIF's
-/// orientation is applied only if it is a quarter turn and only the turned image has the model's aspect ratio.
-/// With a downscale factor K, images in images_K (beside images) are used as they are. In a folder that make_dataset has
-/// made, an image that is cut off or no image counts as missing. Throws InputError.
+/// Camera axes follow the OpenCV convention; the world frame is the file's own. With need_images, frames without a file are skipped
+/// and counted. An image file has the size that the cameras' file states, or that size times one factor, which then scales the
+/// intrinsics. As in COLMAP, cameras belong to the pixels as stored. EXIF's orientation is applied only if it is a quarter turn and
+/// only the turned image has the model's aspect ratio. With a downscale factor K, images in images_K (beside images) are used as
+/// they are. In a folder that make_dataset has made, an image that is cut off or no image counts as missing. Throws InputError.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options);
 
-/// The points that the reconstruction saw in a frame's image. They determine its camera.
+/// The points that the reconstruction saw in a frame's image. These points determine the frame's camera.
 struct CameraSupport {
     size_t points = 0;
     float error = 0;  // Frame::point_error
     struct Neighbor {
         int frame = 0;      // index into Dataset::frames
-        size_t points = 0;  // that both see
+        size_t points = 0;  // that both frames see
     };
     std::vector<Neighbor> neighbors;  // the frames that see most of the same points, the most first
 };
-/// One for each frame, with at most `most` neighbours each. Empty if the dataset does not say which frame sees which points.
+/// The CameraSupport of each frame, with at most `most` neighbours. Empty if the dataset does not say which frame sees which
+/// points.
 std::vector<CameraSupport> camera_support(const Dataset& dataset, size_t most = 3);
 /// A text such as "312 points, 0.42 px; most in common with b.jpg (120) and c.jpg (88)".
 std::string support_text(const Dataset& dataset, const CameraSupport& support);
@@ -164,11 +164,11 @@ std::string neighbors_text(const Dataset& dataset, const CameraSupport& support)
 /// Throws InputError unless `frames` are indices into dataset.frames. Functions that take both call it.
 void check(const Dataset& dataset, const std::vector<int>& frames);
 
-/// Loads the frame's image as `frame.camera` sees it: turned, reduced, undistorted and downscaled.
-/// Undistortion is bilinear and keeps the focal lengths; the size changes so that no pixel is blank
-/// (src/scene/lens.h). The result has 3 channels, or 4 if the frame has a mask or the file has alpha. The
-/// fourth is their product, which is used as frame.masks says. With frame.left_out, it is the weight of pixels.
-/// Throws InputError, also if a value of the file is not finite or left_out is not an image of one channel.
+/// Loads the frame's image as `frame.camera` sees it: turned, reduced, undistorted and downscaled. Undistortion is bilinear and
+/// keeps the focal lengths; the size changes so that no pixel is blank (src/scene/lens.h). The result has 3 channels, or 4 if the
+/// frame has a mask or the file has alpha. The fourth channel is the product of mask and alpha, which is used as frame.masks says.
+/// With frame.left_out, it is the weight of pixels. Throws InputError, also if a value of the file is not finite or left_out is not
+/// an image of one channel.
 Image load_frame_image(const Frame& frame);
 
 /// The frame's image in the form that a render is compared with.
@@ -176,12 +176,12 @@ struct TrainingImage {
     Image image;    // RGB, composited over the background if masks cut
     Image weights;  // one channel, the weight of each pixel; empty if all count
 };
-/// Throws InputError as load_frame_image does. background: RGB.
+/// Loads the frame's image for comparison with a render. background: RGB. Throws InputError as load_frame_image does.
 TrainingImage load_training_image(const Frame& frame, const std::array<float, 3>& background);
 
-/// Indices of train and test frames. A frame's own split wins. Otherwise it is a test frame if its index in
-/// the order of names is a multiple of test_every, as in INRIA's code and gsplat. test_every 0: all are train
-/// frames, also if the dataset holds all of them out.
+/// Indices of train and test frames. A frame's own split wins. Otherwise it is a test frame if its index in the order of names is a
+/// multiple of test_every, as in INRIA's code and gsplat. test_every 0: all frames without an own split are train frames; if no
+/// train frame is left, all frames are.
 struct Split {
     std::vector<int> train, test;
 };

@@ -36,13 +36,12 @@ struct DeviceOptions {
     std::string selector;
     /// Turns the Khronos validation layer on. Its messages become a RunError at the next submission.
     bool validation = false;
-    /// Takes a queue without graphics if there is one. Work and desktop then do not wait for each other.
+    /// Takes a compute queue without graphics if the device has one. Then ewa's work and the desktop's do not wait for each other.
     bool own_queue = true;
 };
 
-/// Renderers and trainers of one device share the shaders that it has compiled: the second starts faster.
-/// Throws InputError when the selector names no usable device (the text lists those there are), RunError when
-/// the driver fails.
+/// Opens a device. Renderers and trainers on one device share its compiled shaders, so the second one starts faster. Throws
+/// InputError when the selector names no usable device (the text lists those there are), RunError when the driver fails.
 std::shared_ptr<gpu::Device> open_device(const DeviceOptions& options);
 /// The entry of list_devices for an open device.
 DeviceInfo device_info(const gpu::Device& device);

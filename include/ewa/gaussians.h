@@ -15,7 +15,7 @@ constexpr int sh_coefficients(int degree) {
     return (degree + 1) * (degree + 1);
 }
 
-/// n splats. Each array has the length of its comment; check() tests that.
+/// n splats. The comment of each array gives its length, which check() tests.
 struct Gaussians {
     int sh_degree = 0;  // 0..3
     /// World units. Zero unless the scene is far from the world's origin, see set_world_means.
@@ -46,7 +46,7 @@ struct Gaussians {
 };
 
 /// Throws InputError unless sh_degree is 0 to kMaxShDegree and each array has its length. Every function of libewa that takes
-/// Gaussians calls it, and throws what it throws.
+/// Gaussians calls this check and throws its errors.
 void check(const Gaussians& gaussians);
 
 /// The highest degree with a non-zero coefficient: the degree that the scene needs, which may be below
@@ -59,7 +59,7 @@ int sh_degree_present(const Gaussians& gaussians);
 /// that are not finite. Throws InputError unless there is one position for each splat.
 void set_world_means(Gaussians& gaussians, const std::vector<glm::dvec3>& positions);
 
-/// Calls set_world_means with the scene's own positions. They move by at most float32's rounding.
+/// Calls set_world_means with the scene's own positions. Rounding to float32 may move the positions.
 void settle_origin(Gaussians& gaussians);
 
 /// Whether splat i < size can be visible: its quaternion is not zero, and its values are finite. Two exceptions are drawable: an

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// libewa on the Vulkan device of another program, and renders that stay on it. This header alone needs Vulkan's headers; the
-// program finds them itself. Handles come from the system's loader (libvulkan.so.1), which libewa is linked to; a program may
-// load that at run time. examples/interop shows all of it.
+// libewa on the Vulkan device of another program, and renders that stay on it. Only this header needs Vulkan's headers, which the
+// program must provide. Handles come from the system's loader (libvulkan.so.1), which libewa is linked to; a program may load that
+// library at run time. examples/interop is an example.
 #pragma once
 #include <vulkan/vulkan_core.h>
 
@@ -34,8 +34,8 @@ struct DeviceNeeds {
     VkPhysicalDeviceVulkan12Features vulkan12{};                   // its second
     VkPhysicalDeviceSubgroupSizeControlFeatures subgroup_sizes{};  // its third, where the device has this
 
-    /// Puts the program's structure into the chain in place of subgroup_sizes, and enables the features of that in it. Vulkan allows
-    /// only one of both in a chain. Its pNext stays. For instances and devices of Vulkan 1.3.
+    /// Puts the program's structure into the chain in place of subgroup_sizes, and enables the features of subgroup_sizes in it.
+    /// Vulkan allows only one of these two in a chain. The structure's pNext stays. Instance and device must be of Vulkan 1.3.
     void use(VkPhysicalDeviceVulkan13Features& vulkan13);
 };
 
@@ -55,9 +55,9 @@ struct VulkanDevice {
     std::function<VkResult(const VkSubmitInfo&, VkFence)> submit{};
 };
 
-/// The device for renderers, trainers and operators. They allocate memory of their own on it, and never wait for the queue or
-/// the device, only for their own submissions. Throws InputError, in one line that names each thing that is missing: handles,
-/// a version of Vulkan, features of the device, and features that are not enabled.
+/// Wraps the program's device for renderers, trainers and operators. These allocate their own memory on it. They wait for their own
+/// submissions only, never for the whole queue or device. Throws InputError, in one line that names each thing that is missing:
+/// handles, a version of Vulkan, features of the device, and features that are not enabled.
 std::shared_ptr<gpu::Device> borrow_device(const VulkanDevice& vulkan);
 
 /// A part of a caller's image on the renderer's device. The image has one sample and VK_IMAGE_USAGE_TRANSFER_DST_BIT.
@@ -104,8 +104,8 @@ struct DeviceSync {
     uint64_t signal_value = 0;
 };
 
-/// Renderer::render into targets on the renderer's device. Nothing is copied to the host. Drawing::color, ellipsoids, depth or
-/// count. The images among the targets are different mip levels or layers.
+/// Renderer::render into targets on the renderer's device. Nothing is copied to the host. options.drawing is color, ellipsoids,
+/// depth or count. The images among the targets are different mip levels or layers.
 ///
 /// Returns when the targets are written and have their layouts. Commands that are submitted to the same queue later see the
 /// values without a barrier. Another queue sees them by `signal`, or with a barrier of its own after the return. Commands that

@@ -24,7 +24,7 @@ struct Image {
     const float* at(int x, int y) const { return &pixels[(size_t(y) * width + x) * channels]; }
 };
 
-/// Throws InputError unless there are as many pixels as the sizes say. Functions that take an Image call it.
+/// Throws InputError unless there are as many pixels as the sizes say. Functions that take an Image call this check.
 void check(const Image& image);
 
 /// The contents of an image file's header. Damage to the pixels may go unnoticed: they are not decoded.
@@ -33,7 +33,7 @@ struct ImageSize {
     int orientation = 1;        // EXIF's, see oriented
     bool eight_bit = true;      // no more than 256 levels
 };
-/// Reads the header. Throws InputError for formats that load_image does not read, and for a damaged header.
+/// Reads an image file's header. Throws InputError for formats that load_image does not read, and for a damaged header.
 ImageSize read_image_size(const std::filesystem::path& path);
 
 /// The image turned by EXIF's orientation (1..8). 5 to 8 exchange width and height. Throws InputError for another one.
@@ -75,18 +75,18 @@ Image with_alpha(const Image& color, const Image& alpha);
 /// Throws InputError if the sizes differ.
 double psnr(const Image& a, const Image& b, const Image& weights = {});
 
-/// Mean SSIM over pixels and RGB (Wang et al. 2004), with an 11 x 11 Gaussian window, sigma 1.5 and zero
-/// padding. Both images are clamped to [0, 1]. Computed in float64. weights: as above; with weights w, the
-/// SSIM of w a + (1 - w) b and b, with each pixel weighted by w. Throws InputError if the sizes differ.
+/// Mean SSIM over pixels and RGB (Wang et al. 2004), with an 11 x 11 Gaussian window, sigma 1.5 and zero padding. Both images are
+/// clamped to [0, 1]. Computed in float64. weights: as for psnr; with weights w, the SSIM of w a + (1 - w) b and b, with each pixel
+/// weighted by w. Throws InputError if the sizes differ.
 double ssim(const Image& a, const Image& b, const Image& weights = {});
 
 /// The difference of two images.
 struct ImageDifference {
-    double psnr = 0, ssim = 0;  // as above: RGB, clamped to [0, 1]
+    double psnr = 0, ssim = 0;  // as psnr and ssim: RGB, clamped to [0, 1]
     // Over all values including alpha, not clamped. Equal values differ by 0, also if infinite or NaN. Other
     // pairs with a value that is not finite differ by +inf (rms_error: NaN if one is NaN).
     double max_error = 0;
-    int max_x = 0, max_y = 0, max_channel = 0;  // where it is; px from the top left corner
+    int max_x = 0, max_y = 0, max_channel = 0;  // position of max_error; px from the top left corner
     double mean_error = 0;                      // over the values that are finite in both
     double rms_error = 0;
     uint64_t over = 0;  // pixels with a difference above the tolerance

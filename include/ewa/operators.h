@@ -37,7 +37,7 @@ struct SplatArrays {
 struct ViewArrays {
     std::span<const float> view_matrices;  // [C, 4, 4], world to camera; the last row is not read
     std::span<const float> intrinsics;     // [C, 3, 3]: fx 0 cx, 0 fy cy, 0 0 1 (px)
-    // [C]; empty: pinholes. Brown, a fisheye of k1 to k4, or orthographic. Depths are view z through each of them.
+    // [C]: brown, a fisheye of k1 to k4, or orthographic; empty: pinholes. Depths are view z for every lens.
     std::span<const Distortion> lenses{};
     size_t size() const { return view_matrices.size() / 16; }
 };
@@ -50,7 +50,7 @@ struct ProjectionOptions {
     float radius_clip = 0;            // a splat with both radii at or below it is not visible (px)
     bool compensations =
         false;  // sqrt(det of the 2D covariance without low_pass / with it), Mip-Splatting's factor
-    // Whiteners in place of conics. They keep their digits where a conic has lost them: a needle 1,000 px long and 1 px
+    // Whiteners in place of conics. A whitener stays accurate in float32 where a conic does not: a needle 1,000 px long and 1 px
     // wide has a conic whose determinant is a millionth of its products.
     bool whiteners = false;
 };
@@ -178,12 +178,12 @@ class Operators {
     /// The projection of Gaussians by its first-order Taylor expansion (Zwicker et al. 2001, eq. 22 to 31).
     ProjectedSplats project(const SplatArrays& splats, const ViewArrays& views,
                             const ProjectionOptions& options);
-    /// radii: those of project for the same arguments.
+    /// The gradient of project. radii: the ones that project has returned for the same arguments.
     SplatGradient project_backward(const SplatArrays& splats, const ViewArrays& views,
                                    const ProjectionOptions& options, std::span<const int32_t> radii,
                                    const ProjectedGradient& gradient, bool view_gradients);
 
-    /// The colours, [C, N, D].
+    /// Evaluates the spherical harmonics. Returns the colours, [C, N, D].
     std::vector<float> spherical_harmonics(const HarmonicsArrays& harmonics);
     /// colors_gradient: [C, N, D].
     HarmonicsGradient spherical_harmonics_backward(const HarmonicsArrays& harmonics,

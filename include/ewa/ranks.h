@@ -10,16 +10,16 @@
 
 namespace ewa {
 
-/// A group of processes. gather and exchange are collective: every rank calls them in the same order. Both throw RunError if a rank does
-/// not answer within the time that the group was opened with. All that crosses a rank is copied or is an integer,
-/// so results do not depend on the order of arrival.
+/// A group of processes. gather and exchange are collective: every rank calls them in the same order. Both throw RunError if a rank
+/// does not answer within the time that the group was opened with. Ranks exchange copies and integers, but no sums of floats, so
+/// results do not depend on the order of arrival.
 class Ranks {
   public:
     virtual ~Ranks() = default;
 
     virtual int rank() const = 0;  // of this process, from 0
     virtual int size() const = 0;  // at least 1
-    /// For messages: "rank 3 (node7)".
+    /// The name of a rank in messages: "rank 3 (node7)".
     virtual std::string name(int rank) const = 0;
 
     /// The values of all ranks, those of rank 0 first. Every rank gives the same number of values.
@@ -32,7 +32,7 @@ class Ranks {
     [[noreturn]] virtual void end_all(int status) = 0;
 };
 
-/// A process that runs alone.
+/// The group of a process that trains alone: rank 0 of 1.
 std::shared_ptr<Ranks> alone();
 
 }  // namespace ewa

@@ -13,10 +13,10 @@ enum class Footprint { peak = 0, antialias = 1, density = 2 };
 
 /// How the splats along a ray become one colour.
 enum class Integrator {
-    splat,    // footprints on the image, in the order of the splats' centres
-    ray,      // each splat's integral along the ray, in the order of its middle on the ray
+    splat,    // 2D footprints on the image, in the depth order of the splats' means
+    ray,      // each splat's integral along the ray, in the order of the integrals' middles on the ray
     march,    // the volume of all splats, in intervals along the ray
-    fast_ray  // each splat's integral along the ray, in the order of the splats' centres
+    fast_ray  // each splat's integral along the ray, in the depth order of the splats' means
 };
 
 inline constexpr int kMostSamples = 4096, kMostNearest = 1000;
@@ -34,14 +34,14 @@ struct RenderOptions {
 };
 
 /// Throws InputError for a negative SH degree, for samples or spheres outside 1 to kMostSamples and kMostNearest, and what
-/// check of the sky throws. Functions that take RenderOptions call it.
+/// check(SkyMap) throws. Functions that take RenderOptions call this check.
 void check(const RenderOptions& options);
 
 /// The planes of a render.
 enum class Drawing {
     color,
-    depth,  // Rendering::depth also
-    count,  // Rendering::count also
+    depth,  // the colour, and Rendering::depth
+    count,  // the colour, and Rendering::count
     /// Each splat as a solid ellipsoid of ELLIPSOID_REACH standard deviations. The nearest one gives the pixel its shaded colour.
     ellipsoids,
     /// Rendering::median_depth in place of the colour. For Integrator::splat without `points`.

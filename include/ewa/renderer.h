@@ -49,11 +49,11 @@ class Renderer {
     Rendering render(const Camera& camera, bool with_depth = false);
     Rendering render(const Camera& camera, Drawing drawing);
 
-    /// Renders with other options than the renderer's. SH degrees above those it was made for stay off.
+    /// Renders with other options than the renderer's. SH degrees above that of the renderer's own options are not evaluated.
     Rendering render(const Camera& camera, const DrawOptions& options);
 
     /// The colour alone, as 8-bit RGBA, rounded and clamped as save_image does it. This is for windows: the floating-point planes
-    /// stay on the device. Drawing::color or ellipsoids. The reference is valid until the next render.
+    /// stay on the device. options.drawing is color or ellipsoids. The returned reference is valid until the next render.
     const std::vector<uint8_t>& render_bytes(const Camera& camera, const DrawOptions& options);
 
     /// Replaces the scene. Compiled kernels are used again. Throws as the constructor does; after a RunError the renderer has no
@@ -79,16 +79,17 @@ struct LossGradient {
     double l2 = 0, ssim = 0, alpha = 0, depth = 0;  // 0 if their weight is 0
     LossWeights weights;                            // that apply to this view: that of alpha is not automatic
     Gaussians gradient;                             // dL/d(stored value) in place of each stored value
-    /// dL/d(each value of the camera's motion), for no motion. Zero with `points`, ray and march. By log_focal, the bounds of the
-    /// Jacobian's tangents move with a pinhole, and stay with another lens; it is zero where the camera moves during its readout.
+    /// dL/d(each value of the camera's motion) at zero motion. Zero with RenderOptions::points, Integrator::ray and march. The
+    /// derivative by log_focal is zero if the camera moves during its readout. For a pinhole, it counts that the bounds of the
+    /// Jacobian's tangents change with the focal length.
     CameraMotion camera;
     uint32_t skipped_nonfinite = 0;
 };
 
-/// The training loss of one view and its gradient. target: RGB, or RGBA that is composited over the
-/// background or, with alpha_is_weight, in which alpha says how much a pixel counts; of the camera's size. depths: its
-/// depth map of one channel, for that term of the loss; 0 where it has no depth. Empty: none. Throws InputError for arrays and
-/// images of other lengths.
+/// The training loss of one view and its gradient. target: RGB, or RGBA that is composited over the background or, with
+/// alpha_is_weight, in which alpha says how much a pixel counts; of the camera's size. depths: the view's depth map of one channel,
+/// for the depth term of the loss; 0 where a depth is unknown. Empty: no depth map. Throws InputError for arrays and images of
+/// other lengths.
 LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
                            const Camera& camera, const Image& target, const RenderOptions& options,
                            bool alpha_is_weight = false, const LossWeights& weights = {},

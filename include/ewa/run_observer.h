@@ -20,8 +20,8 @@ struct RunStart {
     std::string name;  // run_name
     size_t train_views = 0, test_views = 0;
     int width = 0, height = 0;         // of the first training image, px
-    size_t splats = 0;                 // to start from
-    TrainOptions train;                // with concrete values, but for max_splats
+    size_t splats = 0;                 // the initial ones
+    TrainOptions train;                // automatic values are resolved, except max_splats
     uint32_t max_splats = 0;           // of the run
     size_t evaluated = 0;              // views that are rendered at the end
     std::vector<std::string> remarks;  // one line each, e.g. "3 images are missing and are skipped"

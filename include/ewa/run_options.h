@@ -17,7 +17,7 @@ namespace ewa {
 
 /// Whether further first splats are put between neighbouring points.
 enum class DenseStart {
-    automatic,  // in short runs of adc
+    automatic,  // on in short runs of Strategy::adc, else off
     on,
     off
 };
@@ -34,7 +34,7 @@ struct RunOptions {
     /// First splats: "sfm" (the dataset's points), "stereo" (points on whose depth the images agree), "random", or a file of
     /// splats or points.
     std::string init = "sfm";
-    /// A relative file of `init` is relative to this folder. Empty: to the current one.
+    /// A relative file of `init` is relative to this folder. Empty: the current folder.
     std::filesystem::path init_folder;
     DenseStart dense_start = DenseStart::automatic;  // of first splats that come from points
     double init_opacity = 0.1;   // of first splats that come from points or at random; above 0, below 1
@@ -45,7 +45,8 @@ struct RunOptions {
     int max_width = 0;           // px; images that are wider after `downscale` are reduced to it; 0: none are
     MaskUse masks = MaskUse::automatic;
     LensUse lens = LensUse::automatic;
-    /// With TrainOptions::refine_poses: frames without a readout get one from this side. Training learns their cameras' motion, from rest.
+    /// With TrainOptions::refine_poses: the side at which the readout begins, for frames whose readout is not known. Training
+    /// learns how their cameras move during it, and starts with no motion.
     std::optional<ReadoutFrom> rolling_shutter;
     /// Training images without transparency get a background of their mean colour, with TrainOptions::background_noise of 0.4
     /// (docs/training_options.md#background). Only if RenderOptions::background is black, and not with a sky, a random background,
@@ -58,7 +59,7 @@ struct RunOptions {
     std::string metrics;        // a list for metrics_named: evaluations measure these beside PSNR and SSIM
     bool tensorboard = false;   // also writes the figures of metrics.jsonl as TensorBoard's events
     int save_every = 0;  // saves splats and checkpoint every N steps; 0: the checkpoint every 30 s or more
-    int keep = 0;        // of the splats of save_every, the last N stay as splats_007000.ply and the like
+    int keep = 0;        // the last N splats that save_every saved stay as splats_007000.ply and so on
     bool inria = false;  // also writes the folder inria/, for viewers of INRIA's runs
     // A folder with the result or the checkpoint of a run is refused, unless one of these is set.
     bool resume = false;  // continues from the folder's checkpoint, if there is one
@@ -67,7 +68,7 @@ struct RunOptions {
     /// The processes that train together. Rank 0 writes the run's files and calls the observer. The others return an empty
     /// result when it ends.
     std::shared_ptr<Ranks> ranks = alone();
-    int rank_timeout = 300;     // s; of several ranks, one that does not answer for so long ends the run
+    int rank_timeout = 300;     // s; the run ends if one of several ranks does not answer for so long
     std::string command;        // how the run was started, for the report; may be empty
     double seconds_before = 0;  // wall time spent before the run, counted in Summary::wall_seconds
 };

@@ -17,7 +17,7 @@ struct SkyMap {
     bool operator==(const SkyMap&) const = default;
 };
 
-/// Throws InputError unless the size is in its range and there are texels for it. Functions that take a SkyMap call it.
+/// Throws InputError unless the size is in its range and there are texels for it. Functions that take a SkyMap call this check.
 void check(const SkyMap& sky);
 
 /// Reads sky.json of a run's folder. Throws InputError if the file cannot be read, or values are missing or not finite.

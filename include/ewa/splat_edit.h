@@ -22,7 +22,8 @@ void transform_splats(Gaussians& gaussians, const glm::dmat4& matrix);
 /// Replaces the scene by the splats of `indices`, in that order. Each index is < size and may be repeated. Throws InputError.
 void select_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices);
 
-/// Does the same in place, without memory for a copy. The indices ascend without repetition. Throws InputError.
+/// Removes all splats but those of `indices`, in place, without memory for a copy. The indices ascend without repetition. Throws
+/// InputError.
 void keep_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices);
 
 /// Sets the SH degree (0..3). Higher coefficients are cut, new ones are zero. Throws InputError for another degree.

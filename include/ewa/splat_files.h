@@ -10,7 +10,7 @@
 
 namespace ewa {
 
-/// The name in messages, e.g. "SPZ".
+/// The format's name in messages, e.g. "SPZ".
 std::string_view name_of(SplatFormat format);
 
 /// Programs that open the format, for people: "SuperSplat, Spark".
@@ -43,15 +43,16 @@ std::vector<size_t> level_counts(const std::filesystem::path& path);
 /// Reads the splats alone. Skipped contents are warnings for the log handler (ewa/log.h). Throws as read_splats does.
 Gaussians load_splats(const std::filesystem::path& path);
 
-/// Writes the format of the extension to a temporary file and renames it. So the path never holds half a
-/// file. All formats but .ply skip the splats that are not drawable. Returns one line for each thing that the
-/// format cannot store: what is dropped, and the number of bits of quantised values. Throws RunError (disk).
-/// Throws InputError for an unknown extension, arrays of a wrong length, or values out of the format's range. The values of a
-/// .gltf or a meta.json go to files beside it whose names are free; those that the replaced file named are removed.
+/// Writes the format of the extension to a temporary file and renames it. So the path never holds half a file. All formats but .ply
+/// skip the splats that are not drawable. Returns one line for each thing that the format cannot store: what is dropped, and the
+/// number of bits of quantised values. Throws RunError (disk). Throws InputError for an unknown extension, arrays of a wrong
+/// length, or values out of the format's range. The values of a .gltf or a meta.json go to new files beside it; the files that a
+/// replaced .gltf or meta.json named are removed.
 std::vector<std::string> save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                      const SaveOptions& options);
 
-/// The same for a scene that the caller gives up. Then a lod-meta.json, a tileset.json and an .html need no memory for a copy.
+/// The same for a scene that the caller moves into the call. Then a lod-meta.json, a tileset.json and an .html need no memory for a
+/// copy.
 std::vector<std::string> save_splats(const std::filesystem::path& path, Gaussians&& gaussians,
                                      const SaveOptions& options);
 

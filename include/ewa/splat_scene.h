@@ -49,9 +49,9 @@ struct Dataset;
 
 /// The contents of a page besides the scene.
 struct PageOptions {
-    std::string title = {};            // empty: the name of the file
-    bool unbundled = false;            // the scene is beside it, in NAME-levels/lod-meta.json
-    const Dataset* cameras = nullptr;  // its views, in the order of their names; null: none
+    std::string title = {};  // empty: the name of the file
+    bool unbundled = false;  // the scene is not in the page but beside it, in NAME-levels/lod-meta.json
+    const Dataset* cameras = nullptr;  // the page offers these views, by name; null: none
     std::array<float, 3> background{};
 };
 

@@ -19,16 +19,16 @@ struct StepReport {
     uint64_t dropped_updates = 0;    // parameter updates so far that were not finite and were dropped
     uint32_t skipped_nonfinite = 0;  // splats skipped in the last step: a value is not finite
     uint64_t limited_steps = 0;      // updates of a mean, quaternion or scale so far that were shortened
-    /// dB, of the image that `loss` is of. In a masked image, pixels count by the square of their weight. NaN if no
-    /// pixel counts.
+    /// PSNR of the training image that `loss` belongs to, in dB. In a masked image, pixels count by the square of their weight. NaN
+    /// if no pixel counts.
     double psnr = 0;
 };
 
-/// Where the time of the steps since the trainer was made or restored went: means, in ms a step.
+/// Mean times of a step in ms, over the steps since the trainer was made or restored.
 struct StepTimes {
     int steps = 0;
     double step = 0;               // wall time in Trainer::step
-    double refinement = 0;         // of it: adding, moving and removing splats
+    double refinement = 0;         // part of `step`: adding, moving and removing splats
     std::vector<PassTime> passes;  // on the device, in recording order. On a GPU they are of every 100th step
 };
 
@@ -42,7 +42,7 @@ struct TrainerArray {
 struct TrainerState {
     StepReport report;
     int sh_degree = 0;  // of the stored coefficients
-    /// params, moments1, with 32 bits a moment also moments2, and what the strategy gathers, in the device's layout
+    /// params, moments1, with 32 bits a moment also moments2, and the strategy's statistics, in the device's layout
     /// (shaders/shared/layouts.h).
     std::vector<TrainerArray> arrays;
 };

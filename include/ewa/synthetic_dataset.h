@@ -19,8 +19,9 @@ namespace ewa {
 /// A rolling shutter of all cameras. A camera's pose without it is that of the middle of its readout.
 struct RollingShutter {
     ReadoutFrom from = ReadoutFrom::top;
-    double degrees = 0;  // the turn of a camera during the readout, about an axis of its own; at most 90
-    /// Length of its motion during the readout, in a direction of its own: 0 to 100 % of its distance to the scene's middle.
+    double degrees = 0;  // the turn of a camera during the readout, about an axis of its own; at most 90.
+    /// How far a camera's centre moves during the readout, in a direction of its own: 0 to 100 % of its distance to the scene's
+    /// middle.
     double percent = 0;
 };
 
@@ -33,8 +34,8 @@ struct SyntheticOptions {
     int samples = 32;               // paths per pixel, 1..65536; powers of two are distributed best
     int points = 40000;             // on visible surfaces, for the initial splats; 0: none
     uint64_t seed = 0;
-    /// Stops: a factor of 2^exposure between radiance and the image, where 1 is white. Empty: 95 of 100
-    /// surface pixels stay below 0.8, in tenths of a stop.
+    /// Stops: a factor of 2^exposure between radiance and the image, where 1 is white. Empty: the highest exposure, in tenths of a
+    /// stop, at which 95 of 100 surface pixels stay below 0.8.
     std::optional<double> exposure;
     /// ppisp: each image has an exposure and colours of its own, and all share a vignette and a response. Their means over
     /// all images change nothing. none: images are as develop makes them.

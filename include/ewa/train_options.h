@@ -27,7 +27,7 @@ Strategy strategy_for(int steps);
 inline constexpr int kAutomaticShDegree = -1;
 
 /// `TrainOptions::halvings`: 1 in short runs of adc with many training images, for their first hundred steps, else 0
-/// (docs/training_options.md#resolution). It also replaces a resolution_every that has its default.
+/// (docs/training_options.md#resolution). This automatic choice also replaces a resolution_every that has its default.
 inline constexpr int kAutomaticHalvings = -1;
 
 /// TrainOptions::max_splats: splat_cap() of ewa/training_needs.h chooses it.
@@ -36,7 +36,7 @@ inline constexpr uint32_t kAutomaticMaxSplats = 0;
 /// Options of a Trainer. Learning rates are those of Adam. Lengths are in world units. "Scene extent" is
 /// scene_extent() of ewa/dataset.h, or the median distance of the start's splats if all cameras coincide.
 struct TrainOptions {
-    int steps = 30000;  // views: an optimisation step takes `batch` of them
+    int steps = 30000;  // number of views to train on; an optimisation step takes `batch` of them
     /// Views of an optimisation step, at least 1. Their gradients are averaged. Rates and Adam's decays follow the square root rule of
     /// Grendel (Zhao et al. 2024, section 3.3): rates times sqrt(batch), decays to the power of batch.
     int batch = 1;
@@ -111,7 +111,7 @@ struct TrainOptions {
     double grow_gradient = 2e-4;  // mean norm of dL/d(mean in normalised device coordinates)
     /// Uses the sum of the pixels' absolute gradients, which do not cancel (AbsGS), and their own threshold.
     bool absolute_gradients = false;
-    double grow_gradient_absolute = 8e-4;  // gsplat's
+    double grow_gradient_absolute = 8e-4;  // threshold with absolute_gradients, as in gsplat
     double split_scale = 0.01;             // larger splats are split, others cloned; share of scene extent
     double prune_opacity = 0.005;
     double prune_scale = 0.1;  // share of scene extent; used after the first opacity reset

@@ -74,7 +74,7 @@ class Trainer {
     int steps_done() const;
     StepReport report() const;                         // of the last step, once the device has finished it
     std::vector<Exposure> exposures() const;           // one for each training frame; empty if not learned
-    std::vector<Appearance> appearances() const;       // the same of every model
+    std::vector<Appearance> appearances() const;       // learned, of any model; one for each training frame
     std::vector<CameraMotion> camera_motions() const;  // one for each training frame; empty if not learned
     std::shared_ptr<const SkyMap> sky() const;         // null if not learned
     size_t images_on_disk() const;                     // training images that are not cached

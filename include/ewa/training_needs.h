@@ -13,9 +13,9 @@
 
 namespace ewa {
 
-/// The options with concrete values for Strategy::automatic, kAutomaticShDegree, kAutomaticHalvings and
-/// AppearanceModel::automatic. The last one reads up to 64 images of the training frames. Throws InputError: an image that cannot be
-/// read, frames that the dataset lacks.
+/// The options with concrete values for Strategy::automatic, kAutomaticShDegree, kAutomaticHalvings and AppearanceModel::automatic.
+/// The choice of the appearance model reads up to 64 training images. Throws InputError: an image that cannot be read, frames that
+/// the dataset lacks.
 TrainOptions resolve(TrainOptions options, const Dataset& dataset, const std::vector<int>& train_frames);
 
 /// The largest number of splats of a training, and why it is that.
@@ -24,8 +24,8 @@ struct SplatCap {
     std::string reason;  // e.g. "100 more for each step"
 };
 
-/// TrainOptions::max_splats of a Trainer with the same arguments. docs/training_options.md has the rule of the automatic one. Throws
-/// InputError as that does; so do the next two functions.
+/// The largest number of splats of a Trainer with the same arguments. docs/training_options.md has the rule of kAutomaticMaxSplats.
+/// Throws InputError as Trainer does.
 SplatCap splat_cap(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& train_frames,
                    const Gaussians& start, const TrainOptions& options);
 
@@ -38,7 +38,7 @@ struct MemoryEstimate {
     uint64_t total() const { return model + frame + images; }
 };
 
-/// Estimates the memory of a Trainer with the same arguments. Allocates nothing.
+/// Estimates the memory of a Trainer with the same arguments. Allocates no device memory. Throws InputError as Trainer does.
 MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset,
                                const std::vector<int>& train_frames, const Gaussians& start,
                                const TrainOptions& options);
