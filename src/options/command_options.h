@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The options of a command's parser, from the rows of the table.
+// Adds options to the CLI11 parser of a command, from the rows of the options' table (option.h).
 #pragma once
 #include <CLI/CLI.hpp>
 
@@ -25,14 +25,15 @@ struct NumberOf<std::optional<T>> {
     using type = T;
 };
 
-/// The row of an option of this command, which must exist.
+/// The row of the options' table for an option of this command. The row must exist.
 const Option& option_of(const CLI::App& command, std::string_view name);
-/// The names on the command line, such as --output,-o.
+/// The option's names on the command line, such as --output,-o.
 std::string spelled(const Option& option);
-/// Gives an option that is new in a parser what its row says. number: its variable is one.
+/// Sets type, choices, default and heading of an option that was just added to a parser, from its row. number: the option sets a
+/// number.
 CLI::Option* as_in_row(CLI::Option* added, const Option& option, bool number = false);
 
-/// Adds the command's option of this name, which sets the variable: a bool of a flag, a number, a text, or a list of them.
+/// Adds the command's option of this name. Parsing sets the variable: a bool for a flag, a number, a text, or a list of these.
 template <class T>
 CLI::Option* add(CLI::App& command, std::string_view name, T& variable) {
     const Option& option = option_of(command, name);
@@ -51,25 +52,25 @@ CLI::Option* add(CLI::App& command, std::string_view name, T& variable) {
         return as_in_row(added, option, std::is_arithmetic_v<Number>);
     }
 }
-/// Adds an option of a training run, which sets its member.
+/// Adds an option of a training run. Parsing sets the option's member of `variable`.
 CLI::Option* add(CLI::App& command, std::string_view name, RunOptions& variable);
-/// Adds an option without a variable. The command reads its values from the result after the parsing.
+/// Adds an option without a variable. The command reads the option's values from the parser after parsing.
 CLI::Option* add(CLI::App& command, std::string_view name);
 
-/// Puts the options of the help under their subjects. A command with few has one heading. Where rows are in the short help of the
-/// command, --help shows these alone, and --help-all shows all. Call it when all options of the command are there.
+/// Groups the options in the help under their subjects. A command with few options has one heading. If the command has a short
+/// help, --help shows only the options in it, and --help-all shows all. Call this after all options are added.
 void arrange_help(CLI::App& command);
 
-/// The options as they are typed, with their dashes.
+/// The names of the command's options as users type them, with their dashes.
 std::vector<std::string> option_names(const CLI::App& command);
 
-/// The files that the command line names for options with these roles.
+/// Files that the command line names: written by Role::output, read by Role::input.
 struct TypedFiles {
     std::vector<core::NamedFile> written, read;
 };
 TypedFiles typed_files(const CLI::App& command);
 
-/// Throws InputError for options that exclude each other or need another one, by what was typed: rules.h has these.
+/// Throws InputError if typed options exclude each other, or lack an option that they need. rules.h has the rules.
 void check_typed(const CLI::App& command);
 
 }  // namespace ewa::options

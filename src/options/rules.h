@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which typed options go together. Libraries check other pairs, of which Python needs to know: src/train/exclusions.h and others.
+// Which typed options go together. Rules that also apply in Python are in libraries, such as src/train/exclusions.h.
 #pragma once
 #include <span>
 
@@ -7,7 +7,7 @@
 
 namespace ewa::options {
 
-/// Each of the options excludes, or needs, each of the others. One of these is a name, or name=value|value.
+/// Each option of `options` excludes, or needs, each option of `others`. Both are lists of names, or of name=value|value.
 struct Rule {
     const char* commands;
     const char* options;
