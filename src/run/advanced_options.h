@@ -7,7 +7,7 @@
 
 namespace ewa::train {
 
-/// docs/training_options.md lists them.
+/// The rows of the advanced options, which docs/training_options.md lists.
 std::vector<RunOption> advanced_options();
 
 }  // namespace ewa::train

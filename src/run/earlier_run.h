@@ -7,12 +7,11 @@
 
 namespace ewa::train {
 
-/// Throws InputError if the folder has the result or the checkpoint of a run which the new one would replace. The
-/// message says which run that is, and which options help. A folder that does not exist is free.
-/// With options.resume, only a result without a checkpoint is refused. The splats of a run that was killed before its
-/// first checkpoint count as free. With options.force, no run is refused.
-/// Also throws InputError if the folder is a dataset, a folder of images, or has files that are of no run but have the names of a
-/// run's files.
+/// Throws InputError if the new run would replace the result or the checkpoint of an earlier run in the folder. The message
+/// describes that run, and names the options to continue it, to replace it, or to use another folder. A folder that does not exist
+/// passes. With options.resume, the only refused folder is one with a result but no checkpoint. Splats without a result pass if a
+/// run was killed before its first checkpoint. With options.force, no earlier run is refused. Also throws InputError if the folder
+/// is a dataset or a folder of images, or if it has no run but files with the names of a run's files.
 void check_free(const std::filesystem::path& path, const RunOptions& options);
 
 }  // namespace ewa::train

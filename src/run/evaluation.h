@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The renders behind an evaluation.
+// Renders views of a scene for an evaluation, and compares them with the dataset's images.
 #pragma once
 #include <functional>
 #include <memory>
@@ -14,12 +14,12 @@ namespace ewa::train {
 
 /// Renders the views of a scene.
 struct ViewRenderer {
-    size_t at_once = 1;  // cameras of a call that draws fastest
-    /// The images through the cameras, in their order.
+    size_t at_once = 1;  // number of cameras with which one call of `images` is fastest
+    /// Renders one image through each camera, in the order of the cameras.
     std::function<std::vector<Image>(std::span<const Camera>)> images;
 };
 
-/// By a renderer of these splats.
+/// A ViewRenderer that draws these splats with a Renderer.
 ViewRenderer view_renderer_of(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
                               const RenderOptions& options);
 
@@ -28,23 +28,23 @@ struct RenderedView {
     Image photo, weights, rendering;  // weights: see psnr
 };
 
-/// Pairs a render with the frame's image. rendering: through the frame's camera. appearance: applied to it; null: none. Throws InputError (an image that cannot be
-/// read or changed its size).
+/// Pairs a render with the frame's image. rendering: the render through the frame's camera. appearance: applied to the render;
+/// null: none. Throws InputError (an image that cannot be read or changed its size).
 RenderedView with_photo(Image rendering, const Frame& frame, const RenderOptions& options,
                         const Appearance* appearance);
 
-/// The appearances of views that training has not seen. learned: of the frames `train` of the dataset.
+/// The appearances of views that training has not seen. learned: the appearances of the dataset's frames `train`.
 NewViewAppearance new_view_appearance(const std::vector<Appearance>& learned, const Dataset& dataset,
                                       const std::vector<int>& train);
-/// The appearances of frames that training has not seen, for evaluate_views.
+/// The appearances of these frames, which training has not seen, for evaluate_views.
 std::vector<Appearance> for_new_views(const NewViewAppearance& appearance, const Dataset& dataset,
                                       const std::vector<int>& frames);
 
 /// The metrics that the options of a run ask for. Throws InputError (an unknown metric).
 Measures measures_of(const RunOptions& options);
 
-/// As ewa::evaluate. on_view: called after each view that counts, with its place in `frames`. The next view is drawn before.
-/// psnr_alone: without SSIM and the figures of the meter.
+/// Evaluates as ewa::evaluate does. on_view: called with the place in `frames` after each view that counts; the next view is drawn
+/// by then. psnr_alone: without SSIM and the figures of the meter.
 Evaluation evaluate_views(const ViewRenderer& renderer, const Dataset& dataset,
                           const std::vector<int>& frames, const RenderOptions& options,
                           const std::vector<Appearance>& appearances,

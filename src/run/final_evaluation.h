@@ -20,10 +20,10 @@
 
 namespace ewa::train {
 
-/// The views that the evaluation draws.
+/// The number of views that the evaluation renders.
 size_t evaluated_views(const Split& split);
 
-/// The files of the renders that it saves, by frame.
+/// The files of the renders that the evaluation saves, by index of the frame.
 std::map<int, std::filesystem::path> saved_renders(const RunInput& input);
 
 /// The trained scene of a run, and how to draw it.
@@ -35,11 +35,11 @@ struct TrainedScene {
     ViewRenderer renderer;
 };
 
-/// Evaluates a scene and fills the report with it. Each part returns whether it was done: RunObserver::should_stop ends it
-/// early.
+/// Evaluates a scene and adds figures and views to the report. evaluate and add_full_size return false if RunObserver::should_stop
+/// has ended them early.
 class FinalEvaluation {
   public:
-    /// What is passed must outlive this. keep_waiting: called before each frame.
+    /// The references must outlive this object. keep_waiting: called before each frame.
     FinalEvaluation(RunObserver& observer, const RunInput& input, const Measures& measures,
                     const TrainedScene& scene, std::function<void()> keep_waiting, report::ReportData& report)
         : observer_(observer),
@@ -50,13 +50,13 @@ class FinalEvaluation {
           report_(report),
           saved_(saved_renders(input)) {}
 
-    /// The figures and the small views. cameras: refined ones are in use. They are saved again in `folder` after an
-    /// alignment of the test cameras.
+    /// Computes the figures and adds small views to the report. cameras: the refined cameras are in use. If this aligns the test
+    /// cameras, it saves the cameras in `folder` again.
     bool evaluate(RunCameras& cameras, const RunWriter& folder);
-    /// The images at full size, as many as the report may hold.
+    /// Adds images at full size to the report, as many as the report may hold.
     bool add_full_size();
 
-    /// The figures of the test views, once they are evaluated.
+    /// The figures of the test views. Empty before evaluate.
     const std::optional<Evaluation>& of_test_views() const { return of_test_views_; }
     /// The first of the report's images; empty if there is none.
     const std::filesystem::path& first_render() const { return first_render_; }
@@ -64,13 +64,13 @@ class FinalEvaluation {
   private:
     bool done_unless_stopped(const std::function<void()>& work) const;
     void evaluate_test_views();
-    /// Adds a remark on held-out views whose cameras may be wrong. train_psnr: of the training views.
+    /// Adds a remark on test views whose cameras may be wrong. train_psnr: PSNR of the training views, dB.
     void check_test_cameras(double train_psnr);
-    /// Whether the cameras of views can be moved to where the splats fit their images best.
+    /// Whether align_cameras can move cameras to where the splats fit the images best.
     bool can_align() const;
-    /// Those that do so; none where they cannot be moved. extent: of the scene.
+    /// The motions that align_cameras finds for these frames, or zero motions if it cannot run. extent: of the scene, world units.
     std::vector<CameraMotion> motions_of(const std::vector<int>& frames, double extent) const;
-    /// The image of a frame through a camera, and the render.
+    /// The frame's image, and the render of the scene through this camera.
     RenderedView rendered_through(const Camera& camera, int index);
     Evaluation evaluated(const std::vector<int>& frames, const std::vector<Appearance>& appearances,
                          bool shown, const Measures& measures);
@@ -91,8 +91,8 @@ class FinalEvaluation {
     std::optional<Evaluation> of_test_views_;
     std::filesystem::path first_render_;
     std::optional<NewViewAppearance> of_new_views_;
-    std::map<int, RenderedView> kept_;       // for their full size
-    uint64_t kept_values_ = 0;               // of their images
+    std::map<int, RenderedView> kept_;       // views that the report gets at full size
+    uint64_t kept_values_ = 0;               // floats in the images of kept_
     std::vector<std::future<void>> saving_;  // renders
 };
 

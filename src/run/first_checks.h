@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Problems that make a training useless, or stop it at its end. They are found before its first step, and by ewa info.
+// Problems that make a training useless, or stop it at its end. A run and `ewa info` find them before the first step.
 #pragma once
 #include <functional>
 #include <glm/vec3.hpp>
@@ -12,24 +12,24 @@ namespace ewa::train {
 
 struct Finding {
     std::string text;    // one line
-    bool fatal = false;  // the training could not come to its end
+    bool fatal = false;  // the training would fail before its end
 };
 
-/// Why no image is left to train on, and what leaves some. Empty if there are any.
+/// A text on why no training image is left, and how to keep some. Empty if there are training images.
 std::string nothing_to_train_on(const Dataset& dataset, const Split& split);
 
-/// Damaged images, and masks that leave no pixel. decode: reads every held-out image, as the evaluation does; else only those
-/// whose file does not end as an image.
+/// Finds damaged images, and masks that leave no pixel. decode: decodes every held-out image, as the evaluation does. Without it,
+/// only files that do not end as an image are decoded.
 std::vector<Finding> check_images(const Dataset& dataset, const Split& split, bool decode);
 
-/// Where the first splats are.
+/// The positions of the first splats.
 struct FirstPlaces {
     size_t count = 0;
     std::function<glm::dvec3(size_t)> at;  // world
-    std::string file = {};                 // that --init names; empty: the dataset's points
+    std::string file = {};  // the file that --init names; empty: the positions are the dataset's points
 };
 
-/// First splats that are too few, or that no camera of the frames sees.
+/// Findings on the first splats: they are too few, or no camera of the frames sees them.
 std::vector<Finding> check_start(const Dataset& dataset, const std::vector<int>& frames,
                                  const FirstPlaces& places);
 

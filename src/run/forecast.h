@@ -12,7 +12,7 @@ namespace ewa::train {
 
 /// Properties of a training that decide its time, besides the device.
 struct ForecastScene {
-    double pixels = 0;        // of a training image
+    double pixels = 0;        // mean number of pixels of a training image
     size_t photos = 0;        // to train on
     uint32_t splats = 0;      // to start from
     size_t evaluated = 0;     // views that are rendered at the end
@@ -27,7 +27,7 @@ class Forecast {
     /// options: with concrete strategy and SH degree.
     Forecast(const ForecastScene& scene, const TrainOptions& options);
 
-    /// After a step. step: steps done. seconds: in steps so far.
+    /// Adds the time of a step. step: number of steps done. seconds: total time of the steps so far. splats: number after the step.
     void add(int step, double seconds, uint32_t splats);
     /// Whether enough steps are timed.
     bool known() const;
@@ -49,10 +49,10 @@ class Forecast {
     int first_ = -1, step_ = 0;
     double seconds_ = 0;
     uint32_t splats_ = 0;
-    double timed_ = 0, timed_cost_ = 0;  // of recent steps, older ones count less
+    double timed_ = 0, timed_cost_ = 0;  // seconds and cost of the steps, weighted to recent ones
     int steps_timed_ = 0;
     double seconds_timed_ = 0;
-    bool refined_ = false;       // adc, after the last step
+    bool refined_ = false;       // adc has refined after the last step
     double added_now_ = 0;       // splats since the refinement before
     std::vector<double> added_;  // by the last refinements of adc
 };

@@ -8,8 +8,8 @@
 
 namespace ewa::train {
 
-/// Writes into folder/inria: cfg_args, cameras.json, input.ply and point_cloud/iteration_<step>/point_cloud.ply.
-/// The dataset's frames have the cameras that belong to the splats. Throws RunError.
+/// Writes into folder/inria: cfg_args, cameras.json, input.ply and point_cloud/iteration_<step>/point_cloud.ply. input: its frames
+/// have the cameras that belong to the splats. Throws RunError.
 void save_inria(const std::filesystem::path& folder, const RunInput& input, const Gaussians& gaussians,
                 int step);
 

@@ -7,7 +7,8 @@
 
 namespace ewa::train {
 
-/// If the text names a term of colour (l1, l2, ssim), the others have the weight 0. Throws InputError.
+/// Parses weights of the loss. If the text names a colour term (l1, l2, ssim), colour terms that it does not name get the weight 0.
+/// Throws InputError.
 LossWeights parse_loss(const std::string& text);
 
 /// The text of weights, in the form that parse_loss reads.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a row of the options' table is made from a member of RunOptions.
+// Functions that make a row of the options' table from a member of RunOptions.
 #pragma once
 #include <spdlog/fmt/fmt.h>
 
@@ -31,7 +31,7 @@ T parse_within(const std::string& text, T low, T high) {
     return *value;
 }
 
-/// An option that is one member, whose value `parse` reads from a text.
+/// The row of an option that sets one member of RunOptions. `parse` reads the value from a text.
 template <class T, class Parse>
 RunOption member_option(const char* name, const char* value, const char* help, bool decides, Member<T> member,
                         const Parse& parse) {
@@ -59,7 +59,7 @@ inline RunOption flag(const char* name, const char* help, Member<bool> member) {
     return option;
 }
 
-/// A flag that runs of earlier versions did not have.
+/// The row of a flag that earlier versions of ewa did not have: checkpoints without it count as false.
 inline RunOption later_flag(const char* name, const char* help, Member<bool> member) {
     RunOption option = flag(name, help, member);
     option.before = "false";

@@ -12,17 +12,17 @@
 
 namespace ewa::train {
 
-/// In the order of config.json.
+/// All options of a training run, in the order of config.json.
 const std::vector<RunOption>& run_options();
 /// The option with this name, which must exist.
 const RunOption& run_option(std::string_view name);
 
-/// The value as the command line takes it.
+/// The option's value in these options, as the command line takes it.
 std::string value_text(const RunOption& option, const RunOptions& options);
 
 /// Whether files list the option: an advanced one only if its value is not the usual one.
 bool is_listed(const RunOption& option, const RunOptions& options);
-/// The options that are listed, under their names: what config.json holds.
+/// The contents of config.json: the listed options with their values, by name.
 nlohmann::ordered_json to_config(const RunOptions& options);
 
 /// The steps that --quality stands for.

@@ -7,9 +7,9 @@
 
 namespace ewa::train {
 
-/// Settles RunOptions::automatic_background: photos without transparency have their mean colour and noise around it. Others keep
-/// black without noise. frames: those to train on; at most 16 of their images are read. Throws InputError (an image that cannot
-/// be read).
+/// Replaces RunOptions::automatic_background by concrete options. Images without transparency get their mean colour as background,
+/// with noise. Other images keep black without noise. frames: the training frames; at most 16 of their images are read. Throws
+/// InputError (an image that cannot be read).
 void choose_background(RunOptions& options, const Dataset& dataset, const std::vector<int>& frames);
 
 }  // namespace ewa::train

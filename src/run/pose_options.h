@@ -10,10 +10,11 @@ RunOption refine_poses_option();
 RunOption refine_focal_option();
 RunOption rolling_shutter_option();
 
-/// The LensUse of a run. With --rolling-shutter `auto` becomes native, because undistortion bends the rows of an image.
+/// The LensUse of a run. With --rolling-shutter, LensUse::automatic becomes native, because undistortion bends an image's rows,
+/// which are read at one time.
 LensUse lens_use(const RunOptions& options);
 
-/// With --rolling-shutter: gives frames without a readout one in which their cameras are at rest. Throws InputError.
+/// With --rolling-shutter: gives each frame without a readout one during which the camera does not move. Throws InputError.
 void add_unknown_readouts(const RunOptions& options, Dataset& dataset);
 
 }  // namespace ewa::train

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// --region: the box that gets new splats.
+// The option --region: the box in which splats are cloned, split or copied.
 #pragma once
 #include <glm/vec3.hpp>
 
@@ -10,7 +10,7 @@ namespace ewa::train {
 
 RunOption region_option();
 
-/// Whether the region holds the point, in world units. Without a region it holds all.
+/// Whether the region holds the point, in world units. Without a region, every point counts.
 bool in_region(const TrainOptions& options, const glm::dvec3& point);
 
 /// Throws InputError if no first splat is in the region.

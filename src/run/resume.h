@@ -11,23 +11,24 @@
 
 namespace ewa::train {
 
-/// 16 hexadecimal digits that differ between datasets. They are a hash of the name, split and camera of each frame,
-/// and of the size and the first 64 KiB of its image and mask. A frame without a file counts with name and camera. points: the
-/// positions of the points count, too.
+/// 16 hexadecimal digits that differ between datasets. They are a hash of the name, split and camera of each frame, and of the size
+/// and the first 64 KiB of its image and mask. A frame without a file counts with name and camera. points: also hashes the
+/// positions of the points.
 std::string dataset_fingerprint(const Dataset& dataset, const Split& split, bool points = false);
 
 /// The settings of a checkpoint: version, the dataset's fingerprint, and the options that decide the result.
 /// The run adds the device.
 nlohmann::ordered_json checkpoint_settings(const RunOptions& options, const std::string& fingerprint);
 
-/// Lets a run continue from the checkpoint at `path`. Automatic options get the checkpoint's strategy, appearance and background. If the
-/// checkpoint's run has another number of steps, the options keep what it has reached (TrainOptions::least_sh_degree,
-/// most_halvings). An automatic cap of splats does not fall below the checkpoint's. Returns that run's number of steps. Throws InputError if the checkpoint lies behind the last step.
-/// asked: the options before resolve().
+/// Lets a run continue from the checkpoint at `path`. Automatic options get the checkpoint's strategy, appearance and background.
+/// If the checkpoint's run has another number of steps, the options keep the SH degree and resolution that the checkpoint has
+/// reached (TrainOptions::least_sh_degree, most_halvings). An automatic max_splats does not fall below the checkpoint's. Returns
+/// the number of steps of the checkpoint's run. Throws InputError if the checkpoint's step is after the last step of the new
+/// options. asked: the options before resolve().
 int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, const RunOptions& asked,
                   RunOptions& options);
 
-/// The setting that --robust adds: fingerprint_of its masks.
+/// The name of the checkpoint's setting that --robust adds. Its value is fingerprint_of the masks.
 inline constexpr const char* kMasksSetting = "passers_by";
 
 /// Throws InputError that names the first difference, except in the number of steps, if a run with the settings `now`

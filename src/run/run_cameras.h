@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cameras of a run that refines them.
+// The cameras of a run, which --refine-poses refines.
 #pragma once
 #include <functional>
 #include <memory>
@@ -11,7 +11,7 @@
 
 namespace ewa::train {
 
-/// Sets the cameras of the frames of a run's input: those of the dataset, or for a while those that a trainer refined.
+/// Switches the cameras in a run's input between the dataset's and those that a trainer has refined.
 class RunCameras {
   public:
     /// input: must outlive this.
@@ -24,9 +24,9 @@ class RunCameras {
     void align_test(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
                     const std::function<void()>& before_frame);
 
-    // While the refined cameras are in use:
+    // Call the next two only between use_refined and use_given.
     CameraMoves moves() const;
-    /// aligned: align_test has moved the test cameras. Throws RunError.
+    /// Writes the refined cameras. aligned: align_test has moved the test cameras. Throws RunError.
     void save(const RunWriter& folder, bool aligned) const;
 
   private:
@@ -36,7 +36,8 @@ class RunCameras {
     double extent_ = 1;          // Trainer::extent
 };
 
-/// Points and errors of each image by the reconstruction, for the report: the largest error first. Empty: unknown.
+/// Rows of the report: for each image, its reconstructed points and their reprojection error, the largest error first. Empty if the
+/// dataset has none.
 std::vector<report::CameraRow> camera_rows(const Dataset& dataset);
 
 }  // namespace ewa::train

@@ -22,22 +22,22 @@ namespace ewa::train {
 
 struct RunInput;
 
-/// The position of a run's splats on the globe. Empty if the dataset has none, or with --level off.
+/// The geographic position of a run's splats. Empty if the dataset has none, or with --level off.
 std::optional<io::Place> place_of(const RunInput& input);
 
-/// Writes splats with comments on the program, the run and the position on the globe. Throws RunError.
+/// Writes a splat file with comments on the program, the run and the geographic position. Throws RunError.
 void write_splats(const std::filesystem::path& file, const Gaussians& gaussians, int step,
                   const RenderOptions& render, const std::optional<io::Place>& place);
 
 using folders::without_link;
 
-/// Writes the files of a run into its folder. No other process can train in it while this lives.
+/// Writes the files of a run into its folder. No other process can train in the folder while this object exists.
 class RunWriter {
   public:
     /// Creates the folder. Throws RunError if it cannot be created or another process uses it.
     explicit RunWriter(const std::filesystem::path& path);
 
-    /// The place of the splats that are saved from here on.
+    /// Sets the geographic position that later saves of splats write.
     void set_place(const std::optional<io::Place>& place) { place_ = place; }
 
     const std::filesystem::path& path() const { return folder_.path(); }
@@ -45,25 +45,26 @@ class RunWriter {
     std::filesystem::path times() const { return folder_ / folders::kTimesFile; }
     std::filesystem::path metrics() const { return folder_ / folders::kMetricsFile; }
 
-    // All of these throw RunError.
-    /// Writes config.json, after the removal of symbolic links in the places of the run's files. If the run does not continue an earlier one, removes that run's checkpoint and results,
-    /// but splats.ply: they must not stay beside this run's metrics if it fails.
+    // All functions below throw RunError.
+    /// Writes config.json, after the removal of symbolic links in the places of the run's files. If the run does not continue an
+    /// earlier one, removes the earlier run's checkpoint and results, but not splats.ply. Otherwise, if this run failed, its
+    /// metrics would be beside an earlier run's results.
     void begin(const nlohmann::ordered_json& config, bool continues) const;
     /// The last line of metrics.jsonl for this step, if there is one.
     std::optional<MetricsLine> logged(int step) const;
     void save_splats(const Gaussians& gaussians, int step, const RenderOptions& render) const;
-    /// The same as one of the last `count` kept splats. Removes those before.
+    /// Saves the splats under the name of their step, for --keep. Keeps the last `count` such files and removes older ones.
     void keep_splats(const Gaussians& gaussians, int step, const RenderOptions& render, int count) const;
-    /// appearance.json. appearances: one for each of the training frames; none: nothing.
+    /// Writes appearance.json. appearances: one for each training frame; if empty, nothing is written.
     void save_appearances(const Dataset& dataset, const std::vector<int>& frames,
                           const std::vector<Appearance>& appearances) const;
-    /// sky.json. sky: null: nothing.
+    /// Writes sky.json. sky: if null, nothing is written.
     void save_sky(const std::shared_ptr<const SkyMap>& sky) const;
-    /// cameras.json, and a COLMAP model of the dataset with these cameras in cameras/, where images is a link. The frames have
-    /// the refined cameras. given: those of the dataset. aligned: the test cameras were aligned to their images.
+    /// Writes cameras.json, and in cameras/ a COLMAP model of the dataset with a link `images`. dataset: its frames have the
+    /// refined cameras. given: the cameras before refinement. aligned: the test cameras were aligned to their images.
     void save_cameras(const Dataset& dataset, const Split& split, const std::vector<Camera>& given,
                       const Similarity& world, double extent, bool aligned) const;
-    /// summary.json and report.html.
+    /// Writes summary.json and report.html.
     void save_report(const report::ReportData& report) const;
 
   private:
@@ -72,8 +73,7 @@ class RunWriter {
     std::optional<io::Place> place_;
 };
 
-/// The largest memory of the process so far, in bytes. Without the memory of a CPU device, which
-/// peak_device_bytes counts.
+/// The peak host memory of the process so far, in bytes. It excludes memory of a CPU device, which peak_device_bytes counts.
 uint64_t peak_host_bytes(const gpu::Device& device);
 
 }  // namespace ewa::train

@@ -13,13 +13,13 @@
 namespace ewa::train {
 
 struct RunInput {
-    RunOptions options;  // with concrete strategy, SH degree and folder
+    RunOptions options;  // strategy, SH degree and folder are resolved
     std::string name;
     Dataset dataset;
     Split split;
     Gaussians start;
     bool from_points = false;  // `start` is a cloud of points, which can be thinned
-    scene::KeptImages images;  // images that are already read, cached
+    scene::KeptImages images;  // decoded images, so that they are not read again
     // For the user and the report: ewa's choices, and possible problems.
     std::vector<std::string> notes, remarks;
 
@@ -32,7 +32,7 @@ struct RunInput {
 /// Loads the dataset and the first splats. Throws InputError.
 RunInput load_run(const RunOptions& options);
 
-/// Thins the points if the device has no memory for a splat of each. Does nothing if the user set the number of splats.
+/// Thins the points if the device lacks memory for one splat per point. Does nothing if the user set the number of splats.
 void thin_for_device(RunInput& input, const gpu::Device& device);
 
 /// Whether RunOptions::init is a word, and not a file.
@@ -44,27 +44,27 @@ inline bool starts_by_word(const std::string& init) {
 enum class StartsFrom { points, depth_maps, stereo, random, file };
 struct StartSource {
     StartsFrom from = StartsFrom::file;
-    size_t points = 0, images = 0;  // of stereo
-    std::string skipped;            // contents of a file that are skipped, and why; empty: none
+    size_t points = 0, images = 0;  // of StartsFrom::stereo
+    std::string skipped;            // a line on skipped contents of a file, and why; empty: none
     bool cloud = false;             // the file has points
     std::string thinned;            // a line about the thinning of points; empty: none
 };
 
-/// The first splats that the options ask for. frames: indices of the training frames. options: with a concrete
-/// SH degree. source: tells where they come from. Throws InputError (a splat file or an image that
-/// cannot be read, too many splats, --init stereo of images that agree on no depths).
+/// The first splats that the options ask for. frames: indices of the training frames. options: with a resolved SH degree. source:
+/// receives where the splats come from; may be null. Throws InputError (a splat file or an image that cannot be read, too many
+/// splats, --init stereo of images that agree on no depths).
 Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames,
                          StartSource* source = nullptr);
 
-/// Throws InputError if the options, or the files that they name, are wrong for every dataset. For use before long work makes the
-/// dataset.
+/// Throws InputError if the options, or the files that they name, are wrong for every dataset. Call it before the long work that
+/// makes a dataset.
 void check_without_dataset(const RunOptions& options);
 
-/// Throws InputError if --downscale leaves too little of an image to learn from. factor: of --downscale. left: the part of it
-/// that is still to be applied to this size.
+/// Throws InputError if --downscale leaves too little of an image to learn from. factor: of --downscale. left: the part of the
+/// factor by which width and height, in px, are still to be divided.
 void check_downscale(int factor, int left, int width, int height, const std::string& image);
 
-/// The same of --max-width, for an image of this shape that is wider.
+/// Throws InputError if --max-width leaves too little of an image that is wider. width, height: of that image, px.
 void check_max_width(int most, int width, int height, const std::string& image);
 
 /// `count` splats, spread evenly over the part of viewed_sphere(frames) that lies in at least one frustum. If

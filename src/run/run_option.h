@@ -14,14 +14,14 @@ struct RunOption {
     std::string name;   // the key in config.json, and --name on the command line
     std::string value;  // how the help shows the value, e.g. "N"; empty: a flag
     std::string help;
-    bool decides_result;  // else it decides only when files are written, where it runs, or memory
-    std::vector<std::string> choices = {};  // the values there are; empty: many
+    bool decides_result;  // false: it only affects when files are written, the device, or memory
+    std::vector<std::string> choices = {};  // the allowed values; empty: not a fixed list
 
     std::function<nlohmann::ordered_json(const RunOptions&)> get = {};
-    /// From the text on the command line. Throws InputError, which does not name the option.
+    /// Sets the option from its text on the command line. Throws InputError, whose message does not name the option.
     std::function<void(RunOptions&, const std::string&)> set = {};
     bool& (*flag)(RunOptions&) = nullptr;  // the member of a flag
-    /// The value of runs from before the option existed, as on the command line. Empty: it has always existed.
+    /// The value, as on the command line, for runs of versions of ewa without the option. Empty: every version has it.
     std::string before = {};
     /// The heading in the help. Empty: an advanced option, which the help does not show.
     std::string subject = {};

@@ -17,41 +17,43 @@ namespace ewa::train {
 /// How far a run has come.
 struct RunProgress {
     std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
-    double seconds_before = 0;  // of the run that this one continues, and of the work before `begin`
+    double seconds_before = 0;  // wall time of the continued run, and of work before `begin`
     StepReport last;
     std::vector<MetricsLine> metrics;
 
     double wall_seconds() const;
-    /// Takes a line that came after the checkpoint, and the time since then, unless the metrics have its step.
+    /// Adds a metrics line that was written after the checkpoint, and the time from checkpoint to line, unless `metrics` has its
+    /// step.
     void take_later(const MetricsLine& line, double checkpoint_seconds);
 };
 
 /// Saves the state of a trainer. All of its functions throw RunError.
 class RunSaves {
   public:
-    /// What is passed must outlive this.
+    /// The references must outlive this object.
     RunSaves(const RunWriter& folder, const RunOptions& options, RunCameras& cameras,
              const RunProgress& progress)
         : folder_(folder), options_(options), cameras_(cameras), progress_(progress) {}
 
-    /// The settings that checkpoints hold.
+    /// The settings that each checkpoint stores. The caller fills them.
     nlohmann::ordered_json& settings() { return settings_; }
-    /// The run continues from the checkpoint of this step.
+    /// Notes that the run continues from this checkpoint.
     void continue_from(const TimesAt& checkpoint);
 
     void checkpoint(const Trainer& trainer);
-    /// A checkpoint, unless the clock says that it is too early.
+    /// Saves a checkpoint if SavePace says that one is due.
     void checkpoint_if_due(const Trainer& trainer);
     /// Saves a checkpoint after the last step. If the disk is full, saves the smaller splats.ply before the error is thrown.
     void last_checkpoint(const Trainer& trainer);
     void splats(const Gaussians& gaussians);
-    /// The splats as those of a step that --keep counts.
+    /// Saves the splats under the name of their step, for --keep.
     void kept_splats(const Gaussians& gaussians) const;
-    /// The splats, and the cameras that belong to them. kept: of a step that --keep counts.
+    /// Saves the splats and, if they are refined, the cameras. kept: saves the splats for --keep too.
     void result(const Trainer& trainer, bool kept);
-    /// After a write that found the disk full: the checkpoint, or the smaller splats.
+    /// Call it after a write failed because the disk is full. Saves the checkpoint or, if that does not fit, the smaller
+    /// splats.ply.
     void what_fits(const Trainer& trainer);
-    /// How a run can be continued after its disk was full, for the end of an error.
+    /// The end of an error about a full disk: how the run can be continued.
     std::string after_full_disk() const;
 
   private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// --robust: a short training on small images, the scout, finds what single training images show and the others do not. The
-// run then masks that.
+// --robust: a short training on small images, the scout, finds what single training images show and the others do not. The run then
+// masks these objects.
 #pragma once
 #include <filesystem>
 #include <memory>
@@ -18,13 +18,13 @@ namespace ewa::train {
 /// A mask for each training frame, as passers_by makes them.
 using Masks = std::vector<Image>;
 
-/// Gives the training frames their masks: those that are known, or those that the scout finds. If the observer stops the scout,
-/// there are none. Collective. known: of rank 0, from its checkpoint. observer: null on ranks other than 0. Returns how much is
-/// masked, for the user. Throws InputError (an image that cannot be read), RunError.
+/// Sets the masks of the training frames: `known`, or the masks that the scout finds. If the observer stops the scout, no frame
+/// gets a mask. Collective. known: rank 0's masks from an earlier part of the run. observer: null on ranks other than 0. Returns
+/// how much is masked, for the user. Throws InputError (an image that cannot be read), RunError.
 std::string leave_out_passers_by(const std::shared_ptr<gpu::Device>& device, RunInput& input,
                                  const std::optional<Masks>& known, RunObserver* observer);
 
-/// For the checkpoint: differs if a mask does.
+/// A text for the checkpoint that differs if a mask differs.
 std::string fingerprint_of(const Masks& masks);
 /// The frames' masks.
 Masks masks_of(const RunInput& input);
@@ -36,7 +36,7 @@ void save_masks(const RunInput& input);
 /// The masks that save_masks wrote. Throws InputError (a mask that cannot be read).
 Masks saved_masks(const RunInput& input);
 
-/// The largest masks, for the report. Throws InputError.
+/// The views with the largest masks, for the report. Throws InputError.
 std::vector<report::LeftOutView> left_out_views(const RunInput& input);
 
 }  // namespace ewa::train
