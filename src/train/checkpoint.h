@@ -14,8 +14,8 @@
 // The other sections are the arrays of TrainerState under their names, in the device's layout
 // (shaders/shared/layouts.h).
 //
-// A run leaves all times in it zero, so that equal runs have equal files. They are in times.json (run/run_times.h).
-// Earlier versions wrote them here.
+// A run writes zeros for all times, so that equal runs have equal files. The times are in times.json (run/run_times.h). Earlier
+// versions wrote the times here.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -42,7 +42,7 @@ struct Checkpoint {
 /// checkpoint or the previous one. All functions throw RunError.
 class CheckpointWriter : public StateWriter {
   public:
-    /// Without wall_seconds, the file gets no times at all.
+    /// Without wall_seconds, all times in the file are zero.
     CheckpointWriter(const std::filesystem::path& path, std::string settings, std::string metrics,
                      std::optional<double> wall_seconds = {});
     void begin(const StateHead& head, size_t arrays) override;
@@ -56,14 +56,14 @@ class CheckpointWriter : public StateWriter {
     std::optional<double> wall_seconds_;
 };
 
-/// A checkpoint whose arrays stay in the file until they are asked for.
+/// Reads a checkpoint. Its arrays stay in the file until read() reads them.
 class CheckpointReader : public StateReader {
   public:
-    /// Reads the whole file once. Throws InputError, with the byte, if it is cut short, damaged, of another version or no
-    /// checkpoint.
+    /// Reads the whole file once, to check it. Throws InputError with the byte if the file is cut short, damaged, of another
+    /// version or no checkpoint.
     explicit CheckpointReader(const std::filesystem::path& path);
 
-    /// Its settings, metrics and times, without the arrays.
+    /// The checkpoint's settings, metrics and times, without the arrays of its state.
     const Checkpoint& checkpoint() const { return checkpoint_; }
     /// Replaces the training time of the state.
     void set_seconds(double seconds) { head_.report.seconds = seconds; }
@@ -80,11 +80,11 @@ class CheckpointReader : public StateReader {
     std::vector<uint64_t> begins_;  // of each array's bytes in the file
 };
 
-/// Both throw what the classes throw.
+/// Write and read a whole checkpoint. They throw what CheckpointWriter and CheckpointReader throw.
 void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint);
 Checkpoint read_checkpoint(const std::filesystem::path& path);
 
-/// The same without the arrays of the state, which are not read. A file cut short in them is no error.
+/// Reads a checkpoint without the arrays of the state. A file that is cut short within the arrays is no error.
 Checkpoint read_checkpoint_head(const std::filesystem::path& path);
 
 }  // namespace ewa::train

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a training cannot do where its splats or its views are divided, and what it needs of the method that draws splats. Errors
-// print these rows, and docs/scale.md shows those of a division, behind the methods that cannot be divided.
-// src/scene/looks.cpp has the rows of renders, src/run/run_input.cpp those of whole runs.
+// Options that exclude a training whose splats or views are divided, and options that the method of drawing splats must support.
+// Errors print these rows. docs/scale.md shows the rows on division, after the methods that exclude division. src/scene/looks.cpp
+// has the rows of renders, src/run/run_input.cpp those of whole runs.
 #pragma once
 #include <array>
 #include <string>
@@ -13,7 +13,7 @@
 
 namespace ewa::train {
 
-/// What divides a training, in the order of the documents.
+/// What divides a training's splats or views, in the order of docs/scale.md.
 enum Division : size_t { by_ranks, by_batch, by_bands, by_memory, divisions };
 inline constexpr std::array<std::string_view, divisions> kDivisions{"several ranks", "--batch", "--bands",
                                                                     "--device-memory"};
@@ -60,7 +60,7 @@ inline constexpr std::array kExclusions{
               {false, false, true, false},
               "the sky learns from the whole picture of a view"}};
 
-/// What the method of drawing must be able to do for an option.
+/// Options with the ability that each needs of the method of drawing splats (scene/methods.h).
 inline constexpr std::array kDemands{
     Demand{"--strategy mcmc", [](const TrainOptions& options) { return options.strategy == Strategy::mcmc; },
            &scene::Method::no_relocation},
@@ -77,7 +77,7 @@ inline constexpr std::array kSkyExclusions{
     core::Exclusion<TrainOptions>{"--background sky", learns_sky, core::Relation::excludes, "--refine-poses",
                                   refines_poses, "a camera has no gradient by the sky"}};
 
-/// Throws InputError if options exclude what divides the training.
+/// Throws InputError if an option excludes a way in which the training is divided. ranks: number of processes.
 void check_exclusions(const TrainOptions& options, int ranks);
 
 }  // namespace ewa::train

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Steps of one view and one portion, each one submission. Several may be in flight.
+// Training steps of one view by one rank that has all splats on the device in one portion. Each step is one submission. Several
+// submissions may be in flight.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -23,19 +24,19 @@ class FusedSteps {
         int step;
         double weight;  // of its image's pixels
     };
-    /// A step can be recorded again: all that changes from step to step is a pure function of its number.
+    /// Records a step. A step can be recorded again, since all that changes from step to step is a pure function of its number.
     void record(gpu::Recording& recording, int step, size_t index, const portions::StepView& view);
     /// Submits a step. Afterwards at most frames_in_flight steps are in flight.
     void submit(int step);
-    /// A GPU compiles the kernels of the next SH degree while it works at this one.
+    /// On a GPU, compiles the kernels of the next SH degree while the device runs a step of this degree.
     void compile_next_degree(int step, size_t index, ImageCache& seen);
-    /// Waits for the oldest step. If it had too many instances, neither it nor later ones have changed the model: they are
-    /// all repeated, one by one, with more capacity.
+    /// Waits for the oldest step in flight. If it had more (splat, tile) instances than capacity, neither it nor later steps have
+    /// changed the model. All of them are then repeated, one by one, with more capacity.
     void finish_oldest();
-    /// Where steps overlap, the queries between the commands would cost time.
+    /// Whether the passes of a step are timed. If steps overlap, few are, since timestamp queries between commands cost time.
     bool is_timed(int step) const;
     uint32_t slot_of(int step) const { return uint32_t(step) % parts_.tools.frames_in_flight(); }
-    /// Whether something happens after a step that needs its result.
+    /// Whether the schedule does something after this step that needs the step's result, such as a densification.
     bool must_finish(int step) const;
 
     TrainingParts& parts_;

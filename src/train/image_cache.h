@@ -15,33 +15,32 @@
 
 namespace ewa::train {
 
-/// Whether an image that is not read yet may have transparent pixels that cut it out.
+/// Whether an image that is not read yet may have pixels that its alpha cuts out.
 bool may_be_cut(const Frame& frame);
 
-/// A frame's image on the host, and the depths that the loss compares; else these have no pixels.
+/// A frame's image on the host, with depths if the loss compares depths.
 struct LoadedPhoto {
     std::shared_ptr<const Image> image;
     pipeline::PhotoTexels texels;  // of the image
     Image depths;
 };
 
-/// Device bytes of a photo of this size.
+/// The device memory, in bytes, of the frame's image and depths at this size in px.
 uint64_t photo_bytes_of(const Frame& frame, int width, int height, const LossWeights& loss);
 
-/// Where the depths of an image come from: the depth map of its frame, or points, if there are any.
+/// The source of the depths that the loss compares: the frame's depth map, or the points that the frame sees.
 struct DepthSource {
     bool maps = false;
     std::vector<glm::dvec3> points;  // world
 };
 
-/// Caches decoded images on the device up to a number of bytes: the first frames that fit. The others are read
-/// again at each use. Which images are cached changes no result. Besides the cache, one image is on the device
-/// and one is being read.
+/// Caches decoded images on the device up to a number of bytes: the first frames that fit. The others are read again at each use.
+/// The choice of cached images changes no result. Besides the cache, the device stores one image, and one more is being read.
 class ImageCache {
   public:
-    /// Loads and uploads the cached images, with their sides divided by `reduction`. frames: indices into
-    /// dataset.frames. origin: of the model's positions. loss: decides which depths are loaded with the images. Throws
-    /// InputError that names the frame.
+    /// Loads and uploads the cached images, with width and height divided by `reduction`. frames: indices into dataset.frames.
+    /// origin: of the model's means, world units. loss: decides which depths are loaded with the images. Throws InputError that
+    /// names the frame.
     ImageCache(gpu::Device& device, const passes::KernelConfig& config, const Dataset& dataset,
                const std::vector<int>& frames, uint64_t cache_bytes, const glm::dvec3& origin,
                int reduction = 1, const LossWeights& loss = {});
@@ -56,9 +55,9 @@ class ImageCache {
         gpu::Buffer texels;         // empty: on disk
         bool masked = false;        // its alpha weights the pixels, and some weigh less than 1
         bool cut = false;           // its alpha cuts pixels out
-        double weight = 1;          // with a mask: mean square of the pixels' weights
-        gpu::Buffer depths;         // the depth map or those of points, as the loss reads them; empty: none
-        uint64_t depth_pixels = 0;  // that the mean of the term of depth is over
+        double weight = 1;          // with a mask: with a mask: mean square of the pixels' weights; else 1
+        gpu::Buffer depths;         // depths of a map or of points, as the loss reads them; empty: none
+        uint64_t depth_pixels = 0;  // number of pixels in the mean of the loss's depth term
     };
     /// Reads image i if it is not cached. The device must be idle. Throws InputError.
     const Photo& photo(size_t i);
@@ -67,7 +66,7 @@ class ImageCache {
 
     /// Whether an image may be masked.
     bool any_masked() const { return any_masked_; }
-    /// Whether depths are loaded, and some image has some.
+    /// Whether some image has depths that the loss compares.
     bool any_depths() const { return any_depths_; }
     /// Whether an image may be cut out by its alpha.
     bool any_cut() const { return any_cut_; }
@@ -82,7 +81,7 @@ class ImageCache {
     std::vector<Photo> photos_;
     size_t on_disk_ = 0;
     bool any_masked_ = false, any_cut_ = false, any_depths_ = false;
-    Photo visitor_;  // the last one from disk
+    Photo visitor_;  // the last image that was read from disk
     size_t coming_ = 0;
     std::future<LoadedPhoto> reading_;
     gpu::Buffer cameras_;
@@ -92,7 +91,7 @@ class ImageCache {
 /// The training images by downsample level: 0 is the full resolution, and each level halves the sides.
 class ImageLevels {
   public:
-    /// As ImageCache. Each level has a share of TrainOptions::image_cache_bytes.
+    /// The arguments are those of ImageCache. Each level gets cache_share of TrainOptions::image_cache_bytes.
     ImageLevels(gpu::Device& device, const passes::KernelConfig& config, const Dataset& dataset,
                 const std::vector<int>& frames, const TrainOptions& options, const glm::dvec3& origin);
 
@@ -108,8 +107,8 @@ class ImageLevels {
     std::vector<ImageCache> levels_;
 };
 
-/// The index of the image of a step, which counts from 1. Each epoch shows every image once, in an order of its
-/// own. A pure function of the seed.
+/// The index of the training image of a step. step: from 1. Each epoch shows all `count` images once, in an order that depends on
+/// epoch and seed only.
 size_t frame_of_step(int step, size_t count, uint64_t seed);
 
 }  // namespace ewa::train

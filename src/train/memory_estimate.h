@@ -11,7 +11,7 @@ namespace ewa::train {
 /// Estimates the memory of one training with different largest numbers of splats.
 class MemoryEstimator {
   public:
-    /// options: with concrete strategy and SH degree. What is passed must outlive the estimator.
+    /// options: with resolved strategy and SH degree. The references must outlive the estimator.
     MemoryEstimator(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& frames,
                     const Gaussians& start, const TrainOptions& options);
     ~MemoryEstimator();
@@ -28,7 +28,7 @@ class MemoryEstimator {
     const std::vector<int>& frames_;
     const Gaussians& start_;
     const TrainOptions& options_;
-    std::unique_ptr<const Sample> sample_;  // of the first splats; drawn once, for the first estimate
+    std::unique_ptr<const Sample> sample_;  // of views and first splats; made for the first estimate
 };
 
 }  // namespace ewa::train

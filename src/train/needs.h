@@ -15,27 +15,26 @@ void check_start(size_t splats, const TrainOptions& options);
 /// The number of pixels of all these frames together.
 double pixels_of(const Dataset& dataset, const std::vector<int>& frames);
 
-/// The number of splats for which these frames have detail.
+/// The most splats that the number of pixels of these frames justifies.
 size_t cap_by_pixels(const Dataset& dataset, const std::vector<int>& frames);
 
-/// The bytes of the image cache of a training in several portions.
+/// The size in bytes of the image cache if a training keeps its splats in several portions.
 uint64_t limited_cache(const TrainOptions& options);
 
-/// What a training needs. Each figure is computed when it is asked for, from one sample of the first splats.
+/// Computes what a training needs: numbers of splats, device memory and portions.
 class Needs {
   public:
-    /// options: with concrete strategy and SH degree. What is passed must outlive this.
+    /// options: with resolved strategy and SH degree. The references must outlive this object.
     Needs(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& frames,
           const Gaussians& start, const TrainOptions& options);
 
     /// The largest number of splats.
     SplatCap cap();
-    /// About how many of the first splats fit in the device's memory; all of them if they do.
+    /// About how many of the first splats the device's memory can train: all of them, or fewer.
     size_t fitting_start();
     MemoryEstimate memory(uint32_t max_splats) { return estimator_.up_to(max_splats); }
-    /// Into how many portions each of `ranks` ranks divides its splats: 1 if the training fits in
-    /// TrainOptions::device_memory_bytes. Such a training keeps within the limit too. The number comes from the splats at
-    /// the end, so portions never have to be divided again.
+    /// The number of portions into which each of `ranks` ranks divides its splats. It is 1 if all splats fit in
+    /// TrainOptions::device_memory_bytes. The number follows from max_splats, so portions are never divided again.
     int portions(uint32_t max_splats, int ranks);
 
   private:

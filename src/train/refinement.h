@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the schedule does after a step: splats are added, moved and removed.
+// Adds, moves and removes splats after a step, if the schedule says so.
 #pragma once
 #include <functional>
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace ewa::train {
 
-/// A ball that has all cameras of the training in it, world units.
+/// A ball around the centres of all training cameras, in world units.
 struct CameraBall {
     glm::dvec3 middle{0};
     double radius = 0;
@@ -19,14 +19,14 @@ class Refinement {
   public:
     Refinement(TrainingParts& parts, const Dataset& dataset, const std::vector<int>& frames);
 
-    /// Collective.
+    /// Does what the schedule asks for after this step. Collective.
     void after(int step);
 
   private:
     void control_density(int step);
     /// Removes splats down to final_splats.
     void prune(int step);
-    /// refine: changes the numbers of the portions' splats.
+    /// Runs a refinement. refine: changes the numbers of splats in the portions.
     void run(const std::function<void(const pipeline::Phase&)>& refine);
 
     TrainingParts& parts_;

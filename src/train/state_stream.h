@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A training's state on its way to a file or from one, in pieces: no process has to hold it whole.
+// Writes and reads a training's state in pieces, so that no process needs memory for the whole state.
 #pragma once
 #include <algorithm>
 #include <cstddef>
@@ -12,13 +12,13 @@
 
 namespace ewa::train {
 
-/// A state without the bytes of its arrays.
+/// A TrainerState without its arrays.
 struct StateHead {
     StepReport report;
     int sh_degree = 0;
 };
 
-/// Takes a state, one array after another.
+/// Receives a state: first its head, then one array after another.
 class StateWriter {
   public:
     virtual ~StateWriter() = default;
@@ -28,7 +28,7 @@ class StateWriter {
     virtual void write(std::span<const std::byte> piece) = 0;
 };
 
-/// Has a state.
+/// Gives access to a stored state.
 class StateReader {
   public:
     struct Array {
@@ -42,7 +42,7 @@ class StateReader {
     virtual void read(size_t array, uint64_t offset, std::span<std::byte> into) = 0;
 };
 
-/// Keeps a state in memory.
+/// A writer that stores a state in memory.
 struct StateInMemory : StateWriter {
     TrainerState state;
     void begin(const StateHead& head, size_t) override { state = {head.report, head.sh_degree, {}}; }
@@ -56,7 +56,7 @@ struct StateInMemory : StateWriter {
     }
 };
 
-/// Reads a state in memory.
+/// A reader of a state that is in memory.
 class StateOfMemory : public StateReader {
   public:
     explicit StateOfMemory(const TrainerState& state) : state_(state), head_{state.report, state.sh_degree} {

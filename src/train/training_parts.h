@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a training consists of. Its steps, its refinements and its states work on it.
+// The parts of a training: splats, images, tables and tools. Steps, refinements, and functions of the state use them.
 #pragma once
 #include <algorithm>
 #include <cstdint>
@@ -23,48 +23,49 @@
 
 namespace ewa::train {
 
-/// What records and submits a frame.
+/// The compiled passes, queue and buffers with which a training records and submits frames.
 struct FrameTools {
     passes::PassCache cache;
     gpu::Executor executor;
     pipeline::FrameBuffers frame;
     uint32_t instance_capacity = 0;
-    bool limited;  // several portions share the device's memory with the frame
+    bool limited;  // portions of splats and the frame share the limited device memory
 
     FrameTools(gpu::Device& device, bool limited_memory)
         : cache(device), executor(device, cache.config().frames_in_flight), limited(limited_memory) {}
     uint32_t frames_in_flight() const { return cache.config().frames_in_flight; }
-    /// Makes the capacity that of a first frame of so many splats. The first frame says how many instances there are: with a
-    /// limit, a capacity for all splats might not fit.
+    /// Raises the instance capacity to a first guess for this many splats. With limited memory the guess is that for no splats,
+    /// since more might not fit. The first frame then counts the instances.
     void expect(size_t splats) {
         instance_capacity = std::max(instance_capacity, pipeline::first_capacity(limited ? 0 : splats));
     }
-    /// Leaves the memory of a limited frame to others. The next step makes another frame.
+    /// With limited memory, frees the frame's buffers for other uses. The next step allocates a frame again.
     void leave_room() {
         if (limited) frame = {};
     }
 };
 
-/// What a training learns besides the splats. All ranks have the same. A table that is not learned is empty.
+/// The tables that a training learns besides the splats. All ranks have equal tables. A table that is not learned is empty.
 struct Learned {
     pipeline::Appearances appearances;
     pipeline::Motions motions;
     pipeline::LearnedSky sky;
 
-    std::vector<pipeline::LearnedTable::Array> arrays();  // of a state
+    std::vector<pipeline::LearnedTable::Array> arrays();  // the tables' arrays in a checkpoint
 
-    /// What a step learns of a view, for other ranks. photo: its training image. slot: its number in the step.
+    /// The results of one view of a step, which a rank sends to the others. photo: the view's training image. slot: its number in
+    /// the step.
     size_t words_of_view() const;
     std::vector<uint64_t> words(uint32_t photo, uint32_t slot) const;
     void set(uint32_t photo, uint32_t slot, std::span<const uint64_t> words);
 };
 
-/// What the steps have done and how long they took.
+/// Reports and times of the steps so far.
 struct StepLog {
     StepReport report;
     StepTimes times;  // sums, over `timed_steps` steps for the passes
     int timed_steps = 0;
-    uint64_t most_own_bytes = 0;  // of the state that this rank has held after a step
+    uint64_t most_own_bytes = 0;  // largest state of this rank after a step
 
     void add(const portions::StepSums& sums);
     void add_passes(const std::vector<PassTime>& timings);
@@ -84,7 +85,7 @@ struct TrainingParts {
     Learned learned;
     StepLog log;
 
-    /// As Training.
+    /// The parts of a training. resolved: options without automatic values. portions_of_rank: number of portions of each rank.
     TrainingParts(std::shared_ptr<gpu::Device> on, const Dataset& dataset, const std::vector<int>& frames,
                   const Gaussians& ready, double extent_of_cameras, const TrainOptions& resolved,
                   std::shared_ptr<Ranks> ranks, int portions_of_rank);
@@ -92,16 +93,17 @@ struct TrainingParts {
     TrainingParts(const TrainingParts&) = delete;
     TrainingParts& operator=(const TrainingParts&) = delete;
 
-    /// Whether a step draws one part of a view, of one portion: one kernel then gathers its gradients and moves the splats.
+    /// Whether a step has one whole view, and one rank with one portion of splats. One kernel then sums the gradients and updates
+    /// the splats.
     bool fused() const { return portions.alone() && options.batch == 1 && options.bands == 1; }
     /// The training images at this step's resolution.
     ImageCache& images_at(int step) { return images.at(size_t(schedule.halvings_at(step))); }
     size_t index_of(int step) const { return frame_of_step(step, images.count(), options.seed); }
-    /// How often the step's image has been seen then.
+    /// How many steps have used this step's image, this step included.
     uint32_t visit_of(int step) const { return uint32_t(size_t(step - 1) / images.count() + 1); }
-    /// What a step needs of the frame's buffers.
+    /// The frame buffers that a step with this camera needs.
     pipeline::FrameRequest request_of(const pipeline::CameraUse& camera) const;
-    /// The sky that is drawn.
+    /// The learned sky, which frames draw behind the splats. Empty if no sky is learned.
     pipeline::SkyUse sky() const { return plan.sky ? learned.sky.use() : pipeline::SkyUse{}; }
     portions::StepParts step_parts();
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a training joins of all portions on rank 0, and what it divides among them. All steps are finished. All but check_fits and
-// chunk_figures are collective.
+// Functions that collect data of all portions on rank 0, or divide data among them. Call them only when all steps are finished. All
+// but check_fits and chunk_figures are collective.
 #pragma once
 #include <optional>
 #include <span>
@@ -12,15 +12,15 @@
 
 namespace ewa::train {
 
-/// Rank 0 writes the state or reads it; the others pass null.
+/// Save and restore a training's state. Rank 0 passes the writer or reader; other ranks pass null.
 void save(TrainingParts& parts, StateWriter* to);
 void restore(TrainingParts& parts, StateReader* from);
-/// Throws InputError if the state is not one of this training.
+/// Throws InputError if step, SH degree, origin or arrays of the state do not fit this training.
 void check_fits(TrainingParts& parts, StateReader& from);
 
-/// Only rank 0 gets a result.
+/// The splats of all portions, on rank 0. Other ranks get none.
 Gaussians gaussians_of(TrainingParts& parts);
-/// Those of rank 0 are drawn, by all ranks. Only rank 0 gets images.
+/// All ranks together render the cameras that rank 0 passes. Only rank 0 gets the images.
 std::vector<Image> render(TrainingParts& parts, std::span<const Camera> cameras);
 
 std::vector<RankFigures> rank_figures(const TrainingParts& parts);
