@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bytes that the ranks hold together: joined on rank 0, whole or in pieces, divided again, and exchanged.
+// Functions that move bytes between ranks: join them on rank 0, whole or in pieces, divide them again, and exchange them.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -14,14 +14,16 @@ namespace ewa::portions {
 /// The bytes of all ranks one after another, on rank 0; empty on the others. Collective.
 std::vector<std::byte> joined(Ranks& ranks, std::vector<std::byte> own);
 
-/// Hands the bytes of all ranks on, one after another, in pieces of some MiB; on rank 0, which holds no more than a piece of
-/// another's. begin: gets their number and CRC-32 (zlib's) first. Both functions are called on rank 0 alone. Collective.
+/// Passes the bytes of all ranks to `take` on rank 0, rank by rank, in pieces of some MiB. Rank 0 never stores more than a piece of
+/// another rank's bytes. begin: receives the number and CRC-32 (zlib's) of all bytes before `take`. Only rank 0 calls `begin` and
+/// `take`. Collective.
 void pass_on(Ranks& ranks, std::span<const std::byte> own,
              const std::function<void(uint64_t bytes, uint32_t checksum)>& begin,
              const std::function<void(std::span<const std::byte>)>& take);
 
-/// Divides bytes that rank 0 reads into parts, in pieces of some MiB. sizes: of all parts; each rank gets as many. read: fills a
-/// piece from an offset on; called on rank 0 alone. take: gets this rank's parts. Collective.
+/// Divides bytes that rank 0 reads into parts, in pieces of some MiB. sizes: of all parts, in bytes; each rank gets as many parts
+/// as any other. read: fills a piece with the bytes from an offset; called on rank 0 only. take: receives this rank's parts.
+/// Collective.
 void hand_out(Ranks& ranks, const std::vector<uint64_t>& sizes,
               const std::function<void(uint64_t offset, std::span<std::byte>)>& read,
               const std::function<void(size_t part, std::vector<std::byte>)>& take);
@@ -29,16 +31,16 @@ void hand_out(Ranks& ranks, const std::vector<uint64_t>& sizes,
 /// Sends out[r] to rank r. Returns what each rank has sent to this one. Collective.
 std::vector<std::vector<std::byte>> exchanged(Ranks& ranks, std::vector<std::vector<std::byte>> out);
 
-/// Bytes of rank 0, on every rank. own: ignored on other ranks. Collective.
+/// Returns the bytes of rank 0 on every rank. own: the bytes on rank 0; ignored on other ranks. Collective.
 std::vector<std::byte> from_rank_0(Ranks& ranks, std::span<const std::byte> own);
 
-/// What this rank has exchanged with others so far.
+/// Bytes and times of this rank's exchanges with other ranks so far.
 struct Traffic {
     uint64_t sent_bytes = 0;
     double exchange = 0, waiting = 0;  // ms
 };
 
-/// Functions of ranks that count what they do.
+/// Wraps a Ranks and counts the traffic of its functions.
 class CountedRanks {
   public:
     explicit CountedRanks(Ranks& ranks) : ranks_(ranks) {}

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the portions of a rank are. One portion stays on the device. The host holds all of several, and the device as many as
-// fit in its limit. Visits then go forwards and backwards in turn, so the last portions of a visit are the first ones of the
-// next.
+// Stores a rank's portions: ranges of the scene's splats. A single portion stays on the device. Several portions are in host
+// memory, and on the device as many as fit in its limit. Visits of all portions then alternate in direction. So a visit begins with
+// portions that the last visit has left on the device.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -16,18 +16,19 @@
 
 namespace ewa::portions {
 
-/// The arrays of a portion's splats. list_indices: ViewBuffers::list_indices, from a list to its update.
+/// The arrays of a portion's splats. list_indices: ViewBuffers::list_indices, which exist between the listing of a portion's splats
+/// and their update.
 enum Array : size_t { params, moments1, moments2, statistics, list_indices, arrays };
 const char* name_of(Array array);
-/// Bytes of so many splats.
+/// The size in bytes of this array for this many splats.
 uint64_t bytes_of(Array array, uint32_t splats, int sh_degree);
 
-/// What a portion has on the device while it is used. statistics: and parameters.
+/// The arrays that a portion needs on the device while it is used. statistics: statistics and parameters. state: all arrays.
 enum class Need { params, statistics, state };
 
 struct Setup {
     int count = 1;       // portions of each rank
-    uint64_t limit = 0;  // of the device's memory, bytes; with several portions
+    uint64_t limit = 0;  // of device memory in bytes; applies with several portions
     int moments = 0;     // arrays of moments
     bool statistics = false;
 };
@@ -41,30 +42,30 @@ class Holder {
 
     int count() const { return int(own_.size()); }
     uint32_t splats() const;
-    uint64_t state_bytes(uint32_t splats) const;  // of so many splats
-    /// The arrays of a state that the portions have.
+    uint64_t state_bytes(uint32_t splats) const;  // of all stored arrays
+    /// The arrays that each portion has and that a checkpoint stores.
     std::span<const Array> kept() const { return kept_; }
-    /// A portion, whose arrays may be elsewhere.
+    /// The model of a portion. Its arrays need not be on the device.
     pipeline::Model& model(int portion) { return own_[size_t(portion)].model; }
     Streaming& streaming() { return streaming_; }
     virtual std::unique_ptr<Lists> make_lists() = 0;
 
-    /// A portion with the arrays that are needed. They stay until another portion is used.
+    /// Brings the needed arrays of a portion to the device. They stay there until the next call of use.
     virtual pipeline::Model& use(int portion, Need need) = 0;
-    /// The state of the portion in use has changed in place.
+    /// Call it after the arrays of the portion in use have changed on the device: copies in host memory are then out of date.
     virtual void changed() = 0;
-    /// The list indices of the portion in use. The caller moves them away or sets them.
+    /// The list indices of the portion in use. The caller moves the buffer out, or sets it.
     virtual gpu::Buffer& indices() = 0;
     /// Calls visit(portion, its model) for all, in the direction that finds most of them on the device.
     virtual void visit(Need need, const std::function<void(int, pipeline::Model&)>& visit) = 0;
 
-    /// An array of a state, of a portion; and of all portions, one after another.
+    /// Reads back an array of one portion. The overload without `portion` joins those of all portions.
     virtual std::vector<std::byte> download(int portion, Array array) = 0;
     std::vector<std::byte> download(Array array);
-    /// Gives a portion an array that it lacks, or takes one away.
+    /// give adds an array that a portion lacks. remove frees an array of a portion.
     virtual void give(int portion, Array array, std::vector<std::byte> bytes) = 0;
     virtual void remove(int portion, Array array) { buffer(portion, array) = gpu::Buffer(); }
-    /// Takes all arrays away. like: the portion without arrays.
+    /// Frees all arrays of a portion and replaces its model. like: a model without arrays.
     void clear(int portion, pipeline::Model like);
 
   protected:
@@ -83,7 +84,7 @@ class Holder {
     Streaming streaming_;
 };
 
-/// With several portions it limits the device's memory as long as it lives.
+/// Makes a holder. With several portions, the holder limits the device's memory to setup.limit while it exists.
 std::unique_ptr<Holder> make_holder(gpu::Device& device, const Setup& setup);
 
 }  // namespace ewa::portions

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// A training step over portions of the splats. Each portion lists what the step's views show of it. A part of a view is drawn
-// from the lists of all portions, by one rank, and the sums of its gradients go back to the portions. Then each portion is
-// updated. A part of a view is a band of its tile rows, or the whole view.
+// A training step over portions of the splats. Each portion lists its splats that the step's views see. A part of a view is drawn
+// from the lists of all portions, by one rank, and the sums of its gradients go back to the portions. Then each portion is updated.
+// A part of a view is a band of its tile rows, or the whole view.
 //
-// Between a list and a part of a view, and back, data stay on the device, wait in host memory, or go to another rank. Which of
-// these follows from the portions alone.
+// Between listing and drawing, and between drawing and update, data stay on the device, wait in host memory, or go to another rank.
+// The portions alone decide which.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -22,13 +22,13 @@ namespace ewa::portions {
 struct StepView {
     pipeline::FrameInputs inputs;    // without a band
     pipeline::FrameRequest request;  // of the whole view, without splats and instances
-    /// Records the loss after a part is drawn. Its inputs have the part's band. Called once for every attempt to draw.
-    /// Empty: the view is only drawn.
+    /// Records the loss after a part is drawn; FramePasses::inputs has the part's band. Called again if drawing is repeated with
+    /// more capacity. Empty: the view is only drawn.
     std::function<void(const pipeline::FramePasses&)> record_loss;
     /// Weight of the view's pixels in its mean squared error. Called after record_loss.
     std::function<double()> weight;
-    /// What the loss has learned besides the splats, in StepParts::learned words, and the same for a rank that has not drawn the
-    /// view.
+    /// learned: the results of the loss for learned tables, as StepParts::learned words. learn: sets them on a rank that has not
+    /// drawn the view.
     std::function<std::vector<uint64_t>()> learned;
     std::function<void(std::span<const uint64_t>)> learn;
 };
@@ -46,34 +46,36 @@ struct StepParts {
     pipeline::FrameBuffers& frame;
     uint32_t& instance_capacity;
     std::function<void()> submitted;  // called after each submission
-    size_t learned = 0;               // words that ranks learn of a view
+    size_t learned = 0;               // 64-bit words of a view's StepView::learned
 };
 
 class Step {
   public:
-    /// bands: of each view. A view needs a tile row for each.
+    /// bands: number of bands of each view. A view needs at least one tile row for each band.
     Step(Portions& portions, int bands)
         : portions_(portions),
           ranks_(portions.ranks()),
           bands_(uint32_t(bands)),
           lists_(portions.holder().make_lists()) {}
 
-    /// Draws all views and leaves the sums of their gradients. Collective, as all that follows.
+    /// Draws all views and stores the sums of their gradients for update. This and all functions below but free_buffers and traffic
+    /// are collective.
     StepSums draw(const StepParts& parts, std::span<const StepView> views);
-    /// Moves the splats. more: what else the submission of a portion's update does. Adds to the sums.
+    /// Updates the splats by the gradients of draw. more: records further work into the submission of each portion's update. sums:
+    /// receives the counts of the updates.
     void update(const StepParts& parts, const pipeline::Rates& rates, int sh_degree,
                 const std::function<void(const passes::Recorder&, const pipeline::Model&)>& more,
                 StepSums& sums);
 
-    /// Draws whole views without a loss: view k by rank k. There are at most as many views as ranks. Returns whether this rank
-    /// has drawn one, which the frame then holds.
+    /// Draws whole views without a loss: view k by rank k. There are at most as many views as ranks. Returns whether this rank has
+    /// drawn a view, whose image planes are then in StepParts::frame.
     bool draw_views(const StepParts& parts, std::span<const StepView> views);
 
-    /// Raises `largest`, a float a splat of each of this rank's portions, to the splat's largest weight at a pixel of the views:
-    /// at most as many views as ranks, without a loss.
+    /// Raises each value of `largest` to the splat's largest blending weight at a pixel of the views. largest: one float per splat,
+    /// for each of this rank's portions. views: at most as many as ranks, without a loss.
     void raise_weights(const StepParts& parts, std::span<const StepView> views,
                        std::vector<std::vector<float>>& largest);
-    /// Frees what a step holds on the device besides the portions.
+    /// Frees the device buffers of a step, but not the portions.
     void free_buffers() { buffers_ = {}; }
 
     const Traffic& traffic() const { return ranks_.traffic(); }
