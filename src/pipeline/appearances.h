@@ -14,33 +14,33 @@ namespace ewa::pipeline {
 
 struct FrameBuffers;
 
-/// A row for each training image. With PPISP, the values of the cameras follow (shared/layouts.h), and a slot has the gradient by
-/// the values of its view's camera.
+/// A row for each training image. With PPISP, the values of the cameras follow (shared/layouts.h), and the slot of a view has the
+/// gradient with respect to its camera's values.
 struct Appearances : LearnedTable {
     AppearanceModel model = AppearanceModel::none;
-    std::vector<uint32_t> camera_of;  // of each photo; with PPISP
+    std::vector<uint32_t> camera_of;  // the camera of each training image; with PPISP
     uint32_t cameras = 0;
 
     Appearances() = default;
-    /// camera_of: the camera of each image, numbered from 0 without a gap. views: the most of a step.
+    /// camera_of: the camera of each image, numbered from 0 without a gap. views: the most views of a step.
     Appearances(gpu::Device& device, AppearanceModel model, std::vector<uint32_t> camera_of, uint32_t views);
-    uint32_t camera_at(uint32_t camera) const;  // where its values begin, in floats
+    uint32_t camera_at(uint32_t camera) const;  // index of its first value in `values`, in floats
     std::vector<Appearance> download() const;
     /// Replaces PPISP's exposures in stops.
     void set_exposures(std::span<const float> stops);
 };
 
-/// A step of one training image's appearance.
+/// An optimisation step of one training image's appearance.
 struct AppearanceUse {
     const Appearances* appearances = nullptr;
     uint32_t photo = 0;
-    uint32_t slot = 0;  // of its view in the step
+    uint32_t slot = 0;  // number of its view in the step
     float rate = 0;
     uint32_t visit = 1;  // number of this image's step, from 1
 };
 
-/// With PPISP: updates the values of the cameras, after all views of the step. photos: the views' images. capacity: of instances;
-/// if frame.counts has more, nothing changes, because the frame is repeated.
+/// With PPISP: updates the cameras' values after all views of a step. photos: the views' training images. capacity: of (splat,
+/// tile) instances. If frame.counts exceeds it, nothing changes, because the frame is repeated.
 void record_cameras_update(const passes::Recorder& on, const Appearances& appearances,
                            const FrameBuffers& frame, std::span<const uint32_t> photos, float rate,
                            uint32_t capacity);

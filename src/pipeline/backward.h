@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Inputs of the loss and the backward passes of FramePasses besides a frame.
+// Inputs of the loss and of the backward passes in FramePasses: learning rates, and terms of the loss.
 #pragma once
 #include <cstdint>
 
@@ -11,9 +11,9 @@ namespace ewa::pipeline {
 struct Rates {
     float mean = 0, opacity = 0, quaternion = 0, scale = 0, sh0 = 0, sh_rest = 0;
     uint32_t step = 1;      // Adam's, from 1
-    uint32_t views = 1;     // of a step: see batch_rates
-    bool nesterov = false;  // the step looks ahead: see adam_shares
-    uint64_t seed = 0;      // of the rounding of packed moments
+    uint32_t views = 1;     // views of a step: see batch_rates
+    bool nesterov = false;  // Nesterov's momentum: see adam_shares
+    uint64_t seed = 0;      // seed of the stochastic rounding of packed moments
     // With plan.regularised: d(loss)/d(opacity) and d(loss)/d(scale along one axis) of every splat.
     float opacity_weight = 0, scale_weight = 0;
 };

@@ -16,24 +16,24 @@ struct FrameRequest {
     uint32_t width = 0, height = 0;  // px
     uint32_t instances = 0;          // capacity for (splat, tile) pairs
     bool gradients = false;
-    bool fifth_plane = false;  // of the image: depth, count or median depth
+    bool fifth_plane = false;  // a fifth image plane: depth, count or median depth
     bool masks = false;        // with gradients: some pixels count less
-    // With gradients: what is applied before the loss.
+    // With gradients: the appearance that is applied to the render before the loss.
     AppearanceModel appearance = AppearanceModel::none;
     // With gradients: dL/d(image) comes from outside, in 5 planes. There are no buffers for a loss.
     bool given_gradient = false;
-    // With gradients: buffers that are not needed at the same time share memory. The same for all requests of a frame.
+    // With gradients: buffers that are not needed at the same time share memory. All requests of a frame have the same value.
     bool overlaid = false;
-    bool motion = false;    // with gradients: that of the camera's motion
-    bool readouts = false;  // with motion: a readout's too
+    bool motion = false;    // with gradients: also the gradient of the camera's motion
+    bool readouts = false;  // with motion: also the gradient of the motion during a readout
     bool rays = false;      // splats are integrated along rays
-    LossWeights loss{};     // with gradients: of the loss, whose terms of weight 0 have no buffers
+    LossWeights loss{};     // with gradients: a term of weight 0 has no buffers
 };
 
-/// How a radix sort is divided.
+/// How a radix sort is divided into lanes and passes.
 struct RadixCut {
     uint32_t lanes = 0;             // lanes, or workgroups that rank in shared memory: SortPush
-    uint32_t passes = 0, bits = 0;  // of each pass
+    uint32_t passes = 0, bits = 0;  // bits of the key for each pass
 };
 RadixCut radix_cut(const passes::KernelConfig& config, uint32_t items, uint32_t key_bits);
 
@@ -45,11 +45,11 @@ struct Sizes {
     RadixCut depth_sort, tile_sort;
     uint32_t strip_rows = 0;  // tile rows of an emitting lane
     uint32_t image_planes = 0;
-    uint32_t partials = 0;  // partial sums of a loss kernel
+    uint32_t partials = 0;  // partial sums partial sums of a loss kernel
     uint32_t reduce_block = 0, reduce_blocks = 0;
     uint32_t ppisp_blocks = 0;  // of pixels, for the gradient of PPISP's values
     uint32_t grid_parts = 0;    // of pixels, for the gradient of the bilateral grid
-    uint32_t motion_items = 0;  // subgroups that add the gradient of the camera's motion
+    uint32_t motion_items = 0;  // subgroups that sum the gradient of the camera's motion
     uint32_t motion_blocks = 0;
 
     // Bytes.
@@ -72,30 +72,30 @@ struct FrameBuffers {
     Sizes sizes;  // of the last request
     uint32_t instance_capacity = 0;
 
-    gpu::Buffer counts;  // every splat adds to them: they lie in device memory
-    /// Host visible, for frames_in_flight frames. Empty where the host can read counts.
+    gpu::Buffer counts;  // in device memory, since every splat adds to them
+    /// Host-visible copies of counts, one for each of frames_in_flight frames. Empty if the host can read `counts` itself.
     gpu::Buffer counts_copy;
     gpu::Buffer records, depth_keys[2], order[2], tile_counts, prefix, scan_totals, first_instances;
     gpu::Buffer counters, counter_prefix, digit_totals;
     gpu::Buffer instance_keys[2], instance_splats[2], sorted_indices[2], tile_starts;
     gpu::Buffer planes, target, exposed, masked, moments, derivatives, blurred, image_gradient, partials,
         appearance_sums, motion_sums, motion_reduced, reduced, slots, rays;
-    // With FrameRequest::overlaid. The buffers in it hold, one after another, the pairs of the depth sort, those of the
-    // tile sort, the planes of the loss, and the gradient slots.
+    // With FrameRequest::overlaid. Its memory is used in turn for the pairs of the depth sort, those of the tile sort, the loss
+    // planes, and the gradient slots.
     gpu::Buffer overlay;
 
-    /// Allocates what a request needs. Buffers that are large enough stay. Image planes are zeroed if their
-    /// layout changes. Throws what sizes_for and Buffer throw.
+    /// Allocates the buffers that a request needs. Buffers that are large enough stay. Image planes are zeroed if their layout
+    /// changes. Throws as sizes_for and gpu::Buffer do.
     void reserve(gpu::Device& device, const passes::KernelConfig& config, const FrameRequest& request);
     /// Frees all buffers whose size depends on the number of instances, and those that share their memory, until the
     /// next reserve.
     void free_instances();
 
-    /// Which of the two buffers of keys, splats and indices the tile sort begins with. It ends with the second: the
-    /// first is free then, and may be overlaid.
+    /// Which of each two buffers of keys, splats and indices the tile sort reads first. The sort ends in buffer 1. Buffer 0 is
+    /// unused afterwards and may be overlaid.
     uint32_t tile_sort_start() const { return sizes.tile_sort.passes % 2 == 0 ? 1 : 0; }
 
-    /// Frees the memory of overlaid buffers and these buffers, or the same buffers that lie alone.
+    /// Frees the overlay with all buffers in it. Without overlaid, frees the same buffers one by one.
     void free_overlaid();
     /// The last command of a frame: lets the host read the counts. slot: which of the frames in flight it is.
     void record_counts(gpu::Recording& recording, uint32_t slot = 0) const;
@@ -103,19 +103,19 @@ struct FrameBuffers {
     shared::Counts read_counts(uint32_t slot = 0) const;
 };
 
-/// Capacity for (splat, tile) instances of a first try. The first frame tells how many there are.
+/// Capacity for (splat, tile) instances before any frame has counted them.
 uint32_t first_capacity(size_t splats);
 
-/// A number of instances, if an image can have so many. Throws RunError.
+/// Returns the number of instances. Throws RunError if an image cannot have so many.
 uint32_t checked_instances(uint64_t instances);
 
-/// The next capacity if a frame needs `needed`. Throws RunError beyond what an image can have.
+/// The next capacity if a frame needs `needed` instances. Throws RunError beyond what an image can have.
 uint32_t grown_capacity(uint32_t needed);
 
 /// Throws RunError if the rays of a tile met more splats than one invocation may loop over.
 void check_rays_finished(const shared::Counts& counts);
 
-/// Runs what record(Recorder) records, with more capacity each time, until its instances fit.
+/// Runs the commands that record(Recorder) records. Repeats them with more capacity until all instances fit.
 template <class Record>
 shared::Counts run_until_it_fits(passes::PassCache& cache, gpu::Executor& executor, FrameBuffers& frame,
                                  FrameRequest request, Record record) {

@@ -20,7 +20,7 @@ struct CameraUse {
     uint64_t offset = 0;                  // bytes, aligned as the device requires for uniform blocks
     uint32_t width = 0, height = 0;       // px
     uint32_t lenses = 0;                  // LENSES_* of layouts.h
-    bool wraps = false;                   // the left and right border of the image are one line of the scene
+    bool wraps = false;                   // an image of all directions: its left and right border coincide
 };
 
 /// The camera in this block of a buffer.
@@ -32,19 +32,20 @@ struct SkyUse {
     uint32_t size = 0;                    // texels a side
 };
 
-/// Rows of a view that a render shows. The loss counts some of them: the others are a halo, which the windows of SSIM reach.
+/// Rows of a view that a render shows. The loss counts only the band's own rows. The others are a halo for SSIM's windows, which
+/// reach beyond the own rows.
 struct Band {
     uint32_t first = 0;                   // row of the view that is the render's first
     uint32_t rows = 0;                    // of the render; 0: it shows the whole view
-    uint32_t own_begin = 0, own_end = 0;  // of the render's rows, those that count
+    uint32_t own_begin = 0, own_end = 0;  // the band's own rows, as rows of the render
 };
 
 struct FrameInputs {
     CameraUse camera;
     std::array<float, 3> background{0, 0, 0};  // black with a sky
     SkyUse sky{};
-    bool keep_overflow = false;    // the frame before may not be done: if it overflows, this one does nothing
-    int sh_degree = kMaxShDegree;  // evaluated: at most this, and at most what the plan stores
+    bool keep_overflow = false;    // this frame does nothing if an earlier frame in flight overflows
+    int sh_degree = kMaxShDegree;  // degree to evaluate, at most the plan's stored degree
     uint32_t samples = 1;          // of a ray, with Integrator::march
     Band band{};
 };
@@ -61,7 +62,7 @@ shared::CameraBlock camera_block(const Camera& camera, const passes::KernelConfi
 /// The lens of a view of the operators, and its bounds of tangents. The lens must be native.
 void set_lens(const Camera& camera, shared::ViewBlock& block);
 
-/// A buffer of one such block.
+/// A buffer with the camera_block of one camera.
 gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passes::KernelConfig& config,
                           const glm::dvec3& origin = glm::dvec3(0));
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A frame: from parameters to image planes, to the loss, and to moved parameters or their gradient. The order of its passes
-// is written in FramePasses only.
+// The passes of a frame: from parameters to image planes, to the loss, and to updated parameters or their gradient. FramePasses
+// alone has their order.
 #pragma once
 #include <array>
 
@@ -27,7 +27,7 @@ struct Sorted {
 /// Depths that the loss compares with the render's.
 struct DepthUse {
     const gpu::Buffer* map = nullptr;  // width * height floats, 0 where there is no depth; null: none
-    uint64_t pixels = 0;               // that the mean is over; 0: all
+    uint64_t pixels = 0;               // number of pixels in the mean; 0: all
 };
 
 /// Records the passes of a frame.
@@ -42,53 +42,52 @@ struct FramePasses : passes::Recorder {
     Sorted forward(const Model& model) const;
     /// The first part of forward: clears the counts and projects the model's splats.
     void project(const Model& model) const;
-    /// The rest of forward: from frame's records, depth_keys[0] and tile_counts of `splats` splats to the image planes.
+    /// The second part of forward, after project: from the frame's records, depth_keys[0] and tile_counts of `splats` splats to
+    /// image planes.
     Sorted draw(uint32_t splats) const;
 
-    /// After drawing: raises each splat's largest weight at a pixel, as the bits of a float.
+    /// After drawing: raises each value of `largest` to the splat's largest blending weight at a pixel. Values are the bits of
+    /// floats.
     void contributions(const Sorted& sorted, const gpu::Buffer& largest) const;
 
-    /// Leaves the parts of the loss in Counts and dL/d(image) in frame.image_gradient. The loss is that of the whole view:
-    /// those of its bands add up to it, and so do their gradients.
-    /// photo: width * height texels, RGBA. Its alpha composites it over the background or, if `masked`, is the
-    /// weight of each pixel; `frame` must then be reserved with masks.
-    /// appearance: of the training image, if it is learned. It takes its own step of Adam; `frame` must be reserved with its
-    /// model.
-    /// cut: the photo is composited, and its alpha is compared with the render's if the loss has that term.
-    /// depths: of the photo, if the loss has that term.
+    /// Computes the loss terms into Counts, and dL/d(image) into frame.image_gradient. Losses and gradients of a view's bands add
+    /// up to those of the whole view. photo: width * height texels, RGBA. Its alpha composites it over the background or, if
+    /// `masked`, is the weight of each pixel; `frame` must then be reserved with masks. appearance: of the training image, if it is
+    /// learned. The pass also does Adam's step of the appearance; `frame` must be reserved with its model. cut: the photo is
+    /// composited, and its alpha is compared with the render's if the loss has that term. depths: of the photo, if the loss has
+    /// that term.
     void loss(const gpu::Buffer& photo, bool masked = false, const AppearanceUse* appearance = nullptr,
               bool cut = false, const DepthUse& depths = {}) const;
 
-    /// After the loss: leaves the gradient by the sky in the slot of its view in the step.
+    /// After the loss: writes the gradient with respect to the sky into the view's slot. slot: number of the view in the step.
     void sky_gradient(const LearnedSky& sky, uint32_t slot) const;
 
-    /// Gradients of blending and projection. With plan.adam it moves the model; without, it writes
-    /// the gradient to model.moments1.
-    /// With plan.motion, the gradient of the camera's motion is in frame.motion_reduced, which must be reserved for it.
-    /// motion: that of the training image's camera, if motions are learned. It takes its own step of Adam.
+    /// Computes the gradients of blending and projection. With plan.adam, updates the model; without, writes the gradient to
+    /// model.moments1. With plan.motion, the gradient of the camera's motion is in frame.motion_reduced, which must be reserved for
+    /// it. motion: of the training image's camera, if motions are learned. Also does Adam's step of this motion.
     void backward(const Model& model, const Sorted& sorted, const Rates& rates,
                   const MotionUse* motion = nullptr) const;
 
     // A step of several views: see views.h.
 
     /// Projects the model's splats for a view and lists those that reach a tile of inputs.band. After the submission
-    /// Counts.scan_total is their number. `frame` must be reserved for the model's splats.
-    /// projected: `frame` still has what it projected for another band of the view.
+    /// Counts.scan_total is their number. `frame` must be reserved for the model's splats. projected: `frame` still has the
+    /// projection that another band of the same view has made.
     void list(const Model& model, const ViewBuffers& buffers, const ListStart& start,
               bool projected = false) const;
-    /// A forward frame of a list of `splats` splats, whose records are in frame.records. As with forward, Counts.instances
-    /// tells whether it has to be repeated.
+    /// A forward frame of a list of `splats` splats, whose records are in frame.records. As after forward, repeat it if
+    /// Counts.instances exceeds the capacity.
     Sorted draw_list(uint32_t splats) const;
-    /// Gradients of blending a list, after the loss: their sums go to `sums` from first_index on.
+    /// After the loss: computes the gradients of blending a list, and writes each splat's sums into `sums`, from first_index on.
     void list_backward(uint32_t splats, const Sorted& sorted, const gpu::Buffer& sums,
                        uint32_t first_index) const;
-    /// Moves the model by the mean gradient of the views. rates: of one view; batch_rates turns them into those of the step.
-    /// bands: lists of each view; list `view * bands + band`. It reads two of the inputs: the SH degree, and
-    /// what the cameras of the step are.
+    /// Updates the model by the mean gradient of the views. rates: of one view; batch_rates turns them into those of the step.
+    /// bands: number of lists of each view; a band's list is `view * bands + band`. It reads only two of the inputs: the SH degree
+    /// and the cameras' lenses.
     void update_views(const Model& model, const ViewBuffers& buffers, const Rates& rates,
                       uint32_t bands = 1) const;
 
-    // What the passes of a method read: see methods.h.
+    // Bindings and constants for the passes of a method of drawing: see methods.h.
 
     gpu::BufferPart camera() const;
     gpu::SpecConstant degree() const;

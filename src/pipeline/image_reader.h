@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A frame's image on the host.
+// Reads a frame's image planes back to the host.
 #pragma once
 #include <vector>
 

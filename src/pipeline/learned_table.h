@@ -10,13 +10,13 @@
 
 namespace ewa::pipeline {
 
-/// Values, each with its moments of Adam. There is a row of values for each training image. Values that several images share come
-/// after the rows. Each view of a step writes its gradient by the shared values into its own slot.
+/// A table of values with Adam's moments. It has a row of values for each training image, then values that several images share.
+/// Each view of a step writes its gradient with respect to the shared values into its own slot.
 struct LearnedTable {
     struct Layout {
         std::string name, moments;  // of the arrays in checkpoints: moments1 is called moments + "1"
         uint32_t row_floats = 0;    // values of a training image
-        uint32_t slot_floats = 0;   // gradients by shared values, of a view
+        uint32_t slot_floats = 0;   // floats of a view's gradient with respect to shared values
         uint32_t views = 0;         // the most views of a step
     };
     /// An array of a checkpoint.
@@ -32,7 +32,7 @@ struct LearnedTable {
     gpu::Buffer slots;  // empty without slot_floats
 
     LearnedTable() = default;
-    /// start: the first values. The moments are 0. Floats of a row and of a slot are even.
+    /// start: the first values. Moments start at 0. Numbers of floats in a row and in a slot must be even.
     LearnedTable(gpu::Device& device, Layout layout, std::span<const float> start);
 
     bool empty() const { return floats == 0; }
@@ -40,7 +40,7 @@ struct LearnedTable {
     std::vector<float> download() const { return values.download<float>(floats); }
     std::vector<Array> arrays();
 
-    /// The results of a view for other ranks: the row of its image with its moments, and its slot. As 64-bit words, for Ranks::gather.
+    /// The results of a view for other ranks, as 64-bit words for Ranks::gather: its image's row with moments, and the view's slot.
     size_t words_of_view() const { return (3ull * layout.row_floats + layout.slot_floats) / 2; }
     std::vector<uint64_t> words(uint32_t row, uint32_t slot) const;
     void set(uint32_t row, uint32_t slot, std::span<const uint64_t> words);

@@ -6,7 +6,7 @@
 
 namespace ewa::pipeline {
 
-/// Records the pass on a frame. mode: SPEC_MODE of splats.
+/// Records the pass that a method has for one stage of a frame. mode: SPEC_MODE, which the pass of splats uses.
 template <class Buffers, class Push>
 using MethodPass = void (*)(const FramePasses& on, const Buffers& buffers, const Push& push,
                             gpu::SpecConstant mode);

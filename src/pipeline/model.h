@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A splat scene on the device: parameters, and in training Adam's moments. A training
-// step changes nothing else.
+// A splat scene on the device: parameters, and in training Adam's moments. A training step changes only these, and learned tables.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -24,8 +23,7 @@ constexpr uint64_t parameter_bytes(uint32_t capacity, int sh_degree) {
     return blocks * shared::PARAM_BLOCK * parameter_planes(sh_degree) * 16;
 }
 
-/// Index of flat float f of splat i in such a buffer, in floats. planes: texel
-/// planes a splat (shared/layouts.h).
+/// Index of float f of splat i in a parameter-sized buffer, in floats. planes: texel planes a splat (shared/layouts.h).
 constexpr size_t parameter_index(uint32_t planes, uint32_t f, size_t i) {
     const size_t block = i / shared::PARAM_BLOCK, within = i % shared::PARAM_BLOCK;
     return ((block * planes + f / 4) * shared::PARAM_BLOCK + within) * 4 + f % 4;
@@ -43,7 +41,7 @@ struct Model {
     // Words with the layout of params. Training in float32: one moment in each. Training in 16 bits: both moments in
     // moments1. A gradient: moments1, as float32.
     gpu::Buffer moments1, moments2;
-    /// For a binding that needs a buffer: the second moments, or where both moments are.
+    /// A buffer for the binding of second moments: moments2, or moments1 if it has both moments.
     const gpu::Buffer& second_moments() const { return moments2 ? moments2 : moments1; }
     gpu::Buffer statistics;  // vec2 a splat, if a strategy reads it
 };
@@ -53,24 +51,24 @@ struct Model {
 gpu::Buffer parameter_buffer(gpu::Device& device, const char* name, gpu::Texel texel, uint32_t capacity,
                              int sh_degree);
 
-/// Replaces the arrays of a model by those of a generation of `splats` splats, one after another: moments1, moments2
-/// if there are any, then params. write(target, source, is_moments): fills `target` from the model's arrays; `source`
-/// is the array that target replaces. The device must be done when it returns. The statistics stay.
+/// Replaces the arrays of a model by those of a generation of `splats` splats, one after another: moments1, moments2 if there are
+/// any, then params. write(target, source, is_moments): fills `target` from the model's arrays; `source` is the array that `target`
+/// replaces. The device must have finished when write returns. The statistics stay.
 void replace_generation(
     gpu::Device& device, Model& model, uint32_t splats,
     const std::function<void(const gpu::Buffer& target, const gpu::Buffer& source, bool is_moments)>& write);
 
-/// Splats `first` to first + count.
+/// A scene with `count` splats of `all`, from splat `first` on.
 Gaussians slice_of(const Gaussians& all, size_t first, size_t count);
 
-/// moments: how many buffers of them, 0 to 2. They and the statistics are zeroed.
+/// Uploads a scene. moments: number of buffers of moments, 0 to 2. Moments and statistics are zeroed.
 Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments, bool statistics);
 
 /// Reads `values`, a buffer with the layout of the parameters, back into a scene. After a gradient frame
 /// moments1 holds the gradient.
 Gaussians download_model(const Model& model, const gpu::Buffer& values);
 
-/// The same for values on the host, of `splats` splats.
+/// Converts `splats` splats with the layout of the parameters, which are on the host, into a scene.
 Gaussians gaussians_of(const Model& model, std::span<const float> values, uint32_t splats);
 
 /// Densification statistics of a new generation: zeros.

@@ -19,24 +19,24 @@ namespace ewa::pipeline {
 
 using MotionBasis = std::array<float, shared::MOTION_BASIS_FLOATS>;
 
-/// focal: the focal lengths move too. extent: of the scene, world units.
+/// The basis B of a camera. focal: also learns a factor of the focal lengths. extent: of the scene, world units.
 MotionBasis motion_basis(const Camera& camera, const Gaussians& gaussians, bool focal, double extent);
-/// The same for the learned motion during a readout, which is proportional to a point's time from the middle of the readout.
+/// The basis for the learned motion during a readout, which is proportional to a point's time from the middle of the readout.
 MotionBasis readout_basis(const Camera& camera, const Gaussians& gaussians, double extent);
 
-/// The bases of photos' cameras.
+/// The bases of the training images' cameras.
 struct MotionBases {
     std::vector<MotionBasis> poses;
     std::vector<MotionBasis> readouts;  // empty, or as many
-    std::vector<bool> rolling;          // with readouts: whether the photo has one
+    std::vector<bool> rolling;          // with readouts: whether the image has a rolling shutter
 };
 MotionBases motion_bases(const std::vector<Camera>& cameras, const Gaussians& gaussians, bool focal,
                          double extent);
 
-/// Motions of all training cameras: a row of each, then one of each readout.
+/// Motions of all training cameras: first a row for each camera's pose, then a row for each camera's readout.
 struct Motions : LearnedTable {
     uint32_t photos = 0;
-    /// Whether a photo's readout has a motion, the photos-th row after that of its pose.
+    /// Whether an image's camera learns a motion during its readout. Its row is `photos` rows after that of the pose.
     std::vector<bool> rolling;
     gpu::Buffer bases;
     gpu::Buffer camera;  // the moved camera of the frame
@@ -50,7 +50,7 @@ struct Motions : LearnedTable {
     std::vector<Array> arrays();  // with the bases
 };
 
-/// A step of one training camera's motion.
+/// An optimisation step of one training camera's motion.
 struct MotionUse {
     const Motions* motions = nullptr;
     uint32_t photo = 0;
@@ -59,18 +59,18 @@ struct MotionUse {
     uint32_t visit = 1;  // number of this camera's step, from 1
 };
 
-/// Writes the moved camera. base: the camera of the dataset. Returns the camera for the frame.
+/// Records the computation of the moved camera. base: the camera of the dataset. Returns the moved camera, for the frame's inputs.
 CameraUse record_move_camera(const passes::Recorder& on, const Motions& motions, uint32_t photo,
                              const CameraUse& base);
 
-/// Adds the partial sums of the gradient that the update pass wrote into frame.motion_sums. frame.motion_reduced gets sums of
-/// blocks. readout: the camera has LENSES_ROLLING.
+/// Records the sum of the partial gradients that the update pass has written to frame.motion_sums. Sums of blocks go to
+/// frame.motion_reduced. readout: the camera has LENSES_ROLLING.
 void record_motion_sums(const passes::Recorder& on, const FrameBuffers& frame, bool readout);
 
-/// The motion takes its own step of Adam, after record_motion_sums.
+/// Records Adam's step of the motion, after record_motion_sums.
 void record_motion_update(const passes::Recorder& on, const FrameBuffers& frame, const MotionUse& use);
 
-/// The gradient of the last frame with record_motion_sums, for no motion.
+/// Reads back the gradient of the last frame with record_motion_sums, with respect to the motion at zero motion.
 CameraMotion download_motion_gradient(const FrameBuffers& frame, bool readout);
 
 }  // namespace ewa::pipeline

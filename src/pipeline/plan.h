@@ -38,19 +38,19 @@ struct PlanRequest {
     bool alpha = false;                                  // training images whose alpha cuts pixels out
     bool depths = false;                                 // training images with depth maps
     AppearanceModel appearance = AppearanceModel::none;  // of the training images, which is learned
-    bool motion = false;  // the gradient by the camera's motion; in a training it is learned
-    bool sky = false;     // in a training: it is learned
+    bool motion = false;  // a gradient with respect to the camera's motion, which a training learns
+    bool sky = false;     // in a training: a sky is learned
 
     // For a training.
     bool statistics = false;          // the strategy reads densification statistics
-    bool absolute_gradients = false;  // of the statistics: absolute gradients of the pixels
+    bool absolute_gradients = false;  // the statistics sum absolute gradients of the pixels
     bool packed_moments = false;      // Adam's moments in 16 bits each
     bool regularised = false;         // opacity and scale regularisers in the loss
     bool pruned = false;              // splats of small weight are removed near the end
 };
 
 struct Plan {
-    int stored_degree = 0;  // SH degree in the device's parameters; a frame evaluates at most this
+    int stored_degree = 0;  // SH degree in the device's parameters; frames evaluate at most this degree
     Footprint kernel = Footprint::peak;
     const scene::Method* method = &scene::method_of(scene::MethodKind::splat);
     uint32_t nearest = 0;  // spheres at a pixel, if the method draws them
@@ -61,17 +61,17 @@ struct Plan {
     bool adam = false;            // both moments
     bool packed_moments = false;  // in 16 bits each
     bool statistics = false;      // densification statistics
-    bool absolute = false;        // of absolute gradients
+    bool absolute = false;        // the statistics sum absolute gradients of the pixels
     bool regularised = false;     // opacity and scale regularisers in the loss
     bool pruned = false;          // splats of small weight are removed near the end
     LossWeights loss{};           // with gradients: a term of weight 0 has no passes; alpha is not automatic
     bool masks = false;
     AppearanceModel appearance = AppearanceModel::none;
-    bool motion = false;  // the gradient by the camera's motion
+    bool motion = false;  // the gradient with respect to the camera's motion
     bool sky = false;     // a sky that is learned
 
     bool operator==(const Plan&) const = default;
-    /// Buffers of moments, which have the size of the parameters. A gradient takes the place of one.
+    /// The number of moment buffers, each of the parameters' size. Without Adam, a gradient needs one of them.
     int moment_buffers() const { return adam && !packed_moments ? 2 : gradients ? 1 : 0; }
     /// Whether the image has a fifth plane: depth, count or median depth.
     bool fifth_plane() const {
@@ -79,21 +79,20 @@ struct Plan {
     }
     /// Whether the surfaces of splats are drawn in place of their colours.
     bool surface() const { return drawing == Drawing::median_depth || drawing == Drawing::normal; }
-    /// Whether a frame has the buffer of how rays meet each splat.
+    /// Whether a frame has a buffer with each splat's geometry for rays.
     bool rays() const { return method->rays; }
     /// The SH degree that a frame evaluates.
     uint32_t evaluated_degree(int wanted) const;
 };
 
-/// A render stores the degrees that are present and wanted (request.render.sh_degree). A gradient
-/// and a training store all: every stored coefficient has a gradient. Inputs that do not apply to
-/// the purpose are ignored.
+/// A render stores the SH degrees that the scene has and request.render.sh_degree asks for. A gradient and a training store all:
+/// every stored coefficient has a gradient. Inputs that do not apply to the purpose are ignored.
 Plan plan_for(const PlanRequest& request);
 
-/// The buffers of a frame of an image with width * height pixels. Splats, instances and readouts are the caller's.
+/// The buffers of a frame of an image with width * height pixels. The caller sets the request's splats, instances and readouts.
 FrameRequest frame_request(const Plan& plan, uint32_t width, uint32_t height);
 
-/// What a plan skips, and the bytes that this saves for `splats` splats of a scene with `scene_degree`.
+/// The work that a plan skips, and the bytes saved for `splats` splats of a scene with SH degree `scene_degree`.
 std::vector<PlanLine> describe(const Plan& plan, int scene_degree, uint64_t splats);
 
 }  // namespace ewa::pipeline

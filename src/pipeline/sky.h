@@ -13,7 +13,7 @@ namespace ewa::pipeline {
 
 inline constexpr uint32_t kLearnedSkySize = 128;  // texels a side
 
-/// As SkyMap.
+/// A given SkyMap on the device.
 struct SkyTexels {
     uint32_t size = 0;
     gpu::Buffer values;
@@ -24,20 +24,20 @@ struct SkyTexels {
     SkyUse use() const { return {&values, size}; }
 };
 
-/// A sky that training learns. A slot has the gradient by its view, in whole multiples of 1 / SKY_UNITS.
+/// A sky that training learns. A view's slot has the gradient of that view as integers, in units of 1 / SKY_UNITS.
 struct LearnedSky : LearnedTable {
     uint32_t size = 0;
-    gpu::Buffer before;  // the values, while they change
+    gpu::Buffer before;  // copy of the values during their update
 
     LearnedSky() = default;
-    /// Grey. views: of a step at most.
+    /// A grey sky. views: the most views of a step.
     LearnedSky(gpu::Device& device, uint32_t views);
     SkyMap download() const;
     SkyUse use() const { return {&values, size}; }
 };
 
-/// Adam's step after those of all views. step: of the optimiser, from 1. capacity: of instances; more in frame.counts change
-/// nothing.
+/// Records Adam's step of the sky, after all views of the step. step: of the optimiser, from 1. capacity: of (splat, tile)
+/// instances. If frame.counts exceeds it, nothing changes.
 void record_sky_update(const passes::Recorder& on, const LearnedSky& sky, const FrameBuffers& frame,
                        uint32_t views, float rate, uint32_t step, uint32_t capacity);
 

@@ -7,21 +7,21 @@ namespace ewa::pipeline {
 
 struct ScanBuffers {
     const gpu::Buffer& source;  // items
-    const gpu::Buffer* order;   // if given, entry e is source[order[e]]
+    const gpu::Buffer* order;   // null: entry e is source[e]; else source[order[e]]
     const gpu::Buffer& prefix;  // items: sum of the entries before, within the block
     const gpu::Buffer& totals;  // blocks + 1: sum of the blocks before; the grand total last
     const gpu::Buffer& counts;  // Counts
 };
 struct ScanWork {
     uint32_t items;
-    uint32_t block;           // entries a subgroup scans
+    uint32_t block;           // number of entries that a subgroup scans
     uint32_t total;           // shared::TOTAL_*: which of Counts receives the grand total
     const char* name;         // of the timing
     uint32_t capacity = ~0u;  // of instances, with TOTAL_INSTANCES
     bool flags = false;       // counts the entries that are not 0
 };
 
-/// Exclusive prefix sum; that of entry e is totals[e / block] + prefix[e].
+/// Records an exclusive prefix sum. The sum before entry e is totals[e / block] + prefix[e].
 void record_scan(const passes::Recorder& on, const ScanBuffers& buffers, const ScanWork& work);
 
 struct SortBuffers {
@@ -42,8 +42,8 @@ struct SortWork {
     const char* name;   // of the timing
 };
 
-/// Stable sort of pairs by the low cut.passes * cut.bits bits of the key. Returns i such that values[i],
-/// indices[i] and, with keep_keys, keys[i] hold the result.
+/// Records a stable sort of pairs by the low cut.passes * cut.bits bits of the key. Returns i such that values[i], indices[i] and,
+/// with keep_keys, keys[i] hold the result.
 uint32_t record_sort(const passes::Recorder& on, const SortBuffers& buffers, const SortWork& work);
 
 }  // namespace ewa::pipeline

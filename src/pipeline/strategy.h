@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Strategies that change the number of splats, on the device. A scene may be in portions, each a model of its own. So a
-// refinement has phases: each portion is counted, the counts of all decide, and each portion is written. Nothing that the
-// device holds passes from one phase to the next. A write replaces the model's arrays by those of the next generation, one
-// after another: at most one array is there twice.
+// Strategies that change the number of splats, on the device. A scene may be divided into portions, each with its own model. So a
+// refinement has phases: count splats in each portion, decide by the counts of all, and write each portion. No device data pass
+// from one phase to the next. A write replaces a model's arrays one by one, so at most one array exists twice.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -24,7 +23,7 @@ struct Refinement {
     uint32_t relocated = 0;  // by MCMC
 };
 
-/// What a phase runs with. frame: provides sizes, counts and scratch buffers of a value a splat.
+/// The tools of a phase. frame: provides sizes, counts, and scratch buffers of one value per splat.
 struct Phase {
     passes::PassCache& cache;
     gpu::Executor& executor;
@@ -39,12 +38,13 @@ struct Phase {
     }
 };
 
-/// A box of means, relative to the model's origin: its low corner, then its high one. New splats come from splats in it.
+/// A box, relative to the model's origin: its low corner, then its high one. Only splats with means in the box are copied, cloned
+/// or split.
 using Region = std::array<float, 6>;
 inline constexpr float kFarthest = std::numeric_limits<float>::max();
 inline constexpr Region kEverywhere{-kFarthest, -kFarthest, -kFarthest, kFarthest, kFarthest, kFarthest};
 
-/// A ball that has all cameras of the training in it: its middle, relative to the model's origin, and its radius.
+/// A ball around all training cameras: its centre relative to the model's origin, then its radius, in world units.
 using Ball = std::array<float, 4>;
 inline constexpr Ball kUnlimited{0, 0, 0, kFarthest};
 
@@ -59,24 +59,24 @@ struct DensifyRules {
     uint32_t step = 0;
     uint32_t max_splats = 0;  // hard cap: the threshold is raised until the next generation fits
     Region region = kEverywhere;
-    Ball ball = kUnlimited;  // a splat that is larger than its distance to all of it is pruned
+    Ball ball = kUnlimited;  // a splat larger than its distance to the ball is pruned
 };
 
-/// The splats of a model's next generation, if mean gradient norms above `threshold` grow.
+/// The number of splats in a model's next generation, if splats with a mean gradient norm above `threshold` are cloned or split.
 uint32_t count_densified(const Phase& phase, const Model& model, const DensifyRules& rules, float threshold);
 
-/// What all portions do.
+/// The decision for all portions.
 struct Densified {
-    float threshold = 0;  // infinity if not even that fits
+    float threshold = 0;  // infinite: no splat is cloned or split
     uint64_t splats = 0;  // of the next generation; 0: the scene has to stay as it is
 };
-/// count: the splats of the next generation at a threshold, of all portions.
+/// count: returns the number of splats of all portions in the next generation, for a threshold.
 Densified decide_densify(const DensifyRules& rules, const std::function<uint64_t(float)>& count);
 
 /// Writes the next generation. The model then has no statistics.
 void write_densified(const Phase& phase, Model& model, const DensifyRules& rules, float threshold);
 
-/// Lowers every opacity to at most this logit and zeroes its moments.
+/// Records a pass that lowers every opacity to at most this logit and zeroes the opacity's moments.
 void record_reset_opacity(const passes::Recorder& on, const Model& model, float logit);
 
 /// The rules of 3DGS as Markov chain Monte Carlo (Kheradmand et al. 2024). Dead splats move to living ones, the number
@@ -94,9 +94,9 @@ struct McmcRules {
 
 /// A portion's part of a refinement.
 struct McmcPart {
-    uint32_t weight = 0, dead = 0;  // of its splats: sums
-    // As decide_mcmc fills them in:
-    uint32_t all_weight = 0, weight_before = 0;  // of all portions, and of those before
+    uint32_t weight = 0, dead = 0;  // integer opacity of its splats, and its dead splats
+    // decide_mcmc sets the following:
+    uint32_t all_weight = 0, weight_before = 0;  // weights of all portions, and of those before this one
     uint32_t draws = 0;                          // by all portions
     uint32_t first_draw = 0;                     // of the portion's dead splats
     uint32_t added = 0;                          // splats that this portion gets: the last one gets all
@@ -110,15 +110,15 @@ McmcPart weigh_mcmc(const Phase& phase, const Model& model, const McmcRules& rul
 /// parts: of all portions. If all splats are dead or nothing changes, there are no draws, and no phase follows.
 Refinement decide_mcmc(std::span<McmcPart> parts, uint32_t splats, const McmcRules& rules);
 
-/// Draws of which the sources are this model's.
+/// The draws whose sources are splats of this model.
 struct McmcSources {
-    gpu::Buffer sources;  // of all draws: the source's index in this model or NOT_LISTED
-    gpu::Buffer hits;     // of each splat
+    gpu::Buffer sources;  // for each draw of all portions: source in this model, or NOT_LISTED
+    gpu::Buffer hits;     // for each splat: number of its copies
 };
 McmcSources draw_mcmc(const Phase& phase, const Model& model, const McmcRules& rules, const McmcPart& part);
 
-/// Writes the next generation. from: the sources of this portion's dead splats, and then of those that it gets. Sources that are
-/// no splats of the model are in model.params behind them, and have hits too.
+/// Writes the next generation. from: the sources of this portion's dead splats, and then of those that it gets. Sources from other
+/// portions are behind the model's own splats in model.params, and have hits too.
 void write_mcmc(const Phase& phase, Model& model, const McmcRules& rules, const McmcPart& part,
                 const McmcSources& from);
 
@@ -129,7 +129,7 @@ struct Noise {
     uint32_t step = 0;
 };
 
-/// Adds to each mean amplitude * gate(opacity) * Sigma * a standard normal vector
+/// Records a pass that adds to each mean amplitude * gate(opacity) * Sigma * a standard normal vector
 /// (shaders/passes/perturb.comp).
 void record_noise(const passes::Recorder& on, const Model& model, const FrameBuffers& frame,
                   const Noise& noise);
