@@ -14,12 +14,12 @@ namespace ewa {
 /// relative to the width. Size and relative principal point are the first key's, and the shutter is global.
 Camera along_path(std::span<const Camera> keys, double time);
 
-/// The camera, or one of the same view whose image is reduced to this width. Its height keeps the ratio, rounded.
+/// The camera, or, if its image is wider than most_width px, the same view reduced to that width. The rounded height keeps the
+/// aspect ratio.
 Camera narrowed(const Camera& camera, int64_t most_width);
 
-/// Whether an image of the new size is the old one resized by one factor, with each side rounded to a whole
-/// pixel. A factor near 1 must be exact: an image that is a pixel off is a different one (cropped, or of
-/// another camera).
+/// Whether an image of the new size is the old one resized by one factor, with each side rounded to a whole pixel. Sizes that
+/// differ by only a pixel or so do not match: such an image was cropped, or is of another camera.
 bool same_aspect(int old_width, int old_height, int width, int height);
 
 }  // namespace ewa

@@ -9,7 +9,8 @@
 
 namespace ewa::scene {
 
-/// Cameras, points, images and masks, as inputs for core::check_outputs. what: the argument that names the dataset.
+/// The files of a dataset's cameras, points, images and masks, for core::check_outputs. what: the argument that names the dataset,
+/// for errors.
 std::vector<core::NamedFile> files_of(const Dataset& dataset, const std::string& what);
 
 }  // namespace ewa::scene

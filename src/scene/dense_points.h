@@ -9,9 +9,9 @@
 
 namespace ewa::scene {
 
-/// `points`, followed by the middles between neighbours: each point and the two points nearest to it. A middle has the mean
-/// of both colours. With more than `most` points in all, the middles of the longest distances are taken. `points` must be
-/// finite, and have a colour each. wanted: whether a middle may be taken.
+/// Returns `points`, followed by midpoints between neighbours: between each point and the two points nearest to it. A midpoint has
+/// the mean of both colours. With more than `most` points in all, only the midpoints of the longest distances are added. `points`
+/// must be finite, and have a colour each. wanted: whether a midpoint may be added; empty: all may.
 PointCloud with_midpoints(const PointCloud& points, size_t most,
                           const std::function<bool(const glm::dvec3&)>& wanted = {});
 

@@ -11,7 +11,7 @@
 
 namespace ewa::scene {
 
-/// So many images that their pixels take about 1 GiB as four float32 channels; at least one. frames: of these images.
+/// The number of decoded images that take about 1 GiB as four float32 channels; at least one. frames: the frames of the images.
 inline size_t images_at_once(const std::vector<const Frame*>& frames) {
     constexpr uint64_t kPixels = 1 << 26;
     uint64_t largest = 1;
@@ -24,8 +24,8 @@ inline size_t images_at_once(const std::vector<const Frame*>& frames) {
 std::shared_ptr<const Image> image_of(const Frame& frame);
 
 using KeptImages = std::vector<std::shared_ptr<const KeptImage>>;
-/// Reads images of these frames on all cores, the first ones that fit into 128 MiB as four float32 channels. image_of finds them
-/// while the result exists. Throws as load_frame_image does.
+/// Decodes the images of these frames on all cores, until 128 MiB are full (as four float32 channels). image_of returns these
+/// images while the result exists. Throws as load_frame_image does.
 KeptImages read_images(Dataset& dataset, const std::vector<int>& indices);
 
 /// The frames with these indices.

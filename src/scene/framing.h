@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a scene of splats is seen from if no camera says it. World units; cameras in the OpenCV convention.
+// Cameras for a view of a whole splat scene, for scenes without cameras. World units; cameras in the OpenCV convention.
 #pragma once
 #include <glm/vec3.hpp>
 #include <optional>
@@ -41,16 +41,17 @@ glm::dvec3 guessed_up(const Gaussians& gaussians);
 /// The mean up direction of the cameras; -y if they have all orientations.
 glm::dvec3 mean_up(const Dataset& dataset);
 
-/// Shows the whole framed box from the front and slightly above. Without a hint, the front is the broad side of the
-/// scene: a view along the horizontal direction in which it is thinnest. The shorter side of the image has a field of view
-/// of 50 degrees. width, height: px, above zero.
+/// Shows the whole framed box from the front and slightly above. Without FramingHints::forward, the view is along the horizontal
+/// direction in which the scene is thinnest. The shorter side of the image has a field of view of 50 degrees. width, height: px,
+/// above zero.
 Framing frame_scene(const Gaussians& gaussians, int width, int height, const FramingHints& hints = {});
 
 /// A camera at `eye` that looks at `target` with `up` towards the top of the image. If the view is along `up`,
 /// another axis replaces it. The field of view is that of frame_scene. eye and target must differ.
 Camera look_at(const glm::dvec3& eye, const glm::dvec3& target, const glm::dvec3& up, int width, int height);
 
-/// The camera itself if it is a pinhole. Else one at its place that looks the same way, with the field of view of frame_scene.
+/// The camera itself if it is a pinhole. Otherwise, a pinhole camera with the same position and rotation, and with the field of
+/// view of frame_scene.
 Camera pinhole_at(const Camera& camera);
 
 /// The camera turned about the axis `up` (unit length) through `target` by `angle` radians, counterclockwise as

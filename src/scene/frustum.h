@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points of the world in the picture of a camera of any lens, and frusta as lines.
+// Projection of world points and lines through any native lens, and frusta as lines.
 #pragma once
 #include <array>
 #include <glm/vec2.hpp>
@@ -10,8 +10,8 @@
 
 namespace ewa {
 
-/// The world position at pixel coordinates x, y (pixel centres at +0.5) and the depth that a render has there, in world units: camera
-/// z, or the distance with scene::ordered_by_distance. Where the lens shows nothing: the camera's centre.
+/// The world position at pixel coordinates x, y (pixel centres at +0.5) and the depth that a render has there, in world units:
+/// camera z, or the distance with scene::ordered_by_distance. If the lens shows nothing at the pixel, returns the camera's centre.
 glm::dvec3 world_point(const Camera& camera, double x, double y, double depth);
 
 /// A line in world units.
@@ -20,8 +20,8 @@ struct Segment {
 };
 
 /// The frustum as ten lines: four edges from the camera's centre to the image's corners at that depth, then the image's sides (top,
-/// right, bottom, left). The last two are a roof over the top side, which marks the up direction. A fisheye and 360° show the middle of the image, half as wide and high. Parallel rays begin in the plane of
-/// the camera. depth > 0.
+/// right, bottom, left). The last two are a roof over the top side, which marks the up direction. For a fisheye or 360° lens, the
+/// sides are those of the image's middle half. For an orthographic lens, the edges begin in the camera's plane. depth > 0.
 std::array<Segment, 10> frustum_segments(const Camera& camera, double depth);
 
 /// The part of a segment in front of the camera's near plane, in px. Empty if there is none. For a fisheye or 360°, it is the straight

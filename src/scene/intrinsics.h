@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether the numbers of a camera can be those of a camera.
+// Whether the intrinsics of a camera are plausible.
 #pragma once
 #include <string>
 
@@ -7,8 +7,8 @@
 
 namespace ewa::scene {
 
-/// The reason why intrinsics are those of no camera: a focal length or a distortion of 1e30, or a principal point a long way outside
-/// the image. Empty for others. The camera has a size.
+/// The reason why intrinsics cannot be those of a real camera, such as a focal length of 1e30 or a principal point far outside of
+/// the image. Empty if they can. The camera's width and height must be above 0.
 std::string intrinsics_fault(const Camera& camera, const Distortion& lens);
 
 }  // namespace ewa::scene

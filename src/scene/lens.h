@@ -22,7 +22,8 @@
 
 namespace ewa::scene {
 
-/// The image of the ray (x, y, 1). Not finite where the model has no value.
+/// The point of the image plane at focal length 1 to which the lens maps the ray (x, y, 1). Not finite where the model has no
+/// value.
 glm::dvec2 distort(const Distortion& lens, glm::dvec2 ray);
 
 /// The inverse: the ray in front of the camera whose image is `point`. Newton's method starts on the axis,

@@ -22,7 +22,7 @@ inline const core::Words<MaskUse> kMaskWords{{"auto", MaskUse::automatic},
 inline const core::Words<LensUse> kLensWords{
     {"auto", LensUse::automatic}, {"native", LensUse::native}, {"undistort", LensUse::undistort}};
 
-/// The options of a render. nearest, samples: whether the user gave them, even with the default value.
+/// The options of a render. nearest, samples: whether the user set the option of this name, even to its default value.
 struct Look {
     RenderOptions render = {};
     bool nearest = false, samples = false;

@@ -7,12 +7,13 @@
 
 namespace ewa::scene {
 
-/// As load_image. Also throws InputError where a value is not finite: it would make the loss and every gradient of its view not finite.
+/// Reads an image as load_image does. Also throws InputError if a value is not finite, since loss and gradients of its view would
+/// not be finite either.
 Image load_finite_image(const std::filesystem::path& path);
 
-/// A mask as one channel, which is 1 where its image counts. If the file's alpha varies, it is the mask. If all values are 0 or 1 out of
-/// 255, 1 is white, and so is a single colour beside black. Throws InputError for other colours, and for values that are those of no
-/// mask.
+/// A mask as one channel, which is 1 where its image counts. If the file's alpha varies, it is the mask. If all values are 0 or 1
+/// out of 255, 1 counts as white. So does the only colour of a mask that has one colour besides black. Throws InputError for other
+/// colours and other values.
 Image load_mask(const std::filesystem::path& path);
 
 /// The mask of an image, turned as the image's pixels are stored. Throws InputError where it has another aspect ratio, also when EXIF's

@@ -14,7 +14,7 @@
 
 namespace ewa::scene {
 
-/// The limit of leaf references and of a few GB of memory.
+/// The most triangles of a scene. References from the leaves of the ray tracing tree and a few GB of memory suffice for no more.
 inline constexpr size_t kMostTriangles = size_t(1) << 22;
 
 /// The packed normal of a triangle without normals in its file, which is flat.
@@ -72,7 +72,7 @@ struct Sky {
 };
 
 struct EncodedImage {
-    std::string what;  // for errors
+    std::string what;  // name of the image in errors
     std::vector<unsigned char> bytes;
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What rendering through a lens needs to know of it, in place of an undistorted image. shaders/lib/lens.glsl has the formulas.
+// Properties of lenses through which splats are rendered directly, without undistortion of images. shaders/lib/lens.glsl has the
+// formulas.
 #pragma once
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -14,10 +15,10 @@ namespace ewa::scene {
 bool is_native(const Distortion& lens);
 
 /// The pixel of a point in camera coordinates, through the camera's lens. Empty behind the camera and where the lens does not show
-/// it. The lens must be native. limit: lens_limit(camera), which takes longer than this.
+/// it. The lens must be native. limit: lens_limit(camera), which is slow, so compute it once.
 std::optional<glm::dvec2> pixel_of(const Camera& camera, double limit, const glm::dvec3& point);
 
-/// What a position in the image sees: from `origin` along `direction`, of unit length, in camera coordinates. Empty where the lens
+/// The ray of a position in the image: from `origin` along `direction`, of unit length, in camera coordinates. Empty where the lens
 /// shows nothing. limit: lens_limit(camera). x, y: px from the top left corner.
 struct PixelRay {
     glm::dvec3 origin{0}, direction{0};
@@ -37,11 +38,13 @@ bool ordered_by_distance(Lens lens);
 /// Whether the left and right border of the image are one line of the scene: an equirectangular image of all directions.
 bool shows_all_around(const Camera& camera);
 
-/// How far from the axis the lens shows a point. brown: the largest x^2 + y^2 of tangents, before the model folds over.
-/// fisheye: the largest angle in radians, before the model folds over, and little beyond the corners of the image. Others: infinite.
+/// The limit up to which the lens shows points off its axis. brown: the largest x^2 + y^2 of tangents, before the model folds over.
+/// fisheye: the largest angle in radians, before the model folds over, and little beyond the corners of the image. Others:
+/// infinite.
 double lens_limit(const Camera& camera);
 
-/// Bounds of x / z and y / z for the Jacobian of a pinhole or of brown: the image, and JACOBIAN_MARGIN half images on each side.
+/// Bounds to which x / z and y / z are clamped in the projection's Jacobian, for pinholes and brown. They reach JACOBIAN_MARGIN
+/// half images beyond the image on each side.
 struct TangentBounds {
     glm::dvec2 low, high;
 };

@@ -11,7 +11,7 @@ namespace ewa::scene {
 /// The logit with which 3DGS's kernel has about the same image. Values that are not finite stay.
 float shown_logit(float density_logit);
 
-/// The inverse.
+/// The inverse of shown_logit.
 float density_logit(float shown_logit);
 
 }  // namespace ewa::scene

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The views that are averaged for depth of field and motion blur. Cameras in the OpenCV convention.
+// Cameras and sample points of the views whose mean is an image with depth of field or motion blur. Cameras in the OpenCV
+// convention.
 #pragma once
 #include <glm/vec2.hpp>
 

@@ -22,10 +22,10 @@ struct SweepPlanes {
     int count = 0;    // at least 3
 };
 
-/// Per pixel of the reference image, row-major.
+/// Depths at each pixel of the reference image, row-major.
 struct SweptDepths {
     std::vector<float> inverse;  // of view z, 1 / world unit; 0: none
-    std::vector<float> score;    // the correlation there, -1 to 1; -1: none
+    std::vector<float> score;    // the correlation at that depth, -1 to 1; -1: no depth
 };
 
 /// Each plane shows the other images as the reference camera would see them if the scene were that plane. A pixel's score on a

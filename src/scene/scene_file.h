@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file of splats and a camera, as they are in memory. `ewa bench` hands it to ewa-bench, which links no reader of splat formats.
+// A file of splats and a camera, in the byte layout of memory. `ewa bench` hands it to ewa-bench, which links no reader of splat
+// formats.
 #pragma once
 #include <filesystem>
 
@@ -13,7 +14,7 @@ struct SceneFile {
     Camera camera;  // a pinhole at rest; width 0: none
 };
 
-/// Throws RunError.
+/// Writes the file. Throws RunError.
 void write_scene_file(const std::filesystem::path& path, const SceneFile& scene);
 
 /// Throws InputError for a file that write_scene_file has not written whole on a machine of this byte order.

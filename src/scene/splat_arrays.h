@@ -14,11 +14,11 @@
 
 namespace ewa::scene {
 
-/// floats: const or not.
+/// One array of a scene. Floats: std::vector<float>, const or not.
 template <class Floats>
 struct SplatArray {
     Floats* values;
-    size_t each;  // values of a splat
+    size_t each;  // number of values of a splat
 };
 
 /// The five arrays of the scene. gaussians: Gaussians, const or not, which must outlive them.
@@ -49,8 +49,8 @@ std::string undrawable_text(const Gaussians& gaussians);
 /// and its footprint stays below FOOTPRINT_MAX.
 inline constexpr float kOpaqueLogit = 17.328680f, kLargestLogScale = 27.631f;
 
-/// Finite values to compute with, in place of stored ones: for infinite opacities, flat scales, and scales larger than any view. The
-/// image is the same.
+/// Finite values that replace stored ones in computations: infinite opacity logits, scales of 0, and scales larger than any view.
+/// Renders stay the same.
 inline float computable_logit(float logit) {
     return std::isinf(logit) ? std::copysign(kOpaqueLogit, logit) : logit;
 }
@@ -59,14 +59,14 @@ inline float computable_log_scale(float log_scale) {
     return log_scale > kLargestLogScale ? kLargestLogScale : log_scale;
 }
 
-/// Whether all values are computable as they are.
+/// Whether computable() changes no value of the scene.
 inline bool is_computable(const Gaussians& g) {
     return std::ranges::none_of(g.opacity_logits, [](float v) { return std::isinf(v); }) &&
            std::ranges::all_of(g.log_scales,
                                [](float v) { return computable_log_scale(v) == v || std::isnan(v); });
 }
 
-/// The scene with values that are computable.
+/// The scene with computable_logit and computable_log_scale applied.
 inline Gaussians computable(Gaussians g) {
     std::ranges::transform(g.opacity_logits, g.opacity_logits.begin(), computable_logit);
     std::ranges::transform(g.log_scales, g.log_scales.begin(), computable_log_scale);

@@ -15,15 +15,15 @@ struct SplatGroups {
     std::vector<uint32_t> sizes;
 };
 
-/// Groups of splats that touch. Two splats touch if their largest standard deviations differ by less than a factor of 2, and
-/// d' (Σa + Σb)^-1 d < 9 for the difference d of their means: 3 standard deviations of the difference of a point of each. The limit on
-/// sizes keeps a huge splat in the background from joining small groups that float in it. Each splat is compared with its 32 nearest
-/// of about its size. If several of an octave of sizes have one mean, only the first is compared. A splat that is not drawable is a
-/// group of its own. O(n log n).
+/// Groups of splats that touch. Two splats touch if their largest standard deviations differ by less than a factor of 2, and d' (Σa
+/// + Σb)^-1 d < 9 for the difference d of their means: 3 standard deviations of the difference of a point of each. The limit on
+/// sizes keeps a huge splat in the background from joining small groups that float in it. Each splat is compared with its 32
+/// nearest of about its size. If several splats of an octave of sizes have the same mean, only the first is compared. A splat that
+/// is not drawable is a group of its own. O(n log n).
 SplatGroups touching_groups(const Gaussians& gaussians);
 
-/// For each splat, the number of cameras with its mean in their image, in front of the near plane. Splats in front do not hide it.
-/// Lenses must be native (is_native).
+/// For each splat, the number of cameras with its mean in their image, beyond the near plane. Occlusion by other splats does not
+/// count. Lenses must be native (is_native).
 std::vector<uint32_t> views_of_splats(const Gaussians& gaussians, const std::vector<Camera>& cameras);
 
 }  // namespace ewa::scene

@@ -40,8 +40,8 @@ inline Center center_of(std::vector<double>& values) {
 /// must be finite. O(n log n).
 std::vector<double> mean_squared_neighbor_distance(const std::vector<glm::dvec3>& positions);
 
-/// Pairs of neighbours: each distinct position with the `count` distinct ones nearest to it. A pair is there once, as two
-/// indices of positions, the lower one first. Pairs are sorted. All coordinates must be finite. O(n log n).
+/// Pairs of neighbours: each distinct position with the `count` distinct ones nearest to it. Each pair occurs once, as two indices
+/// of positions, the lower one first. Pairs are sorted. All coordinates must be finite. O(n log n).
 std::vector<std::array<size_t, 2>> neighbor_pairs(const std::vector<glm::dvec3>& positions, size_t count);
 
 }  // namespace ewa::scene

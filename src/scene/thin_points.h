@@ -18,10 +18,11 @@ class PointThinner {
   public:
     explicit PointThinner(size_t most);
 
-    /// Must be finite in float32.
+    /// Adds a point. Its position must be finite in float32.
     void add(const glm::dvec3& position, const std::array<uint8_t, 3>& color);
 
-    /// All points if they are at most `most`, else exactly `most`, in their order. Call it once, at the end.
+    /// Returns all added points if there are at most `most`, else exactly `most` of them, in the order of adding. Call it once, at
+    /// the end.
     PointCloud take();
 
   private:
@@ -42,7 +43,7 @@ class PointThinner {
     PointCloud points_;
 };
 
-/// `points` as PointThinner thins them.
+/// `points`, thinned to at most `most` by PointThinner.
 PointCloud thinned(const PointCloud& points, size_t most);
 
 }  // namespace ewa::scene
