@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Edits of a whole scene: one row of a table each. ewa convert and Python use the same rows.
+// Edits of a splat scene. A table has a row for each edit, which ewa convert and Python share.
 #pragma once
 #include <cstdint>
 #include <glm/mat4x4.hpp>
@@ -12,12 +12,12 @@
 
 namespace ewa::edit {
 
-/// An edit as it was typed. One of the functions is set.
+/// A parsed edit. Exactly one of `filter`, `place` and `change` is set.
 struct Edit {
     std::string text;  // such as "--where opacity=0.1.."
     Filter filter = {};
-    /// Moves the scene. before: what the steps right before it do, which is not applied yet. Returns the matrix of all of them.
-    /// Adds a line on what was found, if there is one.
+    /// Transforms the scene. before: the matrix of the place edits directly before this one, which is not applied yet. Returns the
+    /// matrix of all of them, this one included. May add a line for the user to `remarks`.
     std::function<glm::dmat4(const glm::dmat4& before, std::vector<std::string>& remarks)> place = {};
     /// Merges, reduces or sorts splats.
     std::function<void(Gaussians&)> change = {};
@@ -25,10 +25,10 @@ struct Edit {
 
 struct Row {
     const char* name;   // "where" of --where
-    const char* value;  // what it takes, for the help. Empty: nothing
+    const char* value;  // the edit's value, for the help; empty: no value
     const char* help;
     Edit (*parse)(const std::string& value);  // throws InputError that begins with --name
-    const char* brief = "";                   // in the short help; empty: only the whole help has it
+    const char* brief = "";  // text of the short help; empty: only the whole help has the edit
 };
 
 std::span<const Row> rows();
@@ -37,21 +37,21 @@ std::span<const Row> rows();
 Edit parse(std::string_view name, const std::string& value = "");
 
 struct Outcome {
-    std::string text;      // of the edit
-    bool removes;          // it is a filter; else it merged splats
+    std::string text;      // Edit::text
+    bool removes;          // the edit is a filter; else it merged splats
     size_t before, after;  // splats
 };
 
 struct Applied {
-    std::vector<Outcome> outcomes;  // of filters, and of other edits that have changed the number of splats
-    std::vector<std::string> remarks;  // of steps
+    std::vector<Outcome> outcomes;     // of filters, and of edits that have changed the number of splats
+    std::vector<std::string> remarks;  // of place edits
     bool moved = false;
     std::vector<uint32_t>
         left;  // indices of the splats that filters have kept; only if no edit merges or sorts splats
 };
 
-/// Applies the edits in order. Steps that follow one another move the scene once. cameras: of the run, whose splats have not moved.
-/// Throws InputError that names the edit.
+/// Applies the edits in order. Consecutive place edits transform the scene once. cameras: those of the splats' run, in the world
+/// before any edit. Throws InputError that names the edit.
 Applied apply(Gaussians& gaussians, std::span<const Edit> edits, const Cameras& cameras = {});
 
 }  // namespace ewa::edit

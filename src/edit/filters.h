@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Filters: which splats of a scene stay.
+// Filters, which decide for each splat of a scene whether it stays.
 #pragma once
 #include <functional>
 #include <string>
@@ -10,10 +10,10 @@
 
 namespace ewa::edit {
 
-/// The cameras of the run that the splats are of. Throws InputError if there are none.
+/// Returns the cameras of the run that trained the splats. Throws InputError if there are none.
 using Cameras = std::function<std::vector<Camera>()>;
 
-/// Whether each splat stays.
+/// Returns for each splat whether it stays.
 using Filter = std::function<std::vector<bool>(const Gaussians&, const Cameras&)>;
 
 /// Parses a filter of --where. Throws InputError that begins with `what`.
@@ -23,11 +23,11 @@ using Filter = std::function<std::vector<bool>(const Gaussians&, const Cameras&)
 ///   sphere=x,y,z,R     the centre is in this sphere
 Filter parse_filter(const std::string& text, const std::string& what);
 
-/// No value is infinite or NaN, and the quaternion is not zero.
+/// A filter that keeps drawable splats (ewa/gaussians.h).
 std::vector<bool> drawable_splats(const Gaussians& gaussians);
-/// The splat is in a group of at least 10 that touch others of about their size.
+/// A filter that keeps splats in groups of at least 10 splats that touch (scene::touching_groups).
 std::vector<bool> grounded_splats(const Gaussians& gaussians);
-/// The splat is in the largest group of such splats.
+/// A filter that keeps the largest group of splats that touch.
 std::vector<bool> largest_cluster(const Gaussians& gaussians);
 
 /// The scene in grey, with splats that are not in `left` in red. left: ascending indices into `all`.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Steps that move a scene, as people type them.
+// The parsing of transforms of a scene, as users type them.
 #pragma once
 #include <glm/mat4x4.hpp>
 #include <string>
@@ -14,11 +14,11 @@ namespace ewa::edit {
 /// step.
 glm::dmat4 parse_transform(const std::vector<std::string>& steps, const std::string& what = "--transform");
 
-/// Parses --scale-to, "x,y,z,X,Y,Z,LENGTH". Returns the factor by which the scene grows about the world's origin, so that the two points
-/// are LENGTH apart after `transform` and it. Throws InputError.
+/// Parses --scale-to, "x,y,z,X,Y,Z,LENGTH". Returns the factor of a scaling about the world's origin. After `transform` and this
+/// scaling, the two points are LENGTH apart. Throws InputError.
 double parse_scale_to(const std::string& text, const glm::dmat4& transform = glm::dmat4(1.0));
 
-/// Transforms the splats. Throws InputError, which begins with `what`, if fewer of them could be drawn afterwards.
+/// Transforms the splats. Throws InputError, which begins with `what`, if fewer splats would be drawable afterwards.
 void place_splats(Gaussians& gaussians, const glm::dmat4& matrix, const std::string& what);
 
 }  // namespace ewa::edit
