@@ -4,8 +4,8 @@
 
 namespace ewa::folders {
 
-/// The options with their present names. A flag of an earlier version becomes the value that it meant, and goes before a
-/// value of the present name. Whatever is no object of JSON stays.
+/// The options with their present names. A former flag becomes the value that it meant, which replaces a value under the present
+/// name. Returns JSON that is no object unchanged.
 template <class Json>
 Json with_present_names(Json options) {
     struct Former {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A training run, for those who read its folder: its splats, its dataset and its options.
+// A training run as its folder has it: splats, dataset and options.
 #pragma once
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -13,15 +13,15 @@ namespace ewa::folders {
 struct Run {
     std::filesystem::path folder;
     std::filesystem::path splats;  // folder/splats.ply; empty if there is none yet
-    /// Of the splats: config.json's dataset, or the one that the run made of a mesh scene, photos or a video. Empty if it was not
-    /// found; named_dataset then says which.
+    /// The dataset of the splats: that of config.json, or the one that the run made of a mesh scene, photos or a video. Empty if
+    /// the dataset was not found; named_dataset is then its name.
     std::filesystem::path dataset;
-    std::string named_dataset;                         // as in config.json; empty: none
-    nlohmann::json config = nlohmann::json::object();  // of the run; empty if it cannot be read
+    std::string named_dataset;                         // the dataset's path in config.json; empty: none
+    nlohmann::json config = nlohmann::json::object();  // contents of config.json; empty if it cannot be read
 
     /// folder/cameras.json, the refined cameras of the dataset; empty if there is none.
     std::filesystem::path refined_cameras() const;
-    /// Whether the run made its dataset, of named_dataset.
+    /// Whether the run made its dataset, from the input named_dataset.
     bool made_dataset() const;
     /// The option's text in config.json; empty if it is not a text.
     std::string text(const char* option) const;
@@ -31,24 +31,24 @@ struct Run {
     bool flag(const char* option) const;
 };
 
-/// The folder that a path of the run's config.json is relative to: empty for the current one, or any folder above the run.
-/// No value if the path names nothing there.
+/// The folder to which a path in the run's config.json is relative: the current one (an empty path), or a folder above the run. No
+/// value if the path exists in none of them.
 std::optional<std::filesystem::path> base_of(const std::filesystem::path& run,
                                              const std::filesystem::path& named);
 
-/// The run whose folder this is, also if it has just begun: with config.json, splats.ply or metrics.jsonl. Empty for
-/// any other path. The dataset is searched relative to the folder where the training was started: the current one, or
-/// any folder above the run.
+/// The run in this folder, which has config.json, splats.ply or metrics.jsonl; the run may just have begun. Empty for any other
+/// path. The dataset is searched relative to the folder where the training was started: the current one, or any folder above the
+/// run.
 std::optional<Run> find_run(const std::filesystem::path& folder);
 
-/// The runs in this folder, such as "out/a, out/b and 3 more". Empty if there are none.
+/// A text on the runs in this folder, such as "out/a, out/b and 3 more". Empty if there are none.
 std::string runs_in(const std::filesystem::path& folder);
 
 /// The run that wrote this splat file: splats.ply, or one that --keep stores, with config.json beside it. Empty for any other path.
 std::optional<Run> run_of_splats(const std::filesystem::path& splats);
 
-/// The folder of the run that this path is a file of, also through symbolic links: it has the name of such a file, and a
-/// run's config.json is in its folder. The file itself need not exist. Empty for any other path.
+/// The folder of the run to which this file belongs, also through symbolic links. The file has the name of a run's file, and its
+/// folder has a run's config.json. The file need not exist. Empty for any other path.
 std::optional<std::filesystem::path> run_of_file(const std::filesystem::path& file);
 
 }  // namespace ewa::folders

@@ -27,7 +27,7 @@ inline constexpr std::array kRunFiles{kConfigFile,  kMetricsFile, kCheckpointFil
                                       kSplatsFile,  kSummaryFile, kReportFile,     kOldExposuresFile,
                                       kCamerasFile, kEventsFile,  kAppearanceFile, kSkyFile};
 
-/// The port and the token of a run that is served.
+/// The file with the port and the token under which a running training serves its state.
 inline constexpr const char* kLiveFile = "live.json";
 
 /// The renders of held-out and of training images.
@@ -55,16 +55,16 @@ std::string name_of_kept_splats(int step);
 /// Whether a file of a run has this name.
 bool is_run_file(std::string_view name);
 
-/// Removes a symbolic link at the path, through which nothing is to be written. Returns the path.
+/// Removes a symbolic link at the path, so that a later write does not follow the link. Returns the path.
 const std::filesystem::path& without_link(const std::filesystem::path& path);
 
-/// A folder that a run may have. It reads or changes nothing by itself.
+/// The path of a run's folder, which need not exist. The constructor reads and changes nothing.
 class RunFolder {
   public:
     explicit RunFolder(std::filesystem::path path) : path_(std::move(path)) {}
 
     const std::filesystem::path& path() const { return path_; }
-    /// The path of one of the names above.
+    /// The path of the file or folder with this name in the run's folder.
     std::filesystem::path operator/(std::string_view name) const { return path_ / name; }
     /// Whether the folder has this file.
     bool has(std::string_view name) const { return core::is_file(path_ / name); }
@@ -81,14 +81,14 @@ class RunFolder {
     core::FolderLock lock() const;
     /// Removes symbolic links in the places of the run's files: a folder from an archive may have some, which lead out of it.
     void remove_links() const;
-    /// Removes the checkpoint and the results of an earlier run, but its splats and its log.
+    /// Removes the checkpoint and the results of an earlier run, but not splats.ply and metrics.jsonl.
     void remove_results() const;
 
   private:
     std::filesystem::path path_;
 };
 
-/// RunFolder::is_run().
+/// Whether the folder has a run: see RunFolder::is_run.
 bool is_run(const std::filesystem::path& folder);
 
 /// Whether ewa has made the folder: a training run, or a dataset of photos. Images in it are not used as photos.
