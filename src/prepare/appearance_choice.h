@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The exposures of training images before any splat is trained: by their colours of the points that they show, or by EXIF.
+// The exposures of training images, estimated before training: from the images' colours at the dataset's points, or from EXIF.
 #pragma once
 #include <string>
 #include <vector>
@@ -10,11 +10,11 @@
 
 namespace ewa::train {
 
-/// The difference between images in the colours of the points that they show, minus the difference that is expected by chance.
+/// How much images differ in the colours of the points that they show, minus the difference that is expected by chance.
 struct Disagreement {
-    int images = 0;       // that were compared; 0: they have neither points nor EXIF
+    int images = 0;       // number of compared images; 0: neither points nor EXIF
     double exposure = 0;  // root mean square over the images, stops of the stored values
-    double color = 0;     // the same of red and blue against green
+    double color = 0;     // the same for red and blue relative to green
     bool by_exif = false;
 };
 
@@ -26,8 +26,8 @@ Disagreement disagreement_of(const Dataset& dataset, const std::vector<int>& fra
 /// The frames whose images disagreement_of reads.
 std::vector<int> compared_frames(const std::vector<int>& frames);
 
-/// The exposure of each frame's image in stops of the stored values, against their mean: what PPISP starts from. 0 where neither
-/// points nor EXIF say it. Throws as disagreement_of.
+/// The first exposures of PPISP: for each frame, its image's exposure in stops of the stored values, relative to the mean. 0 where
+/// neither points nor EXIF give it. Throws as disagreement_of.
 std::vector<float> first_exposures(const Dataset& dataset, const std::vector<int>& frames);
 
 struct AppearanceChoice {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Training images that show less than the others because the camera or the focus moved.
+// Finds training images that are blurred by camera motion or defocus.
 #pragma once
 #include <string>
 #include <vector>
@@ -8,11 +8,11 @@
 
 namespace ewa::train {
 
-/// Those of the frames whose image is blurred far more than most (image::blur_effect). Reads all their images. Throws
-/// InputError.
+/// The frames whose image is blurred far more than most (image::blur_effect). Reads the images of all `frames`. Throws InputError.
 std::vector<int> blurred_frames(const Dataset& dataset, const std::vector<int>& frames);
 
-/// --skip-blurred: takes those of the training frames out. Returns a remark, empty if there are none. Throws InputError.
+/// --skip-blurred: removes blurred_frames from the training frames. Returns a remark, or an empty text if none is blurred. Throws
+/// InputError.
 std::string skip_blurred(const Dataset& dataset, Split& split);
 
 }  // namespace ewa::train

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points where the depth maps of a dataset are.
+// Points on the surfaces in a dataset's depth maps.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace ewa::train {
 
-/// Whether one of the frames has a depth map that its lens allows.
+/// Whether one of the frames has a depth map and a lens for which takes_depth_map is true.
 bool has_depth_maps(const Dataset& dataset, const std::vector<int>& frames);
 
 /// An image, its depths (view z, 0 for none) and its pinhole, all of one size.
@@ -17,7 +17,8 @@ struct ImageWithDepths {
     const Image& image;
     const Image& depths;
 };
-/// Adds at most `count` points in world coordinates, spread over the pixels with a depth, with their colours. seed, index: choose them.
+/// Adds at most `count` points in world coordinates, spread over the pixels with a depth, with the pixels' colours. seed and index
+/// determine the choice of pixels.
 void add_points(const ImageWithDepths& from, uint32_t count, uint64_t seed, uint32_t index,
                 PointCloud& points);
 
