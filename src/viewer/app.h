@@ -19,7 +19,7 @@ class App {
 
     /// Runs until the window is closed or the requested files are written. Throws RunError, InputError.
     void run();
-    /// What the next session should start with.
+    /// The settings that the next session starts with.
     KeptSettings kept() const;
 
   private:
@@ -39,7 +39,7 @@ class App {
 
     ViewState state_;
     std::unique_ptr<Screen> screen_;
-    double screen_text_ = 0;  // text_height() of the screen
+    double screen_text_ = 0;  // ViewState::text_height() when screen_ was created
     bool dragging_wipe_ = false;
     Navigation navigation_;
     Shown shown_;

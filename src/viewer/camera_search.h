@@ -14,20 +14,20 @@
 
 namespace ewa::viewer {
 
-/// The folder of the run that `ewa train` would write for this input. If it exists, the first free one with a number appended.
-/// or_own_photos: also takes an existing one whose folder `dataset` was made, or begun, from these photos.
+/// The folder that `ewa train` would write for this input. If it exists, the first numbered name that does not exist.
+/// or_own_photos: also returns an existing folder whose subfolder `dataset` was made, or begun, from these photos.
 std::filesystem::path free_run_folder(const std::filesystem::path& input, bool or_own_photos = false);
 
 class CameraSearch {
   public:
-    /// wake: called on a thread when progress() has changed, and at the end.
+    /// wake: called on the thread of the search when progress() has changed, and at the end of the search.
     explicit CameraSearch(std::function<void()> wake) : wake_(std::move(wake)) {}
     /// Stops the search. Finished steps stay on disk.
     ~CameraSearch() { cancel(); }
     CameraSearch(const CameraSearch&) = delete;
     CameraSearch& operator=(const CameraSearch&) = delete;
 
-    /// Starts to make the dataset `folder`. Only while none is running.
+    /// Starts a search, which makes the dataset `folder` of the photos. No other search may be running.
     void start(const std::filesystem::path& photos, const std::filesystem::path& folder,
                const CaptureOptions& options);
     bool running() const { return found_.valid(); }
@@ -35,7 +35,7 @@ class CameraSearch {
     void cancel() { stop_ = true; }
     CaptureProgress progress() const;
 
-    /// Once it has ended: the dataset, as opened. Empty if it was cancelled. Throws InputError, RunError.
+    /// Returns the opened dataset once the search has ended. Empty if the search was cancelled. Throws InputError, RunError.
     std::optional<OpenedScene> take() { return found_.get(); }
 
   private:

@@ -16,8 +16,8 @@
 
 namespace ewa::viewer {
 
-/// |rendering - image| per channel, in the size of the render. The image fills `place` (px of the render) and
-/// is sampled bilinearly; outside of it the result is black.
+/// |rendering - image| per channel, in the size of the render. The image is sampled bilinearly to fill `place`
+/// (px of the render). The result is black outside `place`.
 ByteImage difference(const ByteImage& rendering, const ByteImage& image, const Rectangle& place);
 /// Multiplies every value by `gain`, up to 255.
 void amplify(ByteImage& picture, float gain);
@@ -26,7 +26,7 @@ struct ImageRequest {
     uint64_t scene = 0;  // ImageComparison::scene_
     int index = -1;
     Frame frame;
-    Size size;                          // of its place in the window, px
+    Size size;                          // of the image's place in the window, px
     std::array<float, 3> background{};  // behind transparent pixels
 };
 
@@ -58,15 +58,15 @@ Compared compare_with_image(const ComparisonRequest& request);
 /// Loads the image of the camera that the view is at, and compares it with the render, on threads of its own.
 class ImageComparison {
   public:
-    /// wake: called on the threads when take() has something new.
+    /// wake: called on the threads that load and compare, when take() has something new.
     explicit ImageComparison(const std::function<void()>& wake)
         : images_(load_camera_image, wake), comparisons_(compare_with_image, wake) {}
 
     /// Forgets the image: frame indices of another scene mean other images.
     void forget_scene();
-    /// Loads the image of a frame, unless a loaded or requested one serves for this place and background.
+    /// Loads the image of a frame. Does nothing if a loaded or requested image already serves for this place (px) and background.
     void load(int index, const Frame& frame, Size place, const std::array<float, 3>& background);
-    /// Starts the comparison, unless it is running or done. Empty: none.
+    /// Starts this comparison, unless it is running or done. An empty request drops the last comparison.
     void compare(const std::optional<ComparisonRequest>& request);
     enum class News { none, comparison, image };
     News take();

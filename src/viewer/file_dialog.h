@@ -12,10 +12,10 @@ namespace ewa::viewer {
 
 enum class Wanted { file, folder };
 
-/// Asks by the desktop's portal, else by the program zenity or kdialog, on a thread of its own.
+/// Asks through the desktop's portal, or without one through the program zenity or kdialog. Runs on a thread of its own.
 class FileDialog {
   public:
-    /// wake: called on the thread when take() has an answer.
+    /// wake: called on the thread of the dialog when take() has an answer.
     explicit FileDialog(std::function<void()> wake) : wake_(std::move(wake)) {}
     /// Closes the dialog.
     ~FileDialog() { stop_ = true; }
@@ -25,7 +25,7 @@ class FileDialog {
     /// Opens the dialog, unless one is open.
     void ask(Wanted wanted);
     bool open() const { return answer_.valid(); }
-    /// What the user has chosen, once. Throws RunError where there is no dialog.
+    /// Returns the path that the user has chosen, once. Throws RunError if the system has no such dialog.
     std::optional<std::filesystem::path> take();
 
   private:
@@ -34,8 +34,8 @@ class FileDialog {
     std::future<std::filesystem::path> answer_;  // its thread ends before the rest
 };
 
-/// Asks org.freedesktop.portal.FileChooser on the session bus. Returns false if nobody answers there. chosen: empty if the
-/// user has cancelled, or `stop` was set.
+/// Asks org.freedesktop.portal.FileChooser on the session bus. Returns false if no portal answers on the bus. chosen: the path;
+/// empty if the user has cancelled, or `stop` was set.
 bool ask_portal(Wanted wanted, const std::atomic<bool>& stop, std::filesystem::path& chosen);
 
 /// The path of a file:// URI; empty for anything else.

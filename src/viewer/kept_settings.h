@@ -8,7 +8,7 @@
 
 namespace ewa::viewer {
 
-inline constexpr float kLeastText = 0.5f, kMostText = 3;  // times the usual size
+inline constexpr float kLeastText = 0.5f, kMostText = 3;  // limits of text_scale
 
 struct KeptSettings {
     std::optional<Size> window;  // logical px: of a screen with a content scale of 1
@@ -21,9 +21,9 @@ struct KeptSettings {
 /// $XDG_CONFIG_HOME/ewa/view.json, else ~/.config/ewa/view.json. Empty if the environment names neither.
 std::filesystem::path settings_file();
 
-/// Never throws: an absent or damaged file gives the usual settings, and so does a value out of its range.
+/// Never throws: an absent or damaged file gives the default settings. A value out of its range gets its default.
 KeptSettings read_settings(const std::filesystem::path& file);
-/// Never throws: a session does not depend on it. Members of the file that this version does not know are lost.
+/// Never throws, because the window works without the file. Members of the file that this version does not know are lost.
 void write_settings(const std::filesystem::path& file, const KeptSettings& settings);
 
 }  // namespace ewa::viewer

@@ -8,7 +8,7 @@ namespace ewa::viewer {
 
 enum class Comparison { none, beside, wipe, difference };
 
-/// In pixels, from the top left corner.
+/// Position and size in px. The origin is the window's top left corner.
 struct Rectangle {
     int x = 0, y = 0, width = 0, height = 0;
     bool operator==(const Rectangle&) const = default;
@@ -22,12 +22,12 @@ inline constexpr double kTextHeight = 16;     // of the panel's text, at a conte
 inline constexpr double kPanelWidth = 19;     // in heights of the text
 inline constexpr Size kUsualSize{1280, 800};  // of a picture that no camera sets
 
-/// The part of the window beside the panel. A panel that would take more than half of the width is not beside the picture:
-/// the whole window is free. panel: its width; 0: it is hidden.
+/// The part of the window that the panel does not cover. A panel wider than half of the window lies over the picture, so
+/// this part is the whole window. panel: the panel's width; 0: it is hidden.
 Rectangle free_area(Size window, int panel);
 
-/// Places in the window. Beside: each picture gets half of the area, left and right or one above the other, whichever
-/// shows the image larger. Otherwise the render fills the area, and the image the part that its camera saw.
+/// Places of both pictures in the window. With Comparison::beside, each gets half of the area, left and right or one above
+/// the other, whichever shows the image larger. Else the render fills the area, and the image the part that its camera saw.
 struct Arrangement {
     Rectangle rendering, image;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The text over the picture that goes by itself.
+// Text over the picture that disappears after some seconds.
 #pragma once
 #include <chrono>
 #include <string>

@@ -24,7 +24,7 @@ struct Film {
     int frames = 0, next = 0;
     uint64_t waits_for = 0;  // serial of the frame that is being written; 0: none
 
-    /// The keys are kRate * seconds frames apart; the first and last key are frames.
+    /// Two neighbouring views are kRate * seconds frames apart. The first and the last view are frames of the film.
     Film(const std::vector<io::NamedView>& views, const std::filesystem::path& folder, Size size,
          double seconds);
     bool finished() const { return next >= frames; }
@@ -36,15 +36,15 @@ class Navigation {
   public:
     explicit Navigation(ViewState& state);
 
-    /// Forgets the places in the scene before. frame: of the dataset, whose camera the view is at.
+    /// Shows the scene in state_, and forgets views of the previous scene. frame: the dataset's frame whose camera is the view.
     void enter_scene(std::optional<int> frame);
-    /// The first splats tell what to look at, unless the user has moved the camera.
+    /// Chooses the first view once the scene has splats, unless the user has already moved the camera.
     void take_splats();
 
     void handle_key(const KeyPress& press);
     void obey(const PanelActions& actions);
     void drag(double right, double down, Size place);
-    /// Turns the turntable, and flies where the held keys say.
+    /// Moves the camera by the motion of so many seconds: around the turntable, and in the directions of the held keys.
     void move(double seconds);
     bool flying() const;
 
@@ -55,15 +55,15 @@ class Navigation {
     const Frame& frame() const { return state_.scene.dataset->frames[size_t(*at_camera)]; }
 
     void start_film();
-    /// Asks for the next frame once the last one is written.
+    /// Requests the render of the film's next frame once the previous frame is written.
     void continue_film(Renders& renders);
 
     ViewCamera view;
     std::optional<int> at_camera;       // the frame of the dataset whose camera the view is at
     std::optional<int> pointed_camera;  // the frame whose camera is under the pointer
-    double camera_size = 1;             // of a drawn camera, world units
-    bool framed = false;                // the first view was chosen when there were splats
-    std::vector<io::NamedView> views;   // saved under a number, which is the name
+    double camera_size = 1;             // size of a drawn camera's frustum, world units
+    bool framed = false;                // the first view was chosen from splats, not before any were there
+    std::vector<io::NamedView> views;   // saved views; the name of each is the number of its key
     std::optional<Film> film;
 
   private:

@@ -17,14 +17,14 @@ void draw_help(bool& open);
 
 struct CamerasShown {
     const Dataset& dataset;
-    const std::vector<CameraSupport>& supports;  // of its frames; empty: not known
+    const std::vector<CameraSupport>& supports;  // of its frames; empty: unknown
     const Camera& view;                          // of the size of `place`
     Rectangle place;                             // of the render in the window, px
     double size = 1;                             // of a frustum, world units
-    std::optional<int> at_camera;                // this one is not drawn: it would frame the image
+    std::optional<int> at_camera;  // not drawn: the frustum of the view's own camera would frame the image
 };
 
-/// Draws the frustum of each camera. Returns the one under the pointer, which also shows its name and what holds it.
+/// Draws the frustum of each camera. Returns the frame whose camera is under the pointer, and shows its name and support.
 std::optional<int> draw_cameras(const CamerasShown& cameras);
 
 /// Marks the points that are measured, with their distance. view: of the size of `place`.
@@ -41,16 +41,16 @@ bool over_wipe(const Rectangle& image, float wipe);
 void draw_note(const std::string& note, const Rectangle& area);
 /// The first keys to know, at the lower border. images: there are images to compare with.
 void draw_hint(bool images, bool panel, const Rectangle& area);
-/// What the picture is, at the upper border.
+/// A line at the upper border that says what the picture shows.
 void draw_banner(const std::string& text, const Rectangle& area);
-/// In the middle: one line in large letters, and an explanation below it.
+/// One line in large letters in the middle of the window, and an explanation below it.
 struct Headline {
     std::string text, explanation;
 };
 void draw_headline(const Headline& headline, const Rectangle& area);
-/// Below the headline of an empty window. Returns what a clicked button asks for.
+/// Draws two buttons below the headline of an empty window. Returns whether the clicked one opens a file or a folder.
 std::optional<Wanted> draw_open_buttons(const Rectangle& area);
-/// How far the search for cameras is. Returns whether its button is clicked.
+/// Shows the progress of the search for cameras, and a button. Returns whether the button is clicked.
 bool draw_search(const CaptureProgress& progress, const Rectangle& area);
 
 }  // namespace ewa::viewer

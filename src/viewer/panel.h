@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The panel at the left of the window. Each of its rows keeps its place: a row that has nothing to say is empty. The
+// The panel at the left of the window. A row that has nothing to show stays empty, so that the others do not move. The
 // functions change only their arguments.
 #pragma once
 #include <filesystem>
@@ -20,14 +20,14 @@ namespace ewa::viewer {
 struct PanelFacts {
     const OpenedScene& scene;
     const std::string& device;
-    std::optional<bool> on_cpu;    // whether the device is one; empty: not known
+    std::optional<bool> on_cpu;    // whether the device is a CPU; empty: not known
     const RenderedFrame* picture;  // null: none yet
     const std::vector<io::NamedView>& views;
     const live::Update* run;           // null: no training run
     std::filesystem::path run_folder;  // of that run; may be empty
-    bool drawing;                      // a better frame follows
-    std::string note;                  // the last message, once it is not over the picture
-    std::string image_failure;         // why there is no image
+    bool drawing;                      // the frame is not final: a better one is being rendered
+    std::string note;                  // the last message, after the picture no longer shows it
+    std::string image_failure;         // why the camera's image cannot be shown
     std::optional<double> psnr;        // of this view against the image
     const SessionTimes& times;
     std::optional<float> film;  // share of the film that is written; empty: no film
@@ -44,7 +44,7 @@ struct PanelSettings {
     float wipe = 0.5f;  // share of the width that shows the image
     float gain = 4;     // factor of the difference image
     bool cameras = false, turntable = false;
-    bool parallel = false;   // the picture has parallel rays
+    bool parallel = false;   // orthographic projection
     bool measure = false;    // clicks choose points, whose distance is shown
     float film_seconds = 2;  // from one view to the next
     float text_scale = 1;    // times the size that the monitor asks for

@@ -64,31 +64,31 @@ struct FullRender {
     Image color;
 };
 
-/// Opens the device that renders; called on the thread.
+/// Opens the device that renders. The render thread calls it.
 using OpenDevice = std::function<std::shared_ptr<gpu::Device>()>;
 
 class RenderThread {
   public:
-    /// on_news is called on the thread when take_news() has something new. A lost device is opened again,
-    /// once for each frame that fails.
+    /// on_news: called on the render thread when take_news() has something new. If the device is lost, the thread opens
+    /// it again, once for each frame that fails.
     RenderThread(OpenDevice open, std::function<void()> on_news);
     ~RenderThread();
 
-    /// Sets the scene of all frames requested from now on. coarse: the same with fewer splats, for RenderRequest::coarse; null:
+    /// Sets the scene of all frames requested from now on. coarse: the scene with fewer splats, for RenderRequest::coarse; null:
     /// none. Returns the number that RenderedFrame::scene will have.
     uint64_t set_scene(std::shared_ptr<const Gaussians> gaussians,
                        std::shared_ptr<const Gaussians> coarse = nullptr);
     /// Replaces a waiting request that has no file. The frame that is being rendered is finished first.
     void ask(const RenderRequest& request);
-    /// Asks for the point on the surface at a pixel, by its median depth. News::points has it with the returned number. Points to
-    /// measure are all answered, at full resolution, which takes a frame's time. A point to look at replaces a waiting one.
+    /// Requests the surface point at a pixel, by its median depth. News::points has it with the returned number. Each request with
+    /// PointUse::measure renders at full resolution, and is answered. One with PointUse::look_at replaces a waiting one.
     uint64_t ask_point(const Camera& camera, const glm::dvec2& pixel, PointUse use);
 
     /// Drops waiting requests for points. The one in progress is still answered.
     void forget_points();
 
-    /// Asks for the colours of a camera at its own size. News::full has them once its number is the returned one. Only
-    /// the last of several waiting requests is answered.
+    /// Requests the colours of a camera at its own size. News::full has them once its number is the returned one. A new
+    /// request replaces one that waits.
     uint64_t ask_full(const Camera& camera, const Look& look);
 
     struct News {

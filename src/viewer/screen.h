@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What shows images and Dear ImGui in the window.
+// Shows images and the panel, which Dear ImGui draws, in the window.
 #pragma once
 #include <array>
 #include <span>
@@ -16,7 +16,7 @@ namespace ewa::viewer {
 struct Layer {
     enum Slot { rendering, image } slot = rendering;
     Rectangle target;            // inside the window
-    double left = 0, right = 1;  // shares of the image's width; the height is complete
+    double left = 0, right = 1;  // columns shown, as shares of the image's width; all rows are shown
 };
 
 /// Copies images and the panel to the window.
@@ -74,7 +74,7 @@ class Presenter {
 /// Dear ImGui on one window.
 class Gui {
   public:
-    /// The window's own callbacks must be set before: those of ImGui call them. text: its height, px.
+    /// Set the window's own callbacks first, because those of ImGui call them. text: height of the text, px.
     Gui(const Window& window, const PresentDevice& device, Presenter& presenter, double text);
     ~Gui();
 
@@ -88,7 +88,7 @@ class Gui {
     vk::UniqueDescriptorPool pool_;
 };
 
-/// Created again if its device is lost, or the size of the text changes.
+/// The objects that depend on the device and the text size. They are created again if the device is lost or the size changes.
 struct Screen {
     Screen(const WindowSystem& system, Window& window, const std::string& device_name, double text)
         : device(system, window, device_name), presenter(device), gui(window, device, presenter, text) {}

@@ -15,34 +15,34 @@
 
 namespace ewa::viewer {
 
-/// Its threads call wake() of the window system. It must end before that does.
+/// The picture and its comparison. Its threads call WindowSystem::wake(), so the WindowSystem must outlive it.
 class Shown {
   public:
     Shown(ViewState& state, Navigation& navigation);
 
     void enter_scene();
-    /// Takes the results of the threads. Throws their errors in a script, and for the first frame.
+    /// Takes the results of the render thread. Throws its errors if a command line writes a file, and for the first frame.
     void take_renders();
     void take_comparison(Presenter& presenter);
     /// Asks for a render of the view, unless the window is minimised, or a film sets the cameras.
     void ask();
-    /// Looks at the point, or makes it one of `measurement`.
+    /// Requests the surface point at a pixel, to turn the view to it or to add it to `measurement`.
     void ask_point(const glm::dvec2& pixel, PointUse use);
     /// Turns measuring on or off. Off: drops the points, and requests that still wait.
     void set_measuring(bool on);
-    /// Writes the render alone, in floating point.
+    /// Writes the render as an EXR file in floating point, without the panel and other drawings.
     void write_exr();
 
-    /// Before a frame of the window: loads the image that it needs.
+    /// Loads the camera's image if the next frame of the window needs it. Call it before that frame.
     void load_image();
-    /// After its input: gives the presenter the render or its difference to the image. The last difference stays until
-    /// the next is ready.
+    /// Gives the presenter the render, or its difference to the image. Call it after the frame's input. The last
+    /// difference stays until the next is ready.
     void choose_picture(Presenter& presenter);
     void measure_view();
-    /// Gives a new presenter the pictures.
+    /// Gives the render or difference, and the camera's image, to a presenter that was created again.
     void fill(Presenter& presenter);
     std::vector<Layer> layers() const;
-    /// Whether all that the settings ask for is shown.
+    /// Whether the window shows the final render, and the comparison that the settings ask for.
     bool complete() const;
 
     Comparison comparison() const {
@@ -53,7 +53,7 @@ class Shown {
     void change_comparison();
     Arrangement arrangement() const;
     Camera camera() const;  // of the size of the render's place
-    /// The look of the settings. For other cameras than pinholes, without modes that need a pinhole.
+    /// The look of the settings. If the camera's lens has distortion, splats are not drawn as points.
     Look look_for(const Camera& camera) const;
     std::string image_failure() const;    // why the camera has no image; else empty
     const std::optional<double>& psnr();  // for the panel, dB

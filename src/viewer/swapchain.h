@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The Vulkan device that shows images in a window, and its swapchain. The device that renders is opened
-// without a window.
+// The Vulkan device that shows images in a window, and its swapchain. Rendering uses another device object, which
+// needs no window (gpu::Device).
 #pragma once
 #include <optional>
 
@@ -58,7 +58,7 @@ class Swapchain {
   public:
     explicit Swapchain(const PresentDevice& device);
 
-    /// Returns false if the window has no size. No old image is in use afterwards.
+    /// Creates the images for this size, px. Returns false if the window has no size. The device no longer uses the old images.
     bool recreate(Size window);
 
     /// The index of the next image; its `acquired` semaphore will be signalled. Empty if the window has

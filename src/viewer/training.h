@@ -14,7 +14,7 @@
 
 namespace ewa::viewer {
 
-/// `ewa train` from beside this program, with `--serve 0`. It never waits for the window.
+/// A process of `ewa train --serve 0`. Its program is the `ewa` in this program's folder. It never waits for the window.
 class TrainProcess {
   public:
     /// arguments: DATASET and options of ewa train. Throws RunError if it cannot be started.
@@ -24,10 +24,10 @@ class TrainProcess {
     TrainProcess(const TrainProcess&) = delete;
     TrainProcess& operator=(const TrainProcess&) = delete;
 
-    /// Whether ewa train takes these options. If not, it has printed the reason. Throws RunError if it cannot be started.
+    /// Whether ewa train accepts these options. If not, ewa train has printed the reason. Throws RunError if it cannot be started.
     static bool accepts(const std::vector<std::string>& arguments, const std::filesystem::path& output);
 
-    /// The exit status once it has ended; 128 + the signal if one ended it.
+    /// The exit status once the training has ended: 128 + the signal's number if a signal ended it. Empty before.
     std::optional<int> status();
 
   private:
@@ -35,16 +35,16 @@ class TrainProcess {
     std::optional<int> status_;
 };
 
-/// The command that makes a page of the run in this folder; empty without a folder.
+/// The command line that makes a web page of the run in this folder. Empty if `folder` is.
 std::string how_to_share(const std::filesystem::path& folder);
 
 /// The training run that the window watches, if any.
 class LiveRun {
   public:
-    /// wake: called on a thread when take() has something new.
+    /// wake: called on the watcher's thread when take() has something new.
     explicit LiveRun(std::function<void()> wake) : wake_(std::move(wake)) {}
 
-    /// trainer: that of the run if the viewer started it, or null. It must live until the next call of watch() or stop().
+    /// trainer: the run's process if the viewer started it, or null. It must live until the next call of watch() or stop().
     void watch(const live::WhatToWatch& what, TrainProcess* trainer);
     void stop() {
         watcher_.reset();

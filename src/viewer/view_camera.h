@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The camera of the window: the first view of a scene, and motions by mouse and keys around a pivot, towards it, or freely.
-// Independent of the window.
+// The camera of the window: the first view of a scene, and motions by mouse and keys. They turn around a pivot, approach it, or
+// fly freely. Independent of the window.
 #pragma once
 #include <glm/geometric.hpp>
 
@@ -23,12 +23,12 @@ class ViewCamera {
   public:
     explicit ViewCamera(const Viewpoint& start) : start_(start) { reset(); }
 
-    /// Angles in radians of a drag to the right and down. The scene follows the pointer.
+    /// orbit() and look() turn by angles in radians, for a drag to the right and down. The scene follows the pointer.
     void orbit(double right, double down);  // about the pivot
     void look(double right, double down);   // about the camera itself
-    /// Pixels of an image of this size. Points at the distance of the pivot follow the pointer.
+    /// Moves sideways. right, down: the drag in px of an image of this size. Points at the pivot's distance follow the pointer.
     void pan(double right, double down, int width, int height);
-    /// Positive: closer. A step reduces the distance to the pivot by a tenth.
+    /// Moves towards the pivot. A step reduces the distance to it by a tenth; negative steps move away.
     void zoom(double steps);
     /// Moves along the camera axes (x right, y down, z forward), in units of the distance to the pivot.
     void fly(const glm::dvec3& amount);
@@ -61,16 +61,16 @@ struct SceneBounds {
 };
 SceneBounds scene_bounds(const Gaussians& gaussians);
 
-/// Shows the whole scene from the front and slightly above, as `ewa render` does. dataset: gives up and the front; may be
-/// null.
+/// A view of the whole scene from the front and slightly above, as `ewa render` has. dataset: gives the up direction and the
+/// front; may be null.
 Viewpoint framing_view(const Gaussians& gaussians, const Dataset* dataset, int width, int height);
 
 /// The frame whose camera is closest in position and direction; -1 without frames. A turn of 90 degrees
 /// counts as much as a distance of `radius` (world units).
 int nearest_frame(const Dataset& dataset, const Camera& camera, double radius);
 
-/// The size of drawn cameras in world units, above zero: a share of the median distance between neighbours in
-/// name order, or of the scene's radius if all are in one place.
+/// The size of drawn cameras in world units, above zero: a share of the median distance between cameras next in name
+/// order. If all cameras are in one place, a share of the scene's radius.
 double camera_size(const Dataset& dataset, double radius);
 
 /// The camera of a frame. Up is the mean up direction of all cameras; the pivot is at the median depth of the

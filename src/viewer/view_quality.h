@@ -30,10 +30,10 @@ class ViewQuality {
     /// wake: called on a thread when psnr() may have changed.
     explicit ViewQuality(std::function<void()> wake) : measurements_(quality_of, std::move(wake)) {}
 
-    /// Starts to measure this frame of the dataset, unless that has begun already.
+    /// Starts to measure the PSNR of the dataset's frame `index`, unless this measurement has begun already.
     void measure(Renders& renders, int index, const Frame& frame, const Look& look,
                  const Appearance& appearance = kIdentityExposure);
-    /// rendering: the last one of the renders, or null.
+    /// Compares a render with its image, if measure() requested it. rendering: the last full render, or null.
     void take(const std::shared_ptr<const FullRender>& rendering);
     /// Forgets the frame: indices of another dataset mean other images.
     void forget() { index_ = -1; }

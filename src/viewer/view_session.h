@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is on its way into the window, and out of it: scenes that are opened, training runs, and screenshots.
+// Work in the background of the window: opening scenes, watching training runs, finding cameras, and saving screenshots.
 #pragma once
 #include <filesystem>
 #include <future>
@@ -15,21 +15,21 @@
 
 namespace ewa::viewer {
 
-/// Its threads call wake() of the window system. It must end before that does.
+/// Its threads call WindowSystem::wake(), so the WindowSystem must outlive it.
 class ViewSession {
   public:
     ViewSession(ViewState& state, Navigation& navigation, Shown& shown);
 
     /// Opens what the command line asks for.
     void start();
-    /// shown: what the files may add to; an empty scene if they are opened by themselves.
+    /// Opens files. shown: the scene that they may add to, as in open_dropped(); an empty scene if they replace it.
     void open(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown);
     /// Starts `ewa train` on the dataset that is shown, in a folder of its own.
     void train();
     /// Writes a screenshot.
     void save(Image&& image);
 
-    void take_chosen();  // what the file dialog has answered
+    void take_chosen();  // opens the path that the user chose in the file dialog
     void take_opened();
     void take_found();
     void take_saved();
@@ -38,9 +38,9 @@ class ViewSession {
     bool saving() const { return saving_.valid(); }
     bool waiting() const { return opening_.valid() || saving_.valid() || dialog.open(); }
     bool empty() const;  // nothing is open, nor on its way
-    /// What the middle of the picture says where there is nothing to see.
+    /// The text in the middle of the window while it shows no splats.
     std::optional<Headline> headline() const;
-    std::string banner() const;  // what the picture is, if it is no splats
+    std::string banner() const;  // what the picture shows, if not splats
 
     CameraSearch search;
     FileDialog dialog;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the parts of the window share: the window itself, what is open in it, its settings, and what the command line
-// asked for.
+// The state that the parts of the window share: the window itself, the open scene, the settings, and the options of
+// the command line.
 #pragma once
 #include <algorithm>
 #include <chrono>
@@ -31,7 +31,7 @@ struct LaterTraining {
     CaptureOptions capture;
 };
 
-/// What the command line asks for.
+/// The options of the command line.
 struct Startup {
     OpenedScene scene;
     std::optional<int> frame;                      // of the dataset
@@ -54,7 +54,7 @@ struct Startup {
     SessionTimes times;
 };
 
-/// The size of the dataset's camera that the window starts from, or the usual one.
+/// The image size of the dataset's camera that the window starts from. Without a camera, the usual size.
 Size camera_size_or_usual(const Startup& startup);
 /// The first view: of the dataset's camera `frame`, or of the whole scene for an image of this size.
 Viewpoint start_view(const OpenedScene& scene, std::optional<int> frame, Size size);
@@ -62,7 +62,7 @@ std::string window_title(const OpenedScene& scene);
 /// The first of <stem>-1<extension>, <stem>-2<extension>, ... that does not exist.
 std::filesystem::path free_name(const std::string& stem, const std::string& extension);
 
-/// What the loop of the window has still to do.
+/// The state of the window's main loop: the frames that it has still to draw, and whether it ends.
 struct Loop {
     static constexpr int kRedraws = 3;  // frames that ImGui needs to answer input
     std::chrono::steady_clock::time_point last_frame = std::chrono::steady_clock::now();
@@ -84,7 +84,7 @@ struct ViewState {
     void say(const std::string& note);
     double text_height() const;  // px of the framebuffer
     int panel_width() const;     // px of the framebuffer, also while it is hidden
-    bool panel_fits() const;     // beside the picture
+    bool panel_fits() const;     // the window has room for the panel beside the picture
     bool panel_shown() const { return !scripted() && (panel_fits() ? panel_beside : panel_over); }
     /// The part of the window that the panel leaves to the pictures.
     Rectangle picture_area() const;

@@ -22,7 +22,7 @@ class WindowSystem {
     WindowSystem(const WindowSystem&) = delete;
     WindowSystem& operator=(const WindowSystem&) = delete;
 
-    /// The free size for a window on the main monitor, in the units of window sizes; zero if unknown.
+    /// The size that a window on the main monitor can have without covering the desktop's bars, in window units; zero if unknown.
     Size work_area() const;
     /// The scale of text on the main monitor: larger than 1 on high-density displays.
     float scale() const;
@@ -48,14 +48,14 @@ class Window {
     GLFWwindow* handle() const { return window_; }
     vk::UniqueSurfaceKHR surface(vk::Instance instance) const;
     Size framebuffer() const;  // px; zero while minimised
-    Size size() const;         // in the system's units
+    Size size() const;         // in the window system's units
     float scale() const;       // of text in the framebuffer, on high-density displays
     float density() const;     // px of the framebuffer per unit of the window's size
     bool closed() const;
     void close();
     bool held(int key) const;
 
-    /// Waits for input, at most this long (0: no wait). Returns the keys pressed since the last call.
+    /// Waits for input, at most so many seconds (0: no wait). Returns the keys pressed since the last call.
     std::vector<KeyPress> wait(double seconds);
     /// Whether the last wait() brought input or a change of the window.
     bool stirred() const { return stirred_; }
