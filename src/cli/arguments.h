@@ -39,9 +39,9 @@ struct DrawArguments {
     RenderOptions options() const;
     bool names_background() const { return background_option && background_option->count() > 0; }
     bool names_kernel() const { return kernel_option && kernel_option->count() > 0; }
-    /// Reads splats to draw, with warnings of what is skipped. Without a kernel that is named, sets options.kernel to
-    /// that of the file: of its density, or its mark of antialiasing. Without a background that is named, a sky.json beside the
-    /// file is options.sky. Fits densities to the kernel.
+    /// Reads splats to draw, with warnings about skipped ones. Without --kernel, options.kernel is the kernel that the file
+    /// names, as a density or as antialiased. Without --background, options.sky is the sky.json beside the file, if it
+    /// exists. Converts densities to the kernel.
     Gaussians load(const std::filesystem::path& splats, RenderOptions& options) const;
 };
 void add_draw_options(CLI::App& app, DrawArguments& arguments);
@@ -53,11 +53,11 @@ void add_device_options(CLI::App& app, DeviceOptions& options);
 /// reads. Throws InputError, also if there are none.
 std::vector<int> select_frames(const Dataset& dataset, const std::string& which, int test_every);
 
-// A DATASET is what load_dataset reads, or a glTF file of meshes.
+// DATASET names an input of load_dataset(), or a glTF file of meshes, which has no images and is rendered.
 
-/// The cameras of a dataset, whose images may be missing. If only some are, their frames are skipped as in
-/// training, so that the same frames are held out; Dataset::missing_images counts them. A mesh scene has the
-/// views that `ewa train` renders. options: downscale, max_width and lens count. points: also reads the points.
+/// The cameras of a dataset, whose images may all be missing. If only some are missing, their frames are skipped, so that
+/// the same frames are held out as in training. Dataset::missing_images counts them. A mesh scene has the views that
+/// `ewa train` renders. options: only downscale, max_width and lens are used. points: also reads the points.
 Dataset load_cameras_as_trained(const std::filesystem::path& path, const RunOptions& options = {},
                                 bool points = false);
 
@@ -75,20 +75,20 @@ struct ViewArguments {
     DrawArguments draw;
     DeviceOptions device;
 };
-/// SPLATS and DATASET, which resolve_views of run_inputs.h then completes.
+/// Adds the arguments SPLATS and DATASET. resolve_views() of run_inputs.h replaces runs among them after parsing.
 void add_view_positionals(CLI::App& app, ViewArguments& arguments);
-/// The options of the other members.
+/// Adds the options of the other members of ViewArguments.
 void add_view_options(CLI::App& app, ViewArguments& arguments);
 
 struct Views {
     Dataset dataset;
     io::RefinedUse refined;                         // of the cameras of a run
-    std::vector<int> frames;                        // those that were asked for
+    std::vector<int> frames;                        // indices of the selected frames
     std::unique_ptr<core::TemporaryFolder> folder;  // of the images, or null
 };
-/// Loads a dataset with its images. A mesh scene has the images that `ewa train` stored in `dataset` beside the
-/// splats, if they show this scene. Else it is rendered into a temporary folder. which, test_every: as in
-/// select_frames, whose error comes before the rendering. Throws Interrupted if Ctrl-C ended the rendering.
+/// Loads a dataset with its images. For a mesh scene, loads the folder `dataset` that `ewa train` wrote beside the splats,
+/// if its images show this scene. Else renders the mesh into a temporary folder. which, test_every: as in select_frames().
+/// Throws InputError before rendering, and Interrupted if Ctrl-C ended the rendering.
 Views load_views(const ViewArguments& arguments, const std::string& which, int test_every);
 
 }  // namespace ewa::cli

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What ewa info says of the cameras of a dataset.
+// Summaries of a dataset's cameras, which ewa info prints.
 #pragma once
 #include <optional>
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace ewa::cli {
 
-/// A lens in JSON and in a sentence.
+/// The names of a lens: `word` in JSON, `text` in a sentence.
 struct LensName {
     const char *word, *text;
 };
@@ -24,7 +24,7 @@ struct CameraGroup {
     bool distorted = false;  // undistorted on loading
 };
 
-/// The largest first.
+/// The groups of the dataset's cameras. The group with the most frames is first.
 std::vector<CameraGroup> camera_groups(const Dataset& dataset);
 
 struct Rolling {
@@ -33,7 +33,7 @@ struct Rolling {
     double degrees = 0, distance = 0;  // medians, during a readout; world units
 };
 
-/// Empty if no frame has a readout.
+/// The rolling shutter of the frames. Empty if no frame has a readout time.
 std::optional<Rolling> rolling_of(const Dataset& dataset);
 
 }  // namespace ewa::cli

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One progress line for all that finds cameras, and for the training that follows.
+// One progress line for all steps that find cameras, and for the training that follows.
 #pragma once
 #include <functional>
 #include <string>
@@ -15,7 +15,7 @@ class CaptureProgressLine {
   public:
     /// Seconds of the work after the capture, for so many photos that take so many seconds each to search.
     using After = std::function<double(int photos, double search_seconds)>;
-    /// A line for the user before so many photos are searched.
+    /// Gives a line for the user before the search of features in so many photos.
     using Before = std::function<std::string(int photos)>;
 
     CaptureProgressLine(Progress& progress, After after, Before before)
@@ -31,10 +31,11 @@ class CaptureProgressLine {
     int total_ = 0, photos_ = 0;
 };
 
-/// The time of a training with these options.
+/// Estimates the time of a training with these options, s.
 CaptureProgressLine::After training_after(const RunOptions& options);
 
-/// What proposes a shorter training, where these options take long on a CPU. size: of the photos. training: its time.
+/// Gives a line that proposes a shorter training, if these options take long on a CPU. size: of the photos, px. training:
+/// estimates the time of the training.
 CaptureProgressLine::Before advice_before(const RunOptions& options, const ImageSize& size,
                                           CaptureProgressLine::After training);
 

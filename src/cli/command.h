@@ -15,7 +15,7 @@ namespace ewa::cli {
 /// exception 1.
 using Action = std::function<int()>;
 
-/// Each adds the options of its command to `app`.
+/// Each function adds the options of its command to `app`, and returns the command's action.
 Action add_train(CLI::App& app, const std::string& command_line);
 Action add_render(CLI::App& app);
 Action add_eval(CLI::App& app);

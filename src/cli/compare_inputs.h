@@ -30,7 +30,7 @@ struct ComparedSide {
     bool one_image = false;
     bool is_scene = false;                     // its images are rendered
     std::vector<std::filesystem::path> asked;  // relative to the side, with extension; empty for one image
-    std::vector<std::filesystem::path> other;  // images it has that --frames does not select
+    std::vector<std::filesystem::path> other;  // images of this side that --frames does not select
     uint32_t skipped_splats = 0;  // the most that a render skipped so far because a value was not finite
     std::string undrawable;       // why they are skipped
 };
@@ -53,15 +53,15 @@ struct Sides {
     RenderOptions options;
 };
 
-/// Replaces folders of training runs by the runs' splats. The first run gives --cameras and the options of
-/// use_options_of, unless they are given. Without --cameras, each run is drawn through its own refined cameras, and
-/// other splats through those of the first run. A folder of images stays. Throws InputError, also if two runs differ in
-/// --kernel or --background.
+/// Replaces folders of training runs by the runs' splats. The first run sets --cameras and the options of use_options_of(),
+/// unless the command line has them. Without --cameras, each run is rendered through its own refined cameras. Other
+/// splats are rendered through those of the first run. A folder of images stays as it is. Throws InputError, also if two
+/// runs differ in --kernel or --background.
 void resolve_runs(CLI::App& app, CompareInputs& inputs);
 
-/// A path names a splat scene by the first bytes of the file, else by its name. A scene is rendered when an image
-/// is asked for, as `ewa render --format exr` writes it: float32 with alpha, under the same names. Throws
-/// InputError (no such image or folder, a scene without --cameras), RunError if a scene exceeds the device's memory.
+/// Opens both sides. A file's first bytes tell whether it is a splat scene; if they do not, its name does. A scene is
+/// rendered when an image is requested, as `ewa render --format exr` does: float32 with alpha, under the same names.
+/// Throws InputError (no such image or folder, a scene without --cameras), RunError if a scene exceeds the device's memory.
 Sides open_sides(const CompareInputs& inputs);
 
 /// Converts a render to what the file of the other image could store: without alpha if the other has none,

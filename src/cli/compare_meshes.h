@@ -8,7 +8,7 @@ namespace ewa::cli {
 
 struct MeshComparison {
     std::filesystem::path a, b, json;
-    std::optional<double> distance;  // world units; empty: a part of B's size
+    std::optional<double> distance;  // threshold of the F-score, world units; empty: a share of B's size
 };
 
 /// Prints how far the mesh A is from B, the true surface, which may be a scan, and writes it as JSON. Throws InputError.

@@ -16,16 +16,17 @@ namespace ewa::cli {
 
 struct EditArguments {
     std::vector<edit::Edit> edits;
-    std::filesystem::path picture;  // of what would be removed, with --dry-run; empty: none
+    std::filesystem::path picture;  // image of the splats that would be removed, with --dry-run; empty: none
 };
 
-/// The edits of a command line that was parsed, in its order. Throws InputError for a value that cannot be read.
+/// The edits that the parsed command line names, in the order in which they were typed. Throws InputError for a wrong value.
 std::vector<edit::Edit> typed_edits(const CLI::App& app);
 
-/// The cameras of the run, for filters. Empty without a run.
+/// The cameras of the run, which some filters of splats use. Empty without a run.
 edit::Cameras cameras_of(const std::optional<folders::Run>& run);
 
-/// Draws `all` in grey with what `left` lacks in red, and writes the picture. left: numbers of splats of `all`. Throws RunError.
+/// Writes an image of the splats `all`: removed ones in red, others in grey. left: indices into `all` of those not removed.
+/// Throws RunError.
 void draw_removed(const std::filesystem::path& picture, const Gaussians& all,
                   const std::vector<uint32_t>& left, const std::optional<folders::Run>& run);
 

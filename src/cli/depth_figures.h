@@ -8,10 +8,10 @@
 
 namespace ewa::cli {
 
-/// A row an image and one of means, in percent. Empty without images.
+/// A table of depth errors in percent, with one row for each image, and one for their means. Empty without images.
 std::string depth_table(const train::DepthEvaluation& evaluation);
 
-/// Adds "depth" at the top, and to each of "frames" that has it. json: that of ewa eval.
+/// Adds the member "depth" to the JSON of ewa eval: to the whole, and to each of its "frames" whose depth was measured.
 void add_depths(report::Json& json, const train::DepthEvaluation& evaluation);
 
 }  // namespace ewa::cli

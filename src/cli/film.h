@@ -20,8 +20,8 @@ bool is_film_name(const std::filesystem::path& path);
 /// The program ffmpeg in $PATH. Throws RunError that says what to install, and that a folder of PNGs needs none.
 std::filesystem::path find_ffmpeg();
 
-/// ffmpeg's encoder for h264, hevc, av1 or vp9. Empty: for an empty codec, of which ffmpeg chooses one by the file's name. Throws InputError
-/// if a film of that name cannot have the codec, RunError if ffmpeg has no encoder.
+/// ffmpeg's encoder for h264, hevc, av1 or vp9. Empty for an empty codec: ffmpeg then chooses one by the file's name. Throws
+/// InputError if a film of that name cannot have the codec, RunError if ffmpeg has no encoder for it.
 std::string find_encoder(const std::string& codec, const std::filesystem::path& file);
 
 /// A film that is being written. ffmpeg runs as a process of its own, without a shell, and gets the frames on its
@@ -39,7 +39,7 @@ class Film {
     /// rgba: width * height pixels, row by row from the top. Alpha is ignored. Throws RunError with ffmpeg's own
     /// reason if it has ended.
     void add(const std::vector<uint8_t>& rgba);
-    /// Throws RunError, also if the disk is full.
+    /// Waits for ffmpeg, and moves the film to its path. Throws RunError, also if the disk is full.
     void finish();
 
   private:

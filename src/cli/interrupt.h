@@ -30,8 +30,8 @@ bool interrupted();
 /// Thrown when a signal ended work that a command needs. The exit status is then kInterruptedStatus.
 struct Interrupted {};
 
-/// Outside a watch: the same signals delete the temporary files, then end the program. Ignored signals stay
-/// ignored. A file size limit becomes an error of the write, as a full disk is.
+/// Sets handlers for the signals of InterruptWatch. While no watch exists, a signal deletes the temporary files, then ends
+/// the program. Ignored signals stay ignored. A write beyond the limit of a file's size fails, as on a full disk.
 void remove_temporary_files_on_signals();
 
 /// For work that saves nothing: the signals of a watch delete the temporary files and end the program at once, with

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The lens that a word of the command line names, to render through.
+// The lens that --through of ewa render names.
 #pragma once
 #include <string>
 
@@ -12,7 +12,7 @@ struct LensArgument {
     double fisheye_degrees = 180;  // along the smaller side of a fisheye's image; above 0, at most 360
 };
 
-/// From text such as fisheye:190. Throws InputError that begins with --through.
+/// Parses a lens such as fisheye:190. Throws InputError whose text begins with --through.
 LensArgument lens_of(const std::string& text);
 
 }  // namespace ewa::cli

@@ -10,7 +10,7 @@
 
 namespace ewa::cli {
 
-/// The metric beside the plain PSNR where a photo's exposure is not known.
+/// The metric that is printed beside PSNR where the exposure of an image is not known.
 inline constexpr const char* kFittedMetric = "fitted_psnr";
 
 struct MetricArguments {
@@ -27,12 +27,12 @@ struct FigureRow {
     std::string name;
     std::vector<Figure> figures;  // the same metrics in each row
 };
-/// One row a line, in parts that fit a terminal. Empty without figures.
+/// A table with one line for each row, split into blocks of columns that fit a terminal. Empty without figures.
 std::string figure_table(const std::vector<FigureRow>& rows);
 /// "cc_psnr 24.312, flip 0.08123"; empty without figures.
 std::string figures_text(const std::vector<Figure>& figures);
 
-/// Adds them by their names. A figure that is not finite is null.
+/// Adds each figure to the JSON object, under its name. A figure that is not finite becomes null.
 void add_figures(report::Json& json, const std::vector<Figure>& figures);
 
 }  // namespace ewa::cli

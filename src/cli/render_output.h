@@ -9,7 +9,7 @@
 
 namespace ewa::cli {
 
-/// What to draw for --mode; opacity comes with colours.
+/// The kind of render that --mode needs. Opacity is part of a colour render.
 Drawing drawing_of(const std::string& mode);
 
 struct ImageKind {
@@ -17,8 +17,8 @@ struct ImageKind {
     bool transparent = false;
 };
 
-/// Writes the image of one view, and makes its folder. panorama: it shows all directions. progress gets a remark where the file does not
-/// hold a fact, such as the depth of white. Throws RunError if the file cannot be written.
+/// Writes the image of one view, and creates its folder. panorama: the image is a 360° one. Prints through `progress` a remark on
+/// facts that the file cannot store, such as the depth that white shows. Throws RunError if the file cannot be written.
 void save_render(const std::filesystem::path& file, Rendering&& rendering, const ImageKind& kind,
                  bool panorama, Progress& progress);
 

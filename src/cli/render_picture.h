@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures of ewa render that consist of several renders: depth of field and motion blur. Also transparent ones.
+// Images of ewa render that average several renders, for depth of field and motion blur. Also transparent images.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -22,14 +22,14 @@ struct PictureArguments {
     bool blurs() const { return aperture > 0 || shutter > 0; }
 };
 
-/// Throws InputError where the images do not go with the options. path: whether the views are moments of one motion. extension: of the
-/// images in lower case, with its dot.
+/// Throws InputError if the options do not suit the views or the file format. path: whether the views are moments of one motion.
+/// extension: the image files' extension in lower case, with its dot.
 void check_picture(const PictureArguments& arguments, bool path, const std::string& extension);
 
-/// Takes pictures of views. It keeps the distance of focus that it has found for the first of a path.
+/// Renders views with depth of field and motion blur. All views of one motion have the focus distance found for the first.
 class PictureTaker {
   public:
-    /// kernel: of the renderer's options. views: moments of one motion for a shutter.
+    /// kernel: that of the renderer's options. views: must be moments of one motion if arguments.shutter > 0.
     PictureTaker(const PictureArguments& arguments, Renderer& renderer, Drawing drawing, Footprint kernel,
                  ViewPath views)
         : arguments_(arguments),
@@ -38,8 +38,8 @@ class PictureTaker {
           kernel_(kernel),
           views_(std::move(views)) {}
 
-    /// The picture of view i. With a shutter, while the camera moves to the next view.
-    /// Throws InputError where the options do not go with the lens of a camera, or no view has anything in focus.
+    /// The image of view i. With a shutter, the camera moves towards the next view during the exposure.
+    /// Throws InputError if the options do not suit the lens of a camera, or no view has a surface to focus on.
     Rendering take(size_t i);
 
     uint32_t skipped() const { return skipped_; }  // the most splats of a render that were not finite
@@ -59,10 +59,10 @@ class PictureTaker {
     uint32_t skipped_ = 0;
 };
 
-/// Whether it shows no splat, or no surface where it has the depth of surfaces.
+/// Whether the rendering shows no splat, or, for the depth of surfaces, no surface.
 bool is_empty(const Rendering& rendering);
 
-/// The colours as a camera of this appearance shows them. The rendering is over black, and stays so.
+/// Applies an appearance (such as exposure) to the colours. Rendering and result are over a black background.
 Image with_appearance_over_black(const Rendering& rendering, const Appearance& appearance);
 
 /// RGBA whose colour is not multiplied by alpha, from a render over black.

@@ -9,14 +9,14 @@ class App;
 
 namespace ewa::cli {
 
-/// Lets DATASET, if it is the folder of a run, stand for that run: the output is its folder unless -o names another one,
-/// and the dataset is the run's. Leaves other DATASETs. Throws InputError, also if --resume would continue a run in
-/// another folder than its own.
+/// If DATASET is the folder of a run, replaces it by the run's dataset. The output is then this folder, unless -o names
+/// another one. Does nothing for another DATASET. Throws InputError, also if --resume would continue a run in another
+/// folder than its own.
 void settle_dataset(RunOptions& options);
 
-/// With --resume: gives all options that neither the command line nor --config gives the values of the run in the output
-/// folder, if one is there; its dataset, too. Without a run there, DATASET is needed. Throws InputError.
-/// keep_steps: the number of steps is given otherwise.
+/// With --resume: sets the dataset and all options that neither the command line nor --config sets, to those of the run
+/// in the output folder. If this folder has no run, DATASET is required. Throws InputError.
+/// keep_steps: the caller sets the number of steps, so this does not.
 void take_options_of_run(CLI::App& app, RunOptions& options, bool keep_steps);
 
 }  // namespace ewa::cli

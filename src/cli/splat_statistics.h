@@ -24,7 +24,7 @@ struct SplatStatistics {
 
 SplatStatistics splat_statistics(const Gaussians& gaussians);
 
-/// What a command says of splats that it could not draw. why: undrawable_text of the scene.
+/// The line about splats that a command could not draw. skipped: their number. why: undrawable_text() of the scene.
 std::string skipped_text(uint64_t skipped, const std::string& why);
 
 struct Difference {

@@ -11,7 +11,7 @@ enum ExitStatus { kDone = 0, kFailed = 1, kWrongUse = 2 };
 
 /// Prints "who: what" as one line to standard error, and returns status.
 int fail(const std::string& who, const std::string& what, int status);
-/// The same for standard output that cannot be written.
+/// Prints the error of standard output that cannot be written, as fail() does. Returns the exit status.
 int fail_to_print(const std::string& who);
 
 /// Runs the action and prints its error, if it throws one. Returns its status, kInterruptedStatus after a signal, kWrongUse

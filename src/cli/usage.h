@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Errors in the arguments of a command in plain words.
+// Explains errors in the arguments of a command to the user.
 #pragma once
 #include <string>
 
@@ -10,8 +10,8 @@ class Error;
 
 namespace ewa::cli {
 
-/// What is wrong with the arguments, in one line: unknown words, in the order in which they were typed and with a
-/// suggestion, come before all else. command: the command that was given, or `app` without one.
+/// One line that says what is wrong with the arguments. Unknown words come first, in the order in which they were typed, with a
+/// suggestion. command: the parser of the typed command, or `app` if none was typed.
 std::string usage_error(const CLI::App& app, const CLI::App& command, const CLI::Error& error, int argc,
                         char** argv);
 
