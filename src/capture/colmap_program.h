@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// COLMAP and GLOMAP as programs: their log, their options, and the meaning of their lines.
+// Runs the programs COLMAP and GLOMAP: their log, their options, and the progress that their output states.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -13,7 +13,7 @@
 
 namespace ewa::capture {
 
-/// COLMAP with its log and the meaning of its lines.
+/// Runs COLMAP, writes its log, and reports its progress.
 class Colmap {
   public:
     Colmap(std::filesystem::path work, const ProgressFunction& progress)
@@ -22,18 +22,18 @@ class Colmap {
     std::filesystem::path log() const { return work_ / "log.txt"; }
     std::string log_name() const;
 
-    /// Whether the help of a command has an option: their names differ between releases.
+    /// Whether COLMAP's help for a command lists an option. Options' names differ between releases.
     bool has_option(const std::string& command, const std::string& option) const;
 
-    /// The prefix of a matcher's options, which COLMAP 3.13 has renamed.
+    /// The prefix in the names of a matcher's options. COLMAP 3.13 has another than earlier releases.
     std::string options_of_matching(const std::string& command) const;
 
-    /// Runs a program. done(line): the number of finished units after this line of the output, if it says so. Throws RunError,
+    /// Runs a program. done(line): the number of finished units that a line of the output states, or nothing. Throws RunError,
     /// Stopped.
     void run(std::vector<std::string> command, const CaptureProgress& start,
              const std::function<std::optional<int>(const std::string&)>& done) const;
 
-    /// A line for the user.
+    /// Gives the user a line through the progress function.
     void say(const std::string& line) const;
 
   private:
@@ -44,7 +44,7 @@ class Colmap {
 /// Reads two numbers of a line, such as those of "Matching image [3/50]".
 std::optional<std::pair<int, int>> numbers_in(const std::string& line, const std::regex& pattern);
 
-/// A path that no program takes for an option.
+/// The path in a form that no program takes for an option.
 std::string argument(const std::filesystem::path& path);
 
 }  // namespace ewa::capture

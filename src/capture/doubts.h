@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Signs that cameras are wrong, which the errors of their points do not show.
+// Finds signs of wrong cameras that the reprojection errors of points do not show.
 #pragma once
 #include <filesystem>
 #include <glm/vec2.hpp>
@@ -21,10 +21,10 @@ bool contradict(const Camera& first, const Camera& second,
 struct Contradiction {
     std::string first, second;
     size_t matches = 0;
-    bool follows = false;  // the second follows the first, or the next one, in the order of names
+    bool follows = false;  // the photos are at most two apart in the order of names
 };
 
-/// The pairs with many matches that contradict their cameras. The database has the numbers of the model's images.
+/// The pairs of photos with many matches that contradict their cameras. The database must number the images as the model does.
 std::vector<Contradiction> contradictions_in(const SparseModel& model, const FeatureDatabase& database);
 
 /// The camera of a photo.
@@ -34,14 +34,14 @@ struct Station {
     glm::dmat3 rotation{1};  // world to camera
 };
 
-/// Photos whose cameras are far from, or turned against, those of the photos before and after, if these two are near each other.
-/// Empty unless most neighbours are near each other. stations: in the order in which the photos were taken.
+/// Names of photos whose cameras are far from, or turned against, those of the photos before and after, if these two are near each
+/// other. Empty unless most successive cameras are near each other. stations: in the order in which the photos were taken.
 std::vector<std::string> strays_among(const std::vector<Station>& stations);
 
-/// Indices of photos that have many matches with the next one, but whose cameras are much farther apart or turned than others.
-/// Empty unless most neighbours are near each other. matches: of each station with the next one.
+/// Indices of photos that have many matches with the next photo, although the two cameras are much farther apart or turned than
+/// others. Empty unless most successive cameras are near each other. matches: of each station with the next one.
 std::vector<size_t> jumps_among(const std::vector<Station>& stations, const std::vector<size_t>& matches);
-/// The number of photos outside the longest part of the path without a jump.
+/// The number of photos outside the longest part of the camera path without a jump. jumps: as jumps_among() gives them.
 size_t parted_by(const std::vector<size_t>& jumps, size_t stations);
 /// The verified matches of each station with the next one.
 std::vector<size_t> matches_along(const std::vector<Station>& stations, const FeatureDatabase& database);

@@ -30,36 +30,36 @@ class FeatureDatabase {
     std::map<std::string, std::int64_t> images() const;
     /// The descriptors of an image, in the order of its features; empty if it has none.
     Descriptors descriptors(std::int64_t image) const;
-    /// Sets descriptors to zero for features so near the right or lower border that VLFeat writes none. COLMAP stores uninitialised
-    /// memory for them, which differs between searches. Zeros match nothing. Only with plain images.
+    /// Sets descriptors to zero, which match nothing, for features so near the right or lower border that VLFeat computes none.
+    /// COLMAP stores uninitialised memory for these, which differs from run to run. Requires has_plain_images().
     void clear_unwritten_descriptors();
-    /// Those of the features with the largest scales, at most so many.
+    /// The descriptors of the image's features with the largest scales, at most `most`.
     Descriptors prominent(std::int64_t image, size_t most) const;
 
-    /// Whether there are matches of two images, or `write` found none and COLMAP has not read that yet.
+    /// Whether the database has matches of two images, or write() was called without matches and COLMAP has not read that yet.
     bool is_compared(std::int64_t first, std::int64_t second) const;
     /// Writes the matches of two images for COLMAP to verify.
     void write(std::int64_t first, std::int64_t second, const std::vector<FeatureMatch>& matches);
-    /// Has COLMAP pass over two images without comparing them, until `write` gives their matches.
+    /// Marks two images so that COLMAP does not compare them, until write() gives their matches.
     void pass_over(std::int64_t first, std::int64_t second);
 
-    /// Whether each image has its camera in its own row, as up to COLMAP 3.11. Later ones have rigs and frames.
+    /// Whether the table of images states each image's camera, as up to COLMAP 3.11. Later versions have rigs and frames.
     bool has_plain_images() const;
-    /// Numbers the images in the order of their names. COLMAP's order is that in which its threads have finished. Only before the
-    /// first matches, and with plain images.
+    /// Numbers the images in the order of their names. COLMAP numbers them in the order in which its threads finish. Call it before
+    /// the first matches. Requires has_plain_images().
     void number_by_name();
-    /// The focal lengths that EXIF gives, px, by the images' names. Images without one are not in it.
+    /// The focal lengths that EXIF gives, px, by image name. It has no entry for images without one.
     std::map<std::string, double> expected_focal_lengths() const;
-    /// Gives each image a camera of its own, with the values of the one that it shares. Only with plain images.
+    /// Gives each image a camera of its own, a copy of its shared one. Requires has_plain_images().
     void give_own_cameras();
     /// Whether images share a camera.
     bool has_shared_cameras() const;
-    /// Calls visit(first, second, matches) with the verified matches of each pair, by the pairs' numbers.
+    /// Calls visit(first, second, matches) with the verified matches of each pair of images, in the order of COLMAP's pair ids.
     void visit_verified(const std::function<void(std::int64_t first, std::int64_t second,
                                                  const std::vector<FeatureMatch>&)>& visit) const;
     /// Removes the verified matches of these two images.
     void remove_verified(std::int64_t first, std::int64_t second);
-    /// Removes the descriptors, which are most of a file.
+    /// Removes the descriptors, which take most of the file's bytes.
     void remove_descriptors();
 
     /// Commits all that was written since the last call, in one transaction.

@@ -13,28 +13,28 @@ namespace ewa::capture {
 
 /// Properties of a film that are known before its frames are read. Unknown numbers are 0, and unknown names empty.
 struct FilmInfo {
-    int stream = -1;  // of the largest pictures; -1: not known
+    int stream = -1;  // index of the video stream with the largest pictures; -1: not known
     int width = 0, height = 0;
-    int frames = 0;                // about
-    int stated = 0;                // frames by its header
+    int frames = 0;                // estimate
+    int stated = 0;                // frames that the header states
     double rate = 0;               // frames a second
     std::string matrix, transfer;  // ITU-T H.273's, by ffmpeg's names
-    int streams = 0;               // of pictures
+    int streams = 0;               // number of video streams
 };
 
-/// Asks ffprobe, or ffmpeg where there is no ffprobe. All is unknown where neither can read the film. Throws InputError for a film
-/// without pictures, and for one of two fisheyes, Stopped. go_on: asked now and then.
+/// The properties that ffprobe prints, or ffmpeg if ffprobe is not installed. All are unknown if neither can read the film. go_on:
+/// called now and then; false ends it with Stopped. Throws InputError for a film without pictures, or of a pair of fisheyes.
 FilmInfo film_info(const std::filesystem::path& film, const std::function<bool()>& go_on);
 
-/// The matrix by which YCbCr becomes RGB, as ffmpeg's filter `scale` calls it. A film that names none has the one of its size.
+/// The matrix by which YCbCr becomes RGB, by its name in ffmpeg's filter `scale`. If the film names none, its size decides.
 std::string matrix_word(const FilmInfo& info);
 
 /// A transfer function of high dynamic range (ITU-R BT.2100).
 enum class HdrTransfer { none, hlg, pq };
 HdrTransfer hdr_transfer(const FilmInfo& info);
 
-/// Frames of high dynamic range become sRGB. The primaries are those of BT.2020. 203 cd/m², the white of BT.2408, becomes white, and
-/// what is brighter is clipped.
+/// Converts frames of high dynamic range to sRGB. The frames have the primaries of BT.2020. 203 cd/m², the white of BT.2408,
+/// becomes white. Brighter values are clipped.
 class HdrMap {
   public:
     explicit HdrMap(HdrTransfer transfer);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scale, heading and place of a model by the GPS of its photos.
+// Computes scale, heading and place of a model from the GPS positions of its photos.
 #pragma once
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
@@ -12,16 +12,16 @@
 namespace ewa::capture {
 
 constexpr double kPerMad = 1.4826;  // of a normal distribution: sigma / median absolute deviation
-// Radians by which the up direction of cameras that look one way is probably wrong: only their roll is known.
+// Probable error, radians, of the up direction of cameras that all look one way. Their axes determine roll, but not pitch.
 constexpr double kPitch = 0.25;
 
-/// A camera's axes in the world, as a viewer of the upright photo sees them.
+/// A camera's centre and axes in the world. The axes are those of the photo when it is upright.
 struct Shot {
     glm::dvec3 center{0}, right{0}, up{0}, forward{0};
     std::optional<image::GpsFix> gps;
 };
 
-/// A direction, and the mean squares by which it is probably wrong.
+/// An up direction, and the covariance of its error, radians squared.
 struct Up {
     glm::dvec3 direction{0};
     glm::dmat3 errors{kPitch * kPitch};
@@ -31,10 +31,10 @@ struct Up {
 
 double median_of(std::vector<double> values);
 
-/// Axes whose y points down, as rows: from the model to them.
+/// The rotation from the model's world to axes whose y is -up. Its rows are these axes.
 glm::dmat3 level_axes(const glm::dvec3& up);
 
-/// Empty where GPS does not determine them; reason: why.
+/// The axes that fit the GPS positions. Empty if GPS does not determine them; `reason` then says why. first: up by the cameras.
 std::optional<WorldAxes> axes_by_gps(const std::vector<Shot>& shots, const Up& first, std::string& reason);
 
 }  // namespace ewa::capture

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The last adjustment of a model, with more terms of the lens than the search had.
+// The last bundle adjustment of a model, with more distortion terms of the lens than the search for cameras had.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -13,7 +13,7 @@
 
 namespace ewa::capture {
 
-/// An observation that an adjustment does not get: the feature of an image, and the point that it shows.
+/// An observation that is held out of a bundle adjustment: the feature of an image, and the point that it shows.
 struct HeldOut {
     uint32_t image = 0, feature = 0;
     uint64_t point = 0;
@@ -21,22 +21,22 @@ struct HeldOut {
     bool operator==(const HeldOut&) const = default;
 };
 
-/// Takes every tenth observation out of the model, in an order that is the same each time. Each point keeps three or more.
+/// Removes every tenth observation from the model, the same ones each time. Each point keeps three or more observations.
 std::vector<HeldOut> hold_out(SparseModel& model);
 
-/// The errors of observations that an adjustment did not get, px, each at most some px. Those whose point the model has lost have
-/// the most.
+/// The reprojection errors of held-out observations, px, clamped to a few px. An observation whose point the model has lost gets
+/// the largest value.
 std::vector<double> errors_of(const SparseModel& adjusted, const std::vector<HeldOut>& observations);
 
-/// Whether the errors of the same observations have fallen, by twice what chance gives.
+/// Whether the errors of the same observations are smaller after than before, by more than twice what chance explains.
 bool have_fallen(const std::vector<double>& before, const std::vector<double>& after);
 
-/// The model with this lens (COLMAP's number: RADIAL or OPENCV) for cameras with one radial term that enough photos share.
-/// Returns how many there are.
+/// Sets the lens (COLMAP's model id of RADIAL or OPENCV) of all cameras that have one radial term and that enough photos share.
+/// Returns the number of these cameras.
 int give_lens(SparseModel& model, int32_t lens);
 
-/// Frees the lens of a model by bundle adjustments, and replaces the model by what is better. work: for files. expected: focal
-/// lengths by EXIF, by the photos' names. Returns the lens that it has now; empty: as it was.
+/// Optimises more lens terms by bundle adjustments, and replaces the model if held-out errors fall. work: folder for files.
+/// expected: focal lengths by EXIF, px, by photo name. Returns the new lens; empty if the model has not changed.
 std::string refine_lens(const Colmap& colmap, const std::filesystem::path& model,
                         const std::map<std::string, double>& expected, const std::filesystem::path& work);
 

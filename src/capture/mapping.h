@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the cameras of photos by the same matches in several ways, that is with several settings of COLMAP, and takes the best.
+// Finds the cameras of photos from one set of matches. Tries several settings of COLMAP (ways), and takes the best result.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -14,7 +14,8 @@
 
 namespace ewa::capture {
 
-/// Photos, up to which a search gives the same each time: images are numbered by name, and one thread uses random numbers.
+/// The most photos for which a search gives the same result each time. Images are then numbered by name, and only one thread draws
+/// random numbers.
 constexpr size_t kSameEachTime = 200;
 
 /// A model that a mapper has written.
@@ -28,10 +29,10 @@ std::vector<MappedModel> models_in(const std::filesystem::path& folder);
 
 /// A way to find the cameras of photos: settings of COLMAP's mapper.
 struct Way {
-    std::string name;                  // for the user, after "placed" and a count; empty: the first way
-    std::vector<std::string> words{};  // of COLMAP's mapper
+    std::string name;  // text for the user, which follows "placed" and a count; empty: the first way
+    std::vector<std::string> words{};  // options of COLMAP's mapper
     bool own_lenses = false;           // each photo has its own lens
-    bool neighbours = false;           // only matches of photos that follow each other
+    bool neighbours = false;           // use only matches of photos that follow each other
 };
 
 /// Facts about the matches and photos that decide which ways can be tried.
@@ -40,11 +41,11 @@ struct WayFacts {
     bool shared = false;  // photos share a lens, and may have their own
 };
 
-/// The ways after the first one, in the order in which they are tried: first what costs least and places most.
+/// The ways to try after the first one, in order: those that cost little and place many photos come first.
 std::vector<Way> other_ways(const WayFacts& facts);
 /// The way with the options of `more` added.
 Way with(const Way& way, const Way& more);
-/// Whether two ways are one, whatever their names.
+/// Whether two ways have equal settings, whatever their names.
 bool is_same(const Way& first, const Way& second);
 
 /// The result of a way.
@@ -58,14 +59,14 @@ struct Placing {
 /// Places photos by the matches in the database of a folder.
 class Mapping {
   public:
-    /// views: not null if the photos are views of panoramas, whose lens is known.
+    /// views: the views of panoramas, whose lens is known, if `photos` has these; else null.
     Mapping(const Colmap& colmap, const Photos& photos, const PanoramaViews* views,
             std::filesystem::path work);
 
-    /// Runs one way. The models are in `folder`. There is none if the mapper finds no first pair of images.
+    /// Runs the mapper with one way's settings. Writes models into `folder`; none if the mapper finds no first pair of images.
     Placing place(const Way& way, const std::filesystem::path& folder) const;
-    /// By this way, then by the others until enough photos are placed, then by the best way with other random numbers. The models
-    /// are in work/models. seconds: what the search has taken before; all ways together take about as long.
+    /// Tries this way, then others until enough photos are placed, then the best way with other random numbers. The models are in
+    /// work/models. seconds: the time of the search so far; all ways together may take about as long.
     Placing place_enough(const Way& first, double seconds) const;
     /// Joins the largest model with others that share photos, if the joined cameras are possible.
     void join(Placing& placing) const;
@@ -80,7 +81,7 @@ class Mapping {
 
   private:
     std::filesystem::path database_for(const Way& way) const;
-    /// Runs the mapper with these words, too.
+    /// Runs the mapper with a way's settings, and with the further options `more`.
     void map(const Way& way, const std::filesystem::path& folder, const std::vector<std::string>& more) const;
     /// Grades a model, also by the matches in the database.
     Grade grade_in(const std::filesystem::path& model) const;

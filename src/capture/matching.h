@@ -8,13 +8,13 @@
 
 namespace ewa::capture {
 
-/// Values of a descriptor: each fits into a byte, and their length is 512, as COLMAP writes them.
+/// Number of values of a descriptor. Each fits into a byte, and the vector has length 512, as COLMAP writes it.
 constexpr size_t kDescriptorSize = 128;
 
-/// The descriptors of an image, [feature][kDescriptorSize]. Values of 16 bits multiply in pairs.
+/// The descriptors of an image, [feature][kDescriptorSize]. Values have 16 bits, because CPUs multiply and add these in pairs.
 using Descriptors = std::vector<std::int16_t>;
 
-/// Features of two images, by their places.
+/// Two matching features, by their indices in the first and second image.
 struct FeatureMatch {
     std::uint32_t first = 0, second = 0;
 
@@ -25,11 +25,11 @@ struct FeatureMatch {
 /// descriptors is at most 0.7, and less than 0.8 times that to the second nearest (Lowe 2004). COLMAP has the same rules.
 std::vector<FeatureMatch> matches_of(const Descriptors& first, const Descriptors& second);
 
-/// Two images by their places, the lower first.
+/// Two images by their indices, the lower first.
 using ImagePair = std::pair<int, int>;
 
-/// The candidates that probably show the same things, in their order. shared: how many prominent features the images of each
-/// candidate share (Wu 2013, preemptive matching). An image keeps the `each` candidates with the most, if they share at least 4.
+/// The candidate pairs whose images probably show the same things, in the order of the candidates. shared: the number of prominent
+/// features that each pair shares (Wu 2013, preemptive matching). Each image keeps its `each` best pairs that share at least 4.
 std::vector<ImagePair> pairs_by_look(const std::vector<ImagePair>& candidates, const std::vector<int>& shared,
                                      int each);
 

@@ -18,17 +18,18 @@ namespace ewa::capture {
 
 constexpr int kPanoramaViews = 6;  // pinholes that look at the horizon, 90 degrees wide
 
-/// Whether all photos are twice as wide as high, and are 360° photos: their XMP says so, or their left borders continue in the
-/// right ones. Throws InputError where a photo cannot be read.
+/// Whether all photos are 360° photos: twice as wide as high, and marked as such by XMP, or with a left border that continues the
+/// right one. Throws InputError if a photo cannot be read.
 bool are_panoramas(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& names);
 
-/// Photo axes to the axes of view k. The views look from the middle of the photo to the right, in equal steps.
+/// The rotation from the photo's axes to those of view k. View 0 looks at the photo's middle, and the others follow to the right,
+/// in equal steps.
 glm::dmat3 view_rotation(int k);
 
 /// View k of a photo: a pinhole with the photo's pixels per degree in its middle.
 Image panorama_view(const Image& photo, int k);
 
-/// The name of view k of a photo, which has no white space, and back. Empty for another name.
+/// The name of view k of a photo, without white space. photo_of_view() is the inverse; its photo is empty for other names.
 std::filesystem::path view_name(int k, const std::filesystem::path& photo);
 std::pair<int, std::string> photo_of_view(const std::string& view);
 
@@ -39,12 +40,12 @@ struct PanoramaViews {
     std::map<std::pair<int, int>, std::vector<std::filesystem::path>> cameras;
 };
 
-/// Writes the pinhole views of all photos into the folder. Those that are there stay. Throws RunError, Stopped.
+/// Writes the pinhole views of all photos into the folder. Does not replace existing views. Throws RunError, Stopped.
 PanoramaViews views_of_panoramas(const Photos& photos, const std::filesystem::path& folder,
                                  const ProgressFunction& progress);
 
-/// The pairs of views of these pairs of photos, by places in PanoramaViews::photos. Views of one photo have no baseline, and are
-/// in no pair.
+/// The pairs of views for these pairs of photos, by indices into PanoramaViews::photos. Views of one photo are no pair, because
+/// they have no baseline.
 std::vector<ImagePair> pairs_of_views(const std::vector<ImagePair>& photos);
 
 /// The pose of a photo.
@@ -53,8 +54,8 @@ struct Pose {
     glm::dvec3 center{0};
 };
 
-/// The pose that most of the poses agree with: rotations within about a degree, and near centres. scale: a length of the model.
-/// Returns the number of poses that agree.
+/// Sets `pose` to the one that most poses agree with: rotations within about a degree, and near centres. scale: a typical length of
+/// the model, in its units. Returns the number of poses that agree.
 int agreed(const std::vector<Pose>& poses, double scale, Pose& pose);
 
 /// The photos' poses that follow from a model of their views. A photo whose views all disagree has none.

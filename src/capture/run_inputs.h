@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The folder of a training run in the place of a splat file or of a dataset.
+// Resolves a path that may be the folder of a training run, to the run's splats or dataset.
 #pragma once
 #include <filesystem>
 #include <optional>
@@ -17,8 +17,8 @@ struct SplatInput {
     std::filesystem::path file;       // the path itself, or splats.ply of the run's folder
     std::optional<folders::Run> run;  // if the path is a run's folder
 };
-/// Any path but a folder stays as it is: the reader of splats says what is wrong with it. Throws InputError for a
-/// folder that is not a run's, or whose run has no splats yet.
+/// The splats that a path names. A path that is no folder stays as it is, since the reader of splats checks it. Throws
+/// InputError for a folder that is not a run's, or whose run has no splats yet.
 SplatInput splat_input(const std::filesystem::path& path);
 
 /// Whether the path is the folder of a run that has splats.

@@ -21,7 +21,7 @@ namespace ewa::capture {
 constexpr uint64_t kNoPoint = std::numeric_limits<uint64_t>::max();
 
 struct SparseCamera {
-    int32_t lens = 0;  // COLMAP's number
+    int32_t lens = 0;  // COLMAP's model id
     uint64_t width = 0, height = 0;
     std::vector<double> parameters;
 };
@@ -29,7 +29,7 @@ struct SparseCamera {
 /// A feature of an image.
 struct SparseFeature {
     glm::dvec2 at{0};           // px
-    uint64_t point = kNoPoint;  // that it shows
+    uint64_t point = kNoPoint;  // the point that it shows
 };
 
 struct SparseImage {
@@ -46,7 +46,7 @@ struct SparsePoint {
     std::vector<std::pair<uint32_t, uint32_t>> track;  // images, and the places of their features
 };
 
-/// By COLMAP's numbers.
+/// A model, by COLMAP's ids of cameras, images and points.
 struct SparseModel {
     std::map<uint32_t, SparseCamera> cameras;
     std::map<uint32_t, SparseImage> images;

@@ -20,8 +20,8 @@ using ProgressFunction = std::function<bool(const CaptureProgress&)>;
 /// Thrown when the caller's progress function has ended the run.
 struct Stopped {};
 
-/// Calls work(i) for each i < now.total - now.done on all cores, and says how many are done. most: of them at once. Throws Stopped,
-/// and what work throws.
+/// Calls work(i) for each i < now.total - now.done on all cores, and reports how many are done. most: calls at one time. Throws
+/// Stopped, and exceptions of work.
 void on_all_cores(CaptureProgress now, const ProgressFunction& progress,
                   const std::function<void(size_t)>& work, size_t most = SIZE_MAX);
 
@@ -29,7 +29,8 @@ void on_all_cores(CaptureProgress now, const ProgressFunction& progress,
 /// one size can be compared. 0 for an image of less than 3 x 3 pixels.
 double sharpness(const std::uint8_t* pixels, int width, int height);
 
-/// The index of the sharpest image in each of `parts` parts of equal length, in order; all of them if there are fewer.
+/// Divides the images into `parts` parts of equal length. Returns the index of the sharpest image of each part, in order, or all
+/// indices if there are fewer images than parts.
 std::vector<int> sharpest(const std::vector<double>& sharpness, int parts);
 
 /// Takes the images out of a stream of binary PGM or PPM files that arrives in pieces of any size.
@@ -45,7 +46,7 @@ class PgmStream {
     explicit PgmStream(std::function<void(const std::uint8_t* pixels, int width, int height)> image,
                        const Kind& kind = kGrey)
         : image_(std::move(image)), kind_(kind) {}
-    /// Throws RunError where the stream is not of this kind.
+    /// Adds the stream's next bytes, and calls `image` for each complete image. Throws RunError if the stream is not of this kind.
     void add(std::string_view bytes);
 
   private:
@@ -60,12 +61,12 @@ class PgmStream {
 void require_ffmpeg();
 void require_colmap();
 
-/// Arguments with which ffmpeg and ffprobe read a video. A name that begins with a dash, or has a colon, is a file all the same.
-/// A playlist would lead to other files, and is refused whatever its name.
+/// Arguments with which ffmpeg and ffprobe read a video. They read a name that begins with a dash, or has a colon, as a file too.
+/// They refuse playlists, whatever the name, because a playlist would make them read other files.
 std::vector<std::string> film_input(const std::filesystem::path& video);
 
-/// Writes the sharpest frames of videos to `images` as JPEG files of sRGB. Those of several videos go into folders with their names.
-/// Programs write to the log. Returns remarks. Throws InputError if ffmpeg can read no video, RunError, Stopped.
+/// Writes the sharpest frames of videos to `images` as JPEG files of sRGB. With several videos, each has a subfolder of its name.
+/// log: the file for the programs' output. Returns remarks. Throws InputError if ffmpeg can read no video, RunError, Stopped.
 std::vector<std::string> extract_frames(const std::vector<std::filesystem::path>& videos,
                                         const std::filesystem::path& images, int frames,
                                         const std::filesystem::path& log, const ProgressFunction& progress);
@@ -82,26 +83,27 @@ struct Pictures {
     std::vector<std::filesystem::path> others;  // masks, depth maps and their like, by their names
 };
 Pictures pictures_in(const std::filesystem::path& folder);
-/// The photos alone.
+/// The photos of pictures_in(), without masks and other images.
 std::vector<std::filesystem::path> photo_files(const std::filesystem::path& folder);
-/// The same. Throws InputError if one is HEIC that nothing here converts, or a link out of the folder.
+/// As photo_files(). Throws InputError for a HEIC photo that no installed program converts, and for a link out of the folder.
 std::vector<std::filesystem::path> photos_in(const std::filesystem::path& folder);
 
 /// Whether the extension is a film's.
 bool is_film(const std::filesystem::path& file);
 /// The films of a folder and the folders below it, relative to it and sorted.
 std::vector<std::filesystem::path> films_in(const std::filesystem::path& folder);
-/// Removes small copies, which cameras and editors write beside films, if there are other films. Returns the copies.
+/// Removes proxies from `films`: small copies that cameras and editors write beside films. Keeps them if there are no other films.
+/// Returns the proxies.
 std::vector<std::filesystem::path> take_proxies(std::vector<std::filesystem::path>& films);
 
 /// Whether the photo is of HEIF's family (HEIC, AVIF), which COLMAP does not read.
 bool is_heif(const std::filesystem::path& file);
-/// Whether a program is here that converts such photos.
+/// Whether this machine has a program that converts HEIF photos.
 bool converts_heif();
-/// The name that a photo has for COLMAP.
+/// The name under which COLMAP gets a photo: that of a HEIF photo ends in .jpg.
 std::filesystem::path converted_name(const std::filesystem::path& name);
-/// Makes a folder of the photos by those names: HEIF as JPEG, and links to the others' files, or copies. A photo that cannot be
-/// converted is skipped. Throws RunError, Stopped.
+/// Makes a folder with the photos under their converted_name(). HEIF photos become JPEG; others are links or copies. Skips a photo
+/// that cannot be converted. Throws RunError, Stopped.
 void convert_photos(const std::filesystem::path& photos, const std::vector<std::filesystem::path>& names,
                     const std::filesystem::path& folder, const std::filesystem::path& log,
                     const ProgressFunction& progress);
@@ -113,8 +115,8 @@ struct FoundMasks {
 /// The masks of photos with these names, by the rules for datasets. project: the path that the user named. Throws InputError.
 FoundMasks find_masks(const std::filesystem::path& photos, const std::vector<std::filesystem::path>& names,
                       const std::filesystem::path& project);
-/// Copies the masks into a folder as COLMAP wants them: NAME.png for a photo NAME, of its size. images: the folder with the photos
-/// under their names. Newer copies stay. Returns FoundMasks::text. Throws InputError, RunError, Stopped.
+/// Writes the masks into a folder in COLMAP's form: NAME.png for a photo NAME, in the photo's size. images: the folder of COLMAP's
+/// photos. Keeps copies that are newer than their masks. Returns FoundMasks::text. Throws InputError, RunError, Stopped.
 std::string copy_masks(const std::filesystem::path& photos, const std::vector<std::filesystem::path>& names,
                        const std::filesystem::path& images, const std::filesystem::path& masks,
                        const std::filesystem::path& project, const ProgressFunction& progress);
@@ -125,12 +127,12 @@ struct Skipped {
     std::string reason;
 };
 
-/// Decodes all photos, on all cores. Throws Stopped.
+/// The photos that cannot be decoded, and why. Decodes all photos, on all cores. Throws Stopped.
 std::vector<Skipped> faults_in(const std::filesystem::path& folder,
                                const std::vector<std::filesystem::path>& names,
                                const ProgressFunction& progress);
 
-/// A line for the user, with the first names.
+/// A line for the user about skipped photos, with the first of their names.
 std::string skipped_text(const std::vector<Skipped>& skipped);
 /// The first names, separated by commas.
 std::string names_text(const std::vector<std::string>& names);
@@ -140,7 +142,7 @@ void require_photos(const std::filesystem::path& folder, size_t count, const std
 
 using Json = nlohmann::ordered_json;  // of capture.json
 
-/// A line for a file: a hash of its content, a space, and its name. The record is JSON, which is UTF-8.
+/// The line that identifies a file in capture.json: a hash of its content, a space, and its name in UTF-8.
 std::string line_of(const std::filesystem::path& folder, const std::filesystem::path& name);
 
 /// The photos of a search for cameras, after those that changed since it began were removed.
@@ -150,22 +152,22 @@ struct Chosen {
     std::vector<std::string> remarks;
 };
 
-/// Checks all photos before a search. Those that cannot be used are noted in the record. Throws InputError if too few can be used,
+/// Checks all photos before a search. Writes to the record which photos cannot be used. Throws InputError if too few can be used,
 /// Stopped.
 Chosen first_choice(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& found,
                     Json& record, const ProgressFunction& progress);
 
-/// Skips photos that have changed since a search began. before: its record.
+/// Chooses photos for a search that continues. Skips those that changed since it began. before: the record of the search.
 Chosen later_choice(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& found,
                     const Json& before);
 
 /// Photos whose cameras COLMAP describes alike.
 struct LensGroup {
     std::vector<std::filesystem::path> photos;  // sorted
-    bool shared = true;                         // one camera; else one for each photo
+    bool shared = true;                         // the photos share one camera; else each has its own
 };
 
-/// Photos of one size, camera and focal length share a camera. Throws InputError where a photo cannot be read.
+/// Groups the photos that share a lens: those of one size, camera model and focal length. Throws InputError if one cannot be read.
 std::vector<LensGroup> lenses_of(const std::filesystem::path& folder,
                                  const std::vector<std::filesystem::path>& names);
 
@@ -173,14 +175,14 @@ std::vector<LensGroup> lenses_of(const std::filesystem::path& folder,
 /// model cannot be read, RunError.
 void remove_views(const std::filesystem::path& model, const std::set<std::string>& names);
 
-/// Which photos are compared.
+/// Which pairs of photos are compared.
 enum class Pairing {
     by_look,      // those that share prominent features, and neighbours in the order of names
     in_sequence,  // neighbours in the order of names, and some later ones
     all
 };
 
-/// The photos or views that COLMAP has to place.
+/// The photos, or views of panoramas, whose cameras COLMAP has to find.
 struct Photos {
     std::filesystem::path folder;              // of the images
     std::vector<std::filesystem::path> names;  // relative to it
@@ -195,9 +197,9 @@ struct Found {
     std::string axes;  // as Capture::axes
 };
 
-/// Runs COLMAP in `work` and leaves its largest model in `model` (cameras.bin, images.bin, points3D.bin). Throws
-/// InputError if nothing can be placed, RunError, Stopped. COLMAP gets views of 360° photos, and the model is that of the photos.
-/// place: the file that gets the place of the model's origin, if it is known.
+/// Runs COLMAP in `work`, and writes its largest model to `model` (cameras.bin, images.bin, points3D.bin). Instead of 360°
+/// photos COLMAP gets pinhole views of them, but the model has the photos. place: the file for the place of the model's
+/// origin on the globe, if it is known. Throws InputError if no camera is found, RunError, Stopped.
 Found place_photos(const Photos& photos, const std::filesystem::path& work,
                    const std::filesystem::path& model, const std::filesystem::path& place,
                    const ProgressFunction& progress);

@@ -8,8 +8,8 @@
 
 namespace ewa::capture {
 
-/// The time left is measured for the part at hand. Parts to come are estimated from the time that COLMAP takes to search a photo;
-/// docs/capture.md has the ratios. So nothing is known before the first photo.
+/// Estimates the time left. The pace of the current part gives the part's time. The time that COLMAP takes to search a photo gives
+/// the times of later parts, by the ratios in docs/capture.md. So nothing is known before the first photo.
 class Times {
   public:
     explicit Times(Matching matching) : matching_(matching) {}

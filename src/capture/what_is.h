@@ -21,10 +21,10 @@ enum class What {
 /// The kind of the path. A folder that is a dataset and a run is a dataset. Throws InputError if it cannot be read.
 What what_is(const std::filesystem::path& path);
 
-/// Whether ewa makes a dataset of it by a search for cameras: photos, a video or an archive.
+/// Whether ewa has to search for cameras to make a dataset of this kind of input: photos, a video or an archive.
 bool is_searched(What what);
 
-/// The image format that the first bytes tell. Empty for other files, and for .splat, which may begin with any bytes.
+/// The image format by the file's first bytes. Empty for other files, and for .splat, which may begin with any bytes.
 /// Throws InputError.
 std::string_view image_format(const std::filesystem::path& path);
 
