@@ -43,16 +43,16 @@ std::vector<uint8_t> eight_bit_values(const Image& image);
 /// any other file.
 std::string_view format_name(const std::filesystem::path& path);
 
-/// Why the image cannot be read, without the file's name; empty if it can. The pixels are decoded: those of a JPEG at an
-/// eighth of the size, which finds the same damage in less time and memory.
+/// The reason why the image cannot be read, without the file's name. Empty if it can be read. Decodes the pixels. A JPEG is
+/// decoded at an eighth of its size, which finds the same damage in less time and memory.
 std::string image_fault(const std::filesystem::path& path);
 
-/// Whether a PNG or JPEG has its last bytes, without decoding it. True for other formats.
+/// Whether a PNG or JPEG file ends with the bytes that mark its end. Does not decode the image. True for other formats.
 bool ends_as_an_image(const std::filesystem::path& path);
 
-/// Whether OpenImageIO is here and has libheif.
+/// Whether OpenImageIO can be loaded and has libheif.
 bool reads_heif();
-/// As OpenImageIO::jpeg_of_heif. Returns whether it has written the JPEG.
+/// Converts a HEIF photo as OpenImageIO::jpeg_of_heif does. Returns whether the JPEG was written.
 bool write_jpeg_of_heif(const std::filesystem::path& heif, const std::filesystem::path& jpeg);
 
 /// A position by a satellite receiver: WGS 84, degrees. Finite, and within the ranges of the globe.
@@ -61,7 +61,7 @@ struct GpsFix {
     std::optional<double> altitude;  // m above the sea
 };
 
-/// The settings of the camera by a JPEG's EXIF. Empty for other files.
+/// The camera's settings by a JPEG's EXIF. Empty for other files.
 struct Shot {
     std::string lens;  // text for the camera and its focal length: equal for photos of one lens at one zoom
     std::optional<double> exposure;  // log2(time * ISO / f-number^2), stops
@@ -84,12 +84,12 @@ constexpr uint64_t kMaxPixels = 200'000'000;
 constexpr uint64_t kMaxSide = 65'535;
 /// OpenImageIO's own limit. EXR files keep the layers of a rendering as channels.
 constexpr uint64_t kMaxChannels = 1024;
-/// All channels of the file, decoded.
+/// The most bytes of a file's decoded channels together.
 constexpr uint64_t kMaxDecodedBytes = uint64_t(4) << 30;
-/// Codecs hold several whole tiles in memory.
+/// The most pixels of a tile, because codecs keep several whole tiles in memory.
 constexpr uint64_t kMaxTilePixels = 4096 * 4096;
-/// A decoder visits the whole image once for each scan of a progressive JPEG. Encoders write about ten
-/// scans.
+/// The most scans of a progressive JPEG. A decoder visits the whole image for each scan. Encoders write about
+/// ten scans.
 constexpr int kMaxJpegScans = 100;
 /// An image that takes more bytes than this, as floats, must come from a file of at least one
 /// kMaxCompression-th of its size. Even images of a single colour compress less in every format.
@@ -111,22 +111,22 @@ struct StoredImage {
     std::vector<float> values;  // 8-bit values / 255, 16-bit values / 65535, floats unchanged
 };
 
-/// `file` is at its first byte and has `file_bytes` bytes. With `pixels` the values are read as well, and any
-/// damage throws. Without it the codec reads the header only. Nothing is printed.
+/// Reads an image from a file that is at its first byte and has `file_bytes` bytes. pixels: read the values too, and throw
+/// for any damage; else only the header is read. Prints nothing.
 StoredImage read_png(std::FILE* file, uint64_t file_bytes, bool pixels);
 StoredImage read_jpeg(std::FILE* file, uint64_t file_bytes, bool pixels);
 
-/// Decodes at an eighth of the size, only to check the data.
+/// Decodes a JPEG at an eighth of its size, only to check the data.
 void check_jpeg(std::FILE* file, uint64_t file_bytes);
 Shot jpeg_shot(std::FILE* file);
 
-/// As shot_of, of an EXIF block.
+/// The camera's settings that an EXIF block states, as in shot_of().
 Shot exif_shot(const void* exif, uint64_t size);
 
 /// The value of EXIF's tag 274. The block starts with the header of a TIFF. 1 where the tag is missing.
 int exif_orientation(const void* exif, uint64_t size);
 
-/// Unsigned integers of `count` bytes, at most 8.
+/// Reads an unsigned integer of `count` bytes, at most 8.
 uint64_t big_endian(const std::byte* bytes, int count);
 uint64_t little_endian(const std::byte* bytes, int count);
 
@@ -162,7 +162,7 @@ void probe_pnm(core::FileReader& reader);
 struct OpenImageIO {
     const char* version;  // EWA_VERSION; the loader reads it before it calls a function
 
-    /// Makes OpenImageIO refuse larger images. False where it has no such limits.
+    /// Makes OpenImageIO refuse images beyond these limits. False if this version has no such limits.
     bool (*limit)(uint64_t decoded_bytes, uint64_t channels);
     /// Reads a file whose probe has passed, by OpenImageIO's reader of this name. Calls `check` before it
     /// takes memory for the pixels.
@@ -178,8 +178,8 @@ struct OpenImageIO {
                          const std::function<void(const ImageHeader&)>& check);
 };
 constexpr const char* kModuleFile = "libewa_openimageio.so";
-/// Ends in the number of the layout. Count it up whenever a type above changes: a module of another layout
-/// then has no such entry, and is refused.
+/// The module's entry, whose name ends in the number of the layout. Increase it whenever a type above changes: a
+/// module of another layout then lacks this entry, and is refused.
 constexpr const char* kModuleEntry = "ewa_openimageio_layout_2";
 static_assert(sizeof(void*) != 8 || (sizeof(OpenImageIO) == 48 && sizeof(StoredImage) == 48 &&
                                      sizeof(ImageHeader) == 32 && sizeof(Image) == 40));

@@ -9,17 +9,17 @@
 
 namespace ewa::image {
 
-/// Channels that are compared: RGB, without alpha. Throws InputError.
+/// The number of channels to compare: RGB, without alpha. Throws InputError.
 int compared_channels(const Image& a, const Image& b);
-/// The number of pixels, each with its weight. Throws InputError if the weights have another size.
+/// The sum of the pixels' weights. Throws InputError if the weights have another size than the image.
 double weight_sum(const Image& weights, const Image& image);
 
 inline double weight_at(const Image& weights, int x, int y) {
     return weights.pixels.empty() ? 1.0 : double(*weights.at(x, y));
 }
 
-/// a where the weight is 1, b where it is 0, and their mixture between. So pixels of weight 0 show no difference to a metric
-/// that looks at their surroundings.
+/// Blends b towards a by each pixel's weight: a at weight 1, b at weight 0. So pixels of weight 0 add no difference to metrics that
+/// compare windows of pixels.
 Image pulled_onto(const Image& a, const Image& b, const Image& weights);
 
 /// Mean SSIM as ewa::ssim, over the pixels whose whole window is in the image. NaN if there are none.
