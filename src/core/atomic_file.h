@@ -16,7 +16,7 @@ class FullDisk : public RunError {
     using RunError::RunError;
 };
 
-/// Throws FullDisk or RunError for a file that cannot be written. doing: what failed. reason: an errno.
+/// Throws FullDisk or RunError for a file that cannot be written. doing: the operation that failed. reason: its errno.
 [[noreturn]] void fail_to_write(const std::filesystem::path& path, const char* doing, int reason);
 
 /// Writes a temporary file in the same directory, which commit() renames to the path. Until then, and after
@@ -38,8 +38,8 @@ class AtomicFile {
     void write(const void* bytes, size_t count);
     void write(std::string_view text) { write(text.data(), text.size()); }
 
-    /// Takes another name in the same folder in place of the path's, and holds it by an empty file until commit(). False if
-    /// any file has the name already: of several processes, one gets it.
+    /// Makes commit() rename to `name`, in the same folder, instead of the path. Reserves this name by an empty file. False if
+    /// a file of this name exists already. So only one of several processes gets the name.
     bool claim(const std::filesystem::path& name);
 
     /// Flushes everything to disk, then renames. Call once, last.
@@ -54,7 +54,7 @@ class AtomicFile {
     bool claimed_ = false;
 };
 
-/// The same, value by value, in the machine's byte order.
+/// An AtomicFile that is written value by value, in the machine's byte order.
 class BinaryFile {
   public:
     explicit BinaryFile(const std::filesystem::path& path) : file_(path) {}
@@ -62,7 +62,7 @@ class BinaryFile {
     void add(const Values&... values) {
         (file_.write(&values, sizeof(values)), ...);
     }
-    /// With a zero behind it.
+    /// Writes the text and a zero byte.
     void add_text(const std::string& text) { file_.write(text.c_str(), text.size() + 1); }
     void commit() { file_.commit(); }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The options of ewa-bench. `ewa bench` has them too, and hands them on.
+// The options of ewa-bench. `ewa bench` has the same options, and passes them to ewa-bench.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -21,7 +21,7 @@ struct BenchOptions {
     int training_steps = 500;       // with stability
 };
 
-/// Adds them to a parser. A template, so that this module does not need CLI11: Validator is CLI::Validator.
+/// Adds the options to a parser. A template, so that this module does not need CLI11: Validator is CLI::Validator.
 template <class Validator, class App>
 void add_bench_options(App& app, BenchOptions& options) {
     const auto in_range = [](int low, int high) {

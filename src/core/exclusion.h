@@ -10,7 +10,7 @@ namespace ewa::core {
 
 enum class Relation { excludes, needs };
 
-/// A rule: `option` may not be used with `other` (excludes), or not without it (needs).
+/// A rule for two options. Relation::excludes: `option` may not be used with `other`. Relation::needs: not without `other`.
 template <class Options>
 struct Exclusion {
     std::string_view option;

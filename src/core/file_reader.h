@@ -44,7 +44,7 @@ class FileReader {
 
     void skip(uint64_t n, std::string_view what);
 
-    /// Continues at this byte. `what` names it in the error if the file has no such byte.
+    /// Makes the byte at this offset the next one to read. `what` names it in the error if the file has no such byte.
     void go_to(uint64_t offset, std::string_view what);
 
     /// The text before a zero byte, at most `limit` bytes. The zero byte is consumed.

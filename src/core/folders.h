@@ -6,12 +6,12 @@
 
 namespace ewa::core {
 
-/// Whether the path is a regular file or a folder. False on any error.
+/// Whether the path is a regular file (is_file), or a folder (is_folder). False on any error.
 bool is_file(const std::filesystem::path& path);
 bool is_folder(const std::filesystem::path& path);
 
-/// Whether a desktop or a server has put the file there, or the folder that it is in: names that begin with a dot, __MACOSX, @eaDir,
-/// Thumbs.db and desktop.ini. inside: relative to the user's folder.
+/// Whether a desktop or a server has made the file, or a folder above it. Their names begin with a dot, or are __MACOSX, @eaDir,
+/// Thumbs.db or desktop.ini. inside: the file's path relative to the user's folder.
 bool is_of_desktop(const std::filesystem::path& inside);
 
 /// Creates the folder and its parents. An empty path names no folder. Throws RunError if the folder cannot be

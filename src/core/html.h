@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Values in HTML files.
+// Encodes texts and bytes for HTML files.
 #pragma once
 #include <span>
 #include <string>

@@ -10,7 +10,7 @@
 
 namespace ewa::core {
 
-/// Limits of a text. A value may need some hundred bytes of memory, however short its text is.
+/// Limits of a JSON text. They exist because a value may need some hundred bytes of memory, however short its text is.
 struct JsonLimits {
     uint64_t bytes = uint64_t(256) << 20;  // of the text
     int depth = 64;
@@ -31,7 +31,7 @@ struct JsonLimits {
 template <class Json>
 Json parse_json(std::string_view text, const std::string& name, const JsonLimits& limits = {});
 
-/// The same for a file. Throws InputError also if it cannot be read.
+/// Parses a file as parse_json() does. Throws InputError also if the file cannot be read.
 template <class Json>
 Json read_json_file(const std::filesystem::path& path, const JsonLimits& limits = {});
 

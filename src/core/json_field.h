@@ -13,49 +13,50 @@
 
 namespace ewa::core {
 
-/// A key names a member; null is the value itself.
+/// A JSON value with its place in the file. Functions with a key read this member; with a null key, the value itself.
 class JsonField {
   public:
-    /// where: the file, and what of it. advice: what an error says behind "is missing". The value must outlive the field.
+    /// where: the file and the value's place in it. advice: text that errors add to "is missing". The value must outlive the field.
     JsonField(const nlohmann::json& value, std::string where, std::string advice = {})
         : value_(&value), where_(std::move(where)), advice_(std::move(advice)) {}
 
-    /// The whole of a file or of a text, which the field and its copies keep. Throws InputError.
+    /// The whole value of a file or of a text. The field and its copies own the value. Throws InputError.
     static JsonField of_file(const std::filesystem::path& file, const JsonLimits& limits = {},
                              std::string advice = {});
     static JsonField of_text(std::string_view text, const std::string& name, const JsonLimits& limits = {},
                              std::string advice = {});
 
-    /// The same field. A member that it lacks is that of the other object, which outlives the field.
+    /// This field with defaults: members that it lacks are taken from `other`, which must outlive the field.
     JsonField or_of(const nlohmann::json& other) const;
 
     const nlohmann::json& value() const { return *value_; }
     const std::string& where() const { return where_; }
     /// Whether an object has the key, with another value than null.
     bool has(const char* key) const;
-    /// A member that must be there. Throws also if the value is no object. The place of the result is this one's, with `what` added
-    /// if it is not empty.
+    /// A required member. Throws if it is missing, or the value is no object. The result's place in errors is this field's,
+    /// then `what` if that is not empty.
     JsonField at(const char* key, const std::string& what = {}) const;
-    /// Throws unless the member is a list or an object. The values outlive the field, as its own does.
+    /// list() is a member that is a list, members() one that is an object. They throw for other values. The results live as long as
+    /// the field's value.
     const nlohmann::json& list(const char* key) const;
     const nlohmann::json& members(const char* key) const;
     JsonField object(const char* key) const;
-    /// An object whose place has the key.
+    /// A member that is an object. The result's place in errors is this field's place and the key.
     JsonField part(const char* key) const;
-    /// The values of a list, whose places have the key and their numbers.
+    /// The items of a member that is a list. The place of each in errors is this field's place, the key, and the item's index.
     std::vector<JsonField> items(const char* key) const;
 
-    /// Finite numbers.
+    /// A member that is a finite number. absent: the result if the member is missing; number_if() is then empty.
     double number(const char* key) const;
     double number(const char* key, double absent) const;
     std::optional<double> number_if(const char* key) const;
-    /// A list of `least` to `most` finite numbers; rows of a list, which are equally long, count with their numbers. form: what an
-    /// error says that is expected; null: the list.
+    /// A member that is a list of `least` to `most` finite numbers, or a list of equally long rows of them. form: what errors say
+    /// is expected; null: a text about the list.
     std::vector<double> numbers(const char* key, size_t least, size_t most, const char* form = nullptr) const;
     std::vector<double> numbers(const char* key, size_t count) const { return numbers(key, count, count); }
-    /// The same with numbers that are finite as floats.
+    /// As numbers(), for numbers that are finite as floats.
     std::vector<float> floats(const char* key, size_t count, const char* form = nullptr) const;
-    /// A whole number.
+    /// A member that is a whole number from `least` to `most`.
     uint64_t whole(const char* key, uint64_t most, uint64_t least = 0) const;
     /// A side of an image in px.
     int side(const char* key) const;
@@ -68,7 +69,7 @@ class JsonField {
 
   private:
     const nlohmann::json& member(const char* key) const;
-    /// Throws for a value that is not what is expected.
+    /// Throws InputError that says what is expected instead of the member's value.
     [[noreturn]] void fail(const char* key, const std::string& expected) const;
 
     std::shared_ptr<const nlohmann::json> whole_;  // null: another one keeps the value

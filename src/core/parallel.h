@@ -11,8 +11,8 @@
 
 namespace ewa::core {
 
-/// Calls work(i) for each i < count on all cores. The work of different i must be independent: its order is not fixed. An
-/// exception of any of them is thrown after all threads have ended. most: of them at once.
+/// Calls work(i) for each i < count on all cores. The calls must be independent, because their order is not fixed. If a call
+/// throws, its exception is thrown after all threads have ended. most: calls at one time.
 template <class Work>
 void on_all_cores(size_t count, const Work& work, size_t most = SIZE_MAX) {
     std::atomic<size_t> next{0};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Small libraries of ewa that are loaded when they are needed. Each links a large library, which the programs do not.
+// Loads ewa's plugins, when they are needed. A plugin is a small library of ewa that links a large one, such as MPI, so that the
+// programs need not link it.
 #pragma once
 #include <functional>
 #include <string>
@@ -16,10 +17,10 @@ struct Plugin {
 /// Throws RunError: the library cannot be loaded, with the reason and a remedy.
 [[noreturn]] void cannot_load(const Plugin& plugin, const std::string& reason);
 
-/// Loads the library from its folder beside the program or libewa, and returns what it exports. That begins with the
-/// library's version, a const char*, which must be EWA_VERSION. check_room: is called before the library is loaded,
-/// once it is found. The library stays until the process ends. Throws RunError where there is no such library, or it
-/// does not fit.
+/// Loads the library from its folder beside the program or libewa, and returns its exported table. The table begins with
+/// the library's version, a const char*, which must be EWA_VERSION. check_room: called after the library is found and
+/// before it is loaded. The library stays loaded until the process ends. Throws RunError if the library does not exist,
+/// or has another version.
 const void* load_plugin(const Plugin& plugin, const std::function<void()>& check_room = {});
 
 }  // namespace ewa::core

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Other programs: looked up in PATH, run without a shell, and ended when the caller wishes.
+// Runs other programs. Finds them in PATH, starts them without a shell, and ends them when the caller wishes.
 #pragma once
 #include <sys/types.h>
 
@@ -24,7 +24,7 @@ struct Streams {
     int errors = -1;  // -1: standard error is this process's
 };
 
-/// Whether Ctrl-C on a terminal reaches this process alone, or both.
+/// Whether Ctrl-C on a terminal reaches only this process (own), or the started program as well (shared).
 enum class ProcessGroup { own, shared };
 
 /// Starts a program. The caller waits for it. The program is killed if the thread that started it ends.
@@ -37,7 +37,7 @@ pid_t start_program(std::vector<std::string> command, const std::vector<std::str
 struct Program {
     std::vector<std::string> command;      // the name or path of the program, then its arguments
     std::vector<std::string> environment;  // NAME=value, beside those of this process
-    /// Standard error is appended to it, up to kMostLog bytes. Empty: it is this process's.
+    /// File to which the program's standard error is appended, up to kMostLog bytes. Empty: standard error is this process's.
     std::filesystem::path log;
     bool output_to_log = false;  // standard output is appended to the log, as well as given to `output`
     bool joined = false;         // standard error is part of the output

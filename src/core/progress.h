@@ -11,11 +11,11 @@ namespace ewa::core {
 /// Whether standard output is a terminal on which a line can be redrawn: TERM is not "dumb".
 bool redraws();
 
-/// The pace of work in units of about equal length, from the times at which units were done. Units take the mean time of those
-/// in the later half of the time so far. A unit that takes longer than that makes the estimate longer.
+/// Estimates the time left of work in units of about equal length, from the times at which units were done. The estimate takes
+/// the mean time of units done in the later half of the time so far. A current unit that takes longer lengthens it.
 class Pace {
   public:
-    /// From `done` units on, which were done before.
+    /// seconds: the time at the start. done: the number of units that were already done at that time.
     explicit Pace(double seconds = 0, double done = 0) : marks_{{seconds, done}} {}
     void add(double seconds, double done);
     /// Seconds until `total` units are done. Empty until a unit is done.
@@ -53,13 +53,14 @@ class Progress {
 
     /// Begins the next part of the work. The bar and the time left are those of all parts together.
     void begin(std::string what, int total, std::string unit);
-    /// Another number of units in this part.
+    /// Changes the number of units of this part.
     void set_total(int total);
     /// This part's units up to `done` were done before it began.
     void skip(int done);
-    /// Seconds that this part still takes, in place of the estimate by its pace. They count down until the next call. Empty: unknown.
+    /// Sets the seconds that this part still takes, instead of the estimate by its pace. They count down until the next call.
+    /// Empty: unknown.
     void set_left(std::optional<double> seconds);
-    /// Seconds that the parts after this one take.
+    /// Sets the seconds that all later parts will take.
     void set_rest(double seconds) { rest_ = seconds; }
 
     /// details: more text for the line, such as the loss.

@@ -19,8 +19,8 @@ bool links_stay_inside(const std::filesystem::path& folder, const std::filesyste
 inline constexpr const char* kLinkAdvice =
     "copy the files that it refers to (cp -rL), or make the whole folder of the images a link";
 
-/// The same for images. Their folder in a dataset, the first part of the name, may be a link to anywhere.
-/// Links below it must not lead out of the dataset or of that folder.
+/// As links_stay_inside(), for images of a dataset. The first part of the name, their folder, may be a link to anywhere.
+/// Links below this folder must not lead out of the dataset or of the folder.
 bool links_stay_with_images(const std::filesystem::path& folder, const std::filesystem::path& name);
 
 }  // namespace ewa::core

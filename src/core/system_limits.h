@@ -6,14 +6,14 @@
 
 namespace ewa::core {
 
-/// "this process may use only 390 MiB of address space (ulimit -v); ", or empty without such a limit. Where address
-/// space is short, libraries give other reasons for their failure.
+/// "this process may use only 390 MiB of address space (ulimit -v); ", or empty without such a limit. Errors begin with
+/// it, because libraries give misleading reasons when address space is short.
 std::string address_limit_text();
 
 /// The bytes of address space and of private memory that the process may use (ulimit -v, -d), whichever is less.
 uint64_t memory_limit();
 
-/// Whether the process could now map so many bytes, and start so many threads beside that.
+/// Whether the process could now map so many bytes and also start so many threads.
 bool has_room(uint64_t bytes, int threads);
 
 }  // namespace ewa::core

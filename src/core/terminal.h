@@ -6,20 +6,20 @@
 
 namespace ewa::core {
 
-/// Opens those of the descriptors 0, 1 and 2 that are closed on /dev/null. Without this, the next file that is
-/// opened gets the number, and messages are written into it. Call it first in main().
+/// Opens /dev/null for each of the descriptors 0, 1 and 2 that is closed. Without this, the next opened file would get
+/// such a number, and messages would be written into this file. Call it first in main().
 void open_standard_streams();
 
-/// Columns of the terminal that standard output is. 80 if it is none.
+/// The columns of the terminal on standard output. 80 if standard output is no terminal.
 size_t terminal_columns();
-/// The same, between 40 and 120.
+/// terminal_columns(), clamped to 40..120.
 size_t terminal_width();
 
 /// The help text of a command line parser. Breaks lines between words at `width` columns, and turns "-o,--output"
 /// into "-o, --output". column: where the descriptions of options begin.
 std::string wrapped_help(std::string_view text, size_t column, size_t width);
 
-/// Writes the text to standard output. False, with errno, if not all of it could be written.
+/// Writes the text to standard output. Returns false and sets errno if not all of it could be written.
 bool print_whole(std::string_view text);
 
 }  // namespace ewa::core

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Values of options as people type them: counts such as 7k, colours by name, words of a set. Suggestions for mistyped words.
+// Parses values of options as people type them: counts such as 7k, colours by name, words of a set. Suggests corrections.
 // No function needs a library, so that the parsers of all programs can share them.
 #pragma once
 #include <array>
@@ -50,8 +50,8 @@ std::optional<std::vector<double>> parse_list(std::string_view text);
 /// A number as a message shows it: without needless digits.
 std::string shown_number(double number);
 
-/// Empty if the text is a number from low to high, which it then is in plain digits; else what is wrong with it.
-/// An integer type takes whole numbers only.
+/// Checks that the text is a number from low to high. Returns an empty text, or what is wrong. If T is an integer type, the
+/// number must be whole, and `text` is replaced by its plain digits.
 template <class T>
 std::string settle_number(std::string& text, T low, T high) {
     if constexpr (std::is_integral_v<T>) {
@@ -70,8 +70,8 @@ std::string settle_number(std::string& text, T low, T high) {
     }
 }
 
-/// Empty if the text is one of the words; else what is wrong with it. "colour" becomes "color" and "grey" becomes
-/// "gray" where the words spell it so, and the reverse.
+/// Checks that the text is one of the words. Returns an empty text, or what is wrong. Replaces "colour" by "color" and
+/// "grey" by "gray", or the reverse, if one of the words has that spelling.
 std::string settle_word(std::string& text, const std::vector<std::string>& words);
 
 /// sRGB in [0, 1] from "r,g,b" with each in 0..1, "#rgb", "#rrggbb", or the name of a colour of CSS's basic set

@@ -13,7 +13,7 @@
 
 namespace ewa::core {
 
-/// The first word of a value is its name. Others are read, too.
+/// Pairs of a word and the value that it names. A value's first word is its name; its other words are only read.
 template <class T>
 using Words = std::vector<std::pair<const char*, T>>;
 
@@ -24,7 +24,7 @@ std::vector<std::string> words_of(const Words<T>& words) {
     return all;
 }
 
-/// Empty if there is no such word.
+/// The value that a word names. Empty if no value has this word.
 template <class T>
 std::optional<T> find_value(const Words<T>& words, std::string_view word) {
     const auto found = std::ranges::find_if(words, [&](const auto& named) { return word == named.first; });
@@ -39,7 +39,7 @@ T value_of(const Words<T>& words, std::string word) {
     return *find_value(words, word);
 }
 
-/// Empty if the value has no name.
+/// The name of a value. Empty if the value has none.
 template <class T>
 const char* word_for(const Words<T>& words, T value) {
     const auto found = std::ranges::find_if(words, [&](const auto& named) { return value == named.second; });
