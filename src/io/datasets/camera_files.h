@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which files of a path have the cameras of a dataset.
+// Finds the files at a path that have the cameras of a dataset.
 #pragma once
 #include <filesystem>
 

@@ -23,13 +23,13 @@ struct ColmapLens {
     }
 };
 
-/// In the order of COLMAP's model ids.
+/// All lens models, in the order of COLMAP's model ids.
 std::span<const ColmapLens> colmap_lenses();
 
-/// By COLMAP's number, or null.
+/// The lens model with this COLMAP model id, or null.
 const ColmapLens* colmap_lens(int64_t id);
 
-/// By COLMAP's name, or null.
+/// The lens model with this COLMAP name, or null.
 const ColmapLens* colmap_lens(std::string_view name);
 
 }  // namespace ewa::io

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that belong to images by their names: masks and depth maps. Also counts of a dataset's files that are used.
+// Finds masks and depth maps, which belong to images by their names. Counts which of a dataset's files are used.
 #pragma once
 #include <filesystem>
 #include <map>
@@ -19,10 +19,11 @@ class Companions {
     /// Lists the files. dataset: its folder. downscale: as DatasetOptions::downscale.
     Companions(Kind kind, const ImageRecords& images, const std::filesystem::path& dataset, int downscale);
 
-    /// The file of an image, which the model may name; empty if there is none. Throws InputError for a link out of the dataset.
+    /// The mask or depth map of an image, by the image's name or as the model states. Empty if the image has none. Throws
+    /// InputError for a link out of the dataset.
     std::filesystem::path find(const ImageRecord& image);
 
-    /// The file for all images: the only one there, if its name is that of no image. Empty if there is none.
+    /// The mask or depth map for all images: the only file found, if its name is that of no image. Empty if there is no such file.
     std::filesystem::path of_all();
 
     /// The numbers of files that were found and that are used. bare: names of images without a file.
@@ -62,7 +63,7 @@ class Companions {
     bool for_all_ = false;
 };
 
-/// Counts the images with a file, and those with a camera. dataset: with its frames.
+/// Counts the image files of a dataset, and those that have a camera. dataset: must have its frames.
 UsedOf used_photos(const ImageRecords& model, const Dataset& dataset);
 
 }  // namespace ewa::io

@@ -8,16 +8,16 @@
 
 namespace ewa::io {
 
-/// Whether load_dataset finds cameras in the folder. below false: in its usual places alone, and not elsewhere below it.
+/// Whether load_dataset() finds cameras in the folder. below: also search all folders below it; else only the usual places.
 bool is_dataset_folder(const std::filesystem::path& folder, bool below = true);
 
-/// For a command that names the files in its output folder itself. Throws InputError if the folder is a dataset, or one of
-/// a dataset's folders of images, masks or cameras. option: how the user names the folder.
+/// Checks the output folder of a command that chooses file names itself. Throws InputError if the folder is a dataset, or one
+/// of a dataset's folders of images, masks or cameras. option: the option or argument that names the folder.
 void check_output_folder(const std::string& option, const std::filesystem::path& folder);
-/// Also if the folder holds an image or mask of this dataset.
+/// As above. Throws InputError also if the folder holds an image or mask of this dataset.
 void check_output_folder(const std::string& option, const std::filesystem::path& folder,
                          const Dataset& dataset);
-/// Only for a folder inside a dataset: the command may write datasets.
+/// Checks the output folder of a command that may write datasets. Throws InputError only for a folder inside a dataset.
 void check_not_inside_dataset(const std::string& option, const std::filesystem::path& folder);
 
 }  // namespace ewa::io

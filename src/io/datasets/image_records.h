@@ -54,8 +54,8 @@ struct ImageRecords {
     UsedOf models;                      // of Dataset::used; none: there is no other
 };
 
-/// Gives the camera of a 360° image its intrinsics: the width shows the whole circle, with as many px per angle along both sides.
-/// Throws InputError that begins with `where` if the image is higher than all directions.
+/// Sets the intrinsics of a 360° image's camera. The width spans 360°, and the px per degree are the same along both sides.
+/// Throws InputError that begins with `where` if the height spans more than 180°.
 void set_sphere(Camera& camera, const std::string& where);
 
 /// Adds a note if there are 360° images that do not show all directions.
@@ -81,24 +81,24 @@ void write_points_ply(const std::filesystem::path& path, const PointCloud& point
 struct ColmapModel {
     std::filesystem::path folder;        // of the files
     std::filesystem::path dataset = {};  // the folder that the images are in or below
-    /// A folder above that one. It and the folders between may have images too. Empty: no other folder has any.
+    /// A folder above `dataset`. It and the folders between may have images too. Empty: no other folder has any.
     std::filesystem::path originals = {};
     std::string extension = ".bin";  // or .txt
     uint64_t images = 0;             // only counted where there are several models
 };
 
-/// The models of a dataset, which are in sparse/0 and so on, sparse or root itself. The one with the most images is first. As in COLMAP,
-/// .bin is preferred.
+/// The COLMAP models of a dataset, in sparse/0 and so on, sparse, or `root` itself. The one with the most images is first. As in
+/// COLMAP, .bin files are preferred.
 std::vector<ColmapModel> colmap_models(const std::filesystem::path& root);
-/// The model whose files are in this very folder.
+/// The model whose files are directly in this folder.
 ColmapModel colmap_model_in(const std::filesystem::path& folder);
-/// Those of a workspace that is in the folder: dense/0 and so on, dense, undistorted, distorted or colmap.
+/// The models of a COLMAP workspace in the folder: dense/0 and so on, dense, undistorted, distorted or colmap.
 std::vector<ColmapModel> colmap_workspaces(const std::filesystem::path& root);
-/// Those of other folders, up to three levels below. Empty if several of these folders are datasets.
+/// The models of other folders, up to three levels below `root`. Empty if several of these folders are datasets.
 std::vector<ColmapModel> colmap_models_below(const std::filesystem::path& root);
 /// The number of images in the model's file; 0 if it cannot be read.
 uint64_t count_images(const ColmapModel& model);
-/// Searches the images of the model.
+/// The finder for the images that the model names.
 ImageFinder image_finder(const ColmapModel& model);
 
 /// Reads a model. Without `images`, the images have no paths. With them, missing points are those of points3D.ply in its folder or the

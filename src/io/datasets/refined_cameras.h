@@ -26,10 +26,10 @@ void write_refined_cameras(const std::filesystem::path& path, const std::vector<
 
 struct RefinedUse {
     bool used = false;
-    bool aligned = false;  // those of test images to their images
+    bool aligned = false;  // the cameras of test images were aligned to these images
 };
 
-/// Gives frames the cameras that the file has under their names, at the frames' own resolution. Other frames keep theirs.
+/// Replaces the camera of each frame that the file names, at the frame's own resolution. Other frames keep their cameras.
 /// Throws InputError, also if the file names none of the frames.
 RefinedUse use_refined_cameras(Dataset& dataset, const std::filesystem::path& path);
 

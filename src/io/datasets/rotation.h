@@ -21,13 +21,13 @@ glm::dmat3 nearest_rotation(const glm::dmat3& matrix);
 /// Puts the camera at `center`. axes: its x (right), y (down) and z (forward) in the world, as columns.
 void set_pose(Camera& camera, const glm::dmat3& axes, const glm::dvec3& center);
 
-/// The same axes in OpenCV's order, from those of OpenGL and ARKit: x right, y up, z back.
+/// Converts camera axes of OpenGL and ARKit (x right, y up, z back) to OpenCV's (x right, y down, z forward). Columns are axes.
 inline glm::dmat3 from_opengl(const glm::dmat3& axes) {
     return {axes[0], -axes[1], -axes[2]};
 }
 
-/// The pose of a matrix, row by row, from a camera with OpenGL's axes to the world. The last row may be missing, and the rows may follow each
-/// other in one list.
+/// Sets the camera's pose from a 4 x 4 matrix in JSON, row by row. The matrix maps a camera with OpenGL's axes to the world. Its
+/// last row may be missing, and all numbers may be in one list.
 /// Throws InputError.
 void read_opengl_pose(const core::JsonField& field, const char* key, Camera& camera);
 

@@ -29,7 +29,7 @@ inline constexpr size_t kMostCameras = 100000;  // of a dataset
 /// missing or not finite, a size out of 1..65536, or a rotation that is not orthonormal to 1e-6.
 std::vector<NamedView> read_views(const std::filesystem::path& path, size_t most = kMostViews);
 
-/// Name and camera as in the file.
+/// A named camera as a JSON object in the form above, without the pivot.
 nlohmann::ordered_json camera_json(const std::string& name, const Camera& camera);
 
 /// Writes a temporary file and renames it. Every number survives a round trip unchanged. Throws RunError.

@@ -20,8 +20,8 @@ namespace ewa::io {
 /// The numbers of a .glb: its beginning, and the types of its chunks.
 constexpr uint32_t kGlbMagic = 0x46546c67, kGlbJson = 0x4e4f534a, kGlbBin = 0x004e4942;
 inline const std::string kSplatExtension = "KHR_gaussian_splatting";
-/// By which the values of a primitive are an SPZ in a buffer view: the draft of 2026, and the names of earlier ones. They are
-/// nested in kSplatExtension, or beside it.
+/// Names of the extension that stores a primitive's splats as an SPZ in a buffer view: that of the draft of 2026, then earlier
+/// ones. The extension is nested in kSplatExtension, or beside it.
 inline const std::array<std::string, 4> kSpzExtensions = {
     kSplatExtension + "_compression_spz_2", kSplatExtension + "_compression_spz",
     "KHR_spz_gaussian_splats_compression", "KHR_spz_compression"};

@@ -26,12 +26,12 @@ class GltfDocument;
 /// and without triangles is an InputError too.
 scene::MeshScene read_gltf_mesh(const std::filesystem::path& path);
 
-/// The same in the world of the splats that the mesh was made of, if write_glb_mesh wrote it.
+/// As read_gltf_mesh(). A mesh by write_glb_mesh() is turned back to the world of the splats that it was made of.
 scene::MeshScene read_gltf_mesh_of_splats(const std::filesystem::path& path);
 
 /// The rotation from the world of the splats to the file's, x, y, z and w: in "extras" of the "asset", and in a comment of an OBJ.
 inline constexpr const char* kTurnOfSplats = "rotation_from_splats";
-/// Back from the file's world. Numbers that are no rotation turn nothing.
+/// The inverse of `turn`: from the file's world to that of the splats. The identity if `turn` is no rotation.
 glm::dmat3 undone_turn(const glm::dquat& turn);
 
 /// Whether the file is a glTF whose meshes have triangles and no splats. False for anything else.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Corners and faces of a file become triangles.
+// Makes triangles of the vertices and faces that a file lists.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -25,10 +25,10 @@ class FaceCollector {
     void add_position(const glm::dvec3& position) { positions_.push_back(position); }
     size_t positions() const { return positions_.size(); }
 
-    /// A fan around the first corner. indices: into the positions so far, from 0; others fail.
+    /// Adds a face as a fan of triangles around its first corner. indices: into the positions added so far, from 0; others fail.
     void add_face(std::span<const double> indices);
 
-    /// The triangles with one plain material. Fails where there are none.
+    /// Returns the triangles, with one plain material. Fails if there are none.
     scene::MeshScene take();
 
   private:

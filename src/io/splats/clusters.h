@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Values in fewer values: tables of scalars and palettes of vectors, by k-means. Results depend on the input
-// alone, not on the number of threads: sums have a fixed order, and no random numbers are drawn.
+// Quantises values by k-means, to tables of scalars and palettes of vectors. Results depend only on the
+// input, not on the number of threads: sums have a fixed order, and no random numbers are drawn.
 #pragma once
 #include <array>
 #include <cstddef>

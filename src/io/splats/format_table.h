@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The table of the splat formats: names, functions that read and write them, and the contents of a scene that a file keeps.
+// The table of the splat formats: names, functions that read and write them, and the contents of a scene that a file can store.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -24,9 +24,9 @@ struct FormatRow {
 
     // How a file is recognised.
     std::array<std::string_view, 2> beginnings = {};  // first bytes
-    /// Whether a file that begins so is of this format. Null: it is, unless another row confirms it.
+    /// Whether a file with these first bytes is of this format. Null: it is, unless another row's `confirm` returns true.
     bool (*confirm)(const std::filesystem::path& path) = nullptr;
-    /// The name has precedence over the first bytes if the file's size is a multiple of this. 0: it never has.
+    /// The file's name has precedence over its first bytes if its size is a multiple of this, bytes. 0: never.
     uint64_t named_multiple = 0;
 
     // Contents of a scene that a file keeps besides the usual values.
@@ -53,9 +53,9 @@ struct FormatRow {
                                         const SaveOptions& options) = nullptr;
 
     // Files beside the one that names them.
-    /// Those that exist and belong to an existing file.
+    /// The existing files that hold the values of an existing naming file.
     Paths (*values)(const std::filesystem::path& naming) = nullptr;
-    /// The changes that writing makes to them.
+    /// The value files that writing would write and remove.
     ValueFiles (*beside)(const std::filesystem::path& naming) = nullptr;
     /// Whether writing makes folders of such a name.
     bool (*names_part)(std::string_view folder) = nullptr;
@@ -63,7 +63,7 @@ struct FormatRow {
     bool writable() const { return write != nullptr || consume != nullptr; }
 };
 
-/// In the order of help texts and errors.
+/// All rows, in the order of help texts and errors.
 std::span<const FormatRow> format_rows();
 
 const FormatRow& row_of(SplatFormat format);
@@ -71,10 +71,10 @@ const FormatRow& row_of(SplatFormat format);
 /// The row whose extension or name the file has, in upper or lower case. Null if there is none.
 const FormatRow* row_of_name(const std::filesystem::path& path);
 
-/// The same for a file to write. Throws InputError that says what ewa writes.
+/// The row of a file to write, by its name. Throws InputError that lists the formats that ewa writes.
 const FormatRow& row_to_write(const std::filesystem::path& path);
 
-/// The row that the first bytes of the file tell. Null if there is none. head: four bytes, or the whole of a shorter file.
+/// The row of a file by its first bytes. Null if no row fits. head: the first four bytes, or the whole of a shorter file.
 const FormatRow* row_of_head(const std::filesystem::path& path, std::string_view head);
 
 enum class Uses { read, written, both, only_read, only_written };
@@ -82,7 +82,7 @@ enum class Uses { read, written, both, only_read, only_written };
 /// The extensions of the formats with these uses, for help texts: ".ply .spz".
 std::string extension_list(Uses uses);
 
-/// The same for errors, with their meanings: ".ply, meta.json of a SOG".
+/// The extensions of the formats with these uses, for errors, with their meanings: ".ply, meta.json of a SOG".
 std::string extension_text(Uses uses);
 
 }  // namespace ewa::io

@@ -22,7 +22,7 @@ namespace ewa::io {
 inline constexpr const char* kLevelsName = "lod-meta.json";
 inline constexpr size_t kMostLevels = 32;
 
-/// The splats of the levels, such as "100, 50, 25".
+/// The numbers of splats of the levels as text, such as "100, 50, 25".
 std::string counts_text(const std::vector<size_t>& counts);
 
 /// Whether write_levels makes folders with such a name: LEVEL_CHUNK, or with a number more where that existed.

@@ -7,8 +7,8 @@
 
 namespace ewa::io {
 
-/// Converts colours from linear light to sRGB: the base colour exactly, and view dependence by the slope of the curve there.
-/// Returns a line that says so.
+/// Converts colours from linear light to sRGB: the base colour exactly, view dependence by the slope of sRGB's curve at the
+/// base colour. Returns a line for the user about this.
 std::string linear_colors_to_srgb(Gaussians& gaussians);
 
 }  // namespace ewa::io

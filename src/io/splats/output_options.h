@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options of an output as people give them, by the format that its name tells.
+// Options of a splat file to write, as users type them. The file's name gives the format.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -15,7 +15,7 @@ struct OutputOptions {
     std::string geo, title;
 };
 
-/// Sets them in `save`. Throws InputError for a name of no format, and for options that the output does not have.
+/// Sets the options in `save`. Throws InputError if the file's name has no known format, or the format lacks an option.
 void set_output_options(SaveOptions& save, const std::filesystem::path& file, const OutputOptions& options);
 
 }  // namespace ewa::io

@@ -35,11 +35,11 @@ class PartFolders {
     PartFolders(const PartFolders&) = delete;
     PartFolders& operator=(const PartFolders&) = delete;
 
-    /// Makes a folder of the first name that is free: `usual`, then with -2, -3 and so on. Returns the name.
+    /// Makes a folder with the first name that does not exist: `usual`, then with -2, -3 and so on. Returns the name.
     std::string add(const std::string& usual);
 
-    /// Writes the naming file. Then removes the parts of the one that it replaced, and the folders that killed processes left, unless
-    /// a .json beside them names them.
+    /// Writes the naming file. Then removes the parts of the replaced naming file, and folders that killed processes left. Keeps
+    /// folders that a .json beside them names.
     void replace(std::string_view text);
 
   private:

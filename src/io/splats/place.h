@@ -21,7 +21,7 @@ std::optional<Place> read_place(const std::filesystem::path& folder);
 /// Throws RunError.
 void write_place(const std::filesystem::path& file, const Place& place);
 
-/// Without the heading, which is 0.
+/// The comment of a PLY that states the place. It has no heading, which counts as 0.
 std::string place_comment(const Place& place);
 bool is_place_comment(const std::string& comment);
 /// The place that the comments of a PLY name. Empty if they name none, or several that differ.

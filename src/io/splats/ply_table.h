@@ -36,7 +36,7 @@ struct PlyElement {
     std::optional<size_t> find_number(std::string_view property) const;  // not a list
 };
 
-/// Where an element has colours.
+/// The columns of an element that hold red, green and blue.
 struct PlyColors {
     std::array<size_t, 3> columns{};
     double full = 255;  // the value of full brightness
@@ -67,7 +67,7 @@ class PlyTable {
     /// indices of properties that are not lists. Double holds every PLY type exactly.
     void read(const std::vector<size_t>& columns, const std::function<void(size_t, const double*)>& row);
 
-    /// The same for one list: calls row with the values of property `list`.
+    /// Reads one property that is a list: calls row with the values of property `list`, for each row of the element.
     void read_lists(size_t list, const std::function<void(std::span<const double>)>& row);
 
     [[noreturn]] void fail(std::string_view text) const { reader_.fail(text); }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scene as a file of a format stores it (format_table.h). All functions return lines on contents that the format loses.
+// Changes a scene to what a file of a format stores (format_table.h). Functions return lines for the user on lost contents.
 #pragma once
 #include <string>
 #include <vector>
@@ -15,11 +15,11 @@ std::vector<std::string> prepare(Gaussians& gaussians, const FormatRow& row);
 /// Whether prepare would leave the scene as it is.
 bool is_prepared(const Gaussians& gaussians, const FormatRow& row);
 
-/// Keeps the splats that the file will have, in its order, so that a file that is read back can be compared splat by splat. Positions
-/// and opacities do not change.
+/// Removes splats that the file will not have, and puts the others into its order. So the file, when read back, can be compared
+/// splat by splat. Positions and opacities do not change.
 std::vector<std::string> match_file(Gaussians& gaussians, const FormatRow& row);
 
-/// The comments and the mark that the format drops.
+/// A line on comments and the anti-aliased mark, if the format cannot store them.
 std::vector<std::string> dropped_remarks(const SaveOptions& options, const FormatRow& row);
 
 }  // namespace ewa::io

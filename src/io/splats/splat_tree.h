@@ -23,7 +23,7 @@ struct Bound {
     void add(const Bound& other) { add(other.low, other.high); }
 };
 
-/// The box of the splat's ellipsoid at so many standard deviations, in the world.
+/// The axis-aligned box (world) of the splat's ellipsoid at this number of standard deviations.
 Bound bound_of_splat(const Gaussians& gaussians, size_t i, double deviations = 1);
 
 struct TreeNode {
@@ -40,8 +40,8 @@ struct TreeLimits {
     int depth = 64;      // of the deepest leaf; the root has 0
 };
 
-/// Planes through the medians of the means. They divide the whole of space, so that every place is in a leaf. The first node is the
-/// root.
+/// Builds the tree. Planes pass through the medians of the splats' means, and divide all of space: every point is in a leaf.
+/// The first node is the root.
 std::vector<TreeNode> build_tree(const Gaussians& gaussians, const TreeLimits& limits);
 
 /// The node at this depth whose box has the mean, or the leaf above it. mean: three coordinates.

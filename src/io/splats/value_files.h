@@ -24,9 +24,9 @@ struct ValueFiles {
     Paths removed;  // older values, once the naming file is in its place
 };
 
-/// `usual`: the names of the values where all of them are free; else all end in -2, in -3 and so on. `named_by`: the
-/// values that an existing naming file names, empty if there is none. Values of `naming` with such a
-/// name are removed if ewa wrote it, unless another naming file in the folder names them too.
+/// usual: the names of the values. If a file has one of these names, all values get -2, -3 and so on. named_by: returns the
+/// values that an existing naming file names. If ewa wrote the existing `naming`, its values with such names are removed,
+/// unless another naming file in the folder names them too.
 ValueFiles value_files(const std::filesystem::path& naming, const Paths& usual,
                        Paths (*named_by)(const std::filesystem::path&));
 
@@ -35,15 +35,15 @@ class NewValues {
   public:
     /// beside: the ValueFiles of the naming file.
     NewValues(const std::filesystem::path& naming, ValueFiles (*beside)(const std::filesystem::path&));
-    /// Without replace(), no new file stays.
+    /// Removes the new files unless replace() was called.
     ~NewValues();
     NewValues(const NewValues&) = delete;
     NewValues& operator=(const NewValues&) = delete;
 
-    /// The next value, to be written.
+    /// Opens the next value file, which the caller writes.
     core::AtomicFile& add();
-    /// Gives the values their usual names, or those with the first number that all of them can have. Files of other processes
-    /// keep theirs.
+    /// Chooses and returns the names of the values: the usual ones, or those with the first number that no file has. Names that
+    /// other processes have reserved count as existing files.
     Paths claim();
     /// Puts all in place, the naming file last, and removes the older values.
     void replace(std::string_view text);
@@ -58,10 +58,10 @@ class NewValues {
 /// a.bin, a-2.bin, a-3.bin and so on.
 std::filesystem::path numbered(const std::filesystem::path& usual, int number);
 
-/// The file's name in the form of the first one.
+/// The inverse of numbered(): the file's name without -2, -3 and so on.
 std::string without_number(const std::filesystem::path& file);
 
-/// Whether the asset.generator at the beginning of a JSON or .glb says so.
+/// Whether ewa wrote the file, by the asset.generator at the beginning of a JSON or .glb.
 bool written_by_ewa(const std::filesystem::path& file);
 
 }  // namespace ewa::io

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Splats in a zip archive, as sites and browsers give them: one file, or the folder of a SOG, among files that do not matter.
+// Reads splats in a zip archive, as web sites offer them: one splat file, or the folder of a SOG, among other files.
 #pragma once
 #include <filesystem>
 

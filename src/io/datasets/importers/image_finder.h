@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The images of a dataset, whose cameras' file may name them as they were on another machine: by a path that is gone, by file name,
-// with another extension or in another case, or by a label without an extension.
+// Finds the images that a file of cameras names. The file may name them as on another machine: by a path that no longer exists, by
+// file name, with another extension or in another case, or by a label without an extension.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -19,18 +19,19 @@ class ImageFinder {
     /// A folder that may hold the images.
     struct Place {
         std::filesystem::path folder;
-        bool own = false;   // it holds other things too, such as the images' folder
-        bool below = true;  // also in the folders below it
-        bool last = false;  // only where no other place has any of them
+        bool own = false;   // the dataset's own folder, which also holds other files and folders
+        bool below = true;  // also search the folders below it
+        bool last = false;  // search it only if no other place has any of the images
     };
 
     /// The places, the likeliest first. All images are in one of them.
     explicit ImageFinder(std::vector<Place> places);
-    /// These folders of the dataset, as far as they exist, then its own, and undistorted/ and dense/ where it has no images.
+    /// Searches these folders of the dataset, if they exist, then the dataset's own folder. If that has no images, also
+    /// undistorted/ and dense/.
     ImageFinder(const std::filesystem::path& dataset, const std::vector<std::string>& folders);
 
-    /// Chooses the place by all names of the cameras' file. Without it, the place of the first image that is found counts. Then only
-    /// names without a path that exists are searched in other folders of the place.
+    /// Chooses the place by all names in the file of cameras. Without this call, the first image found decides. After it, only
+    /// names whose path does not exist are searched in other folders of the place.
     void settle(const std::vector<std::string>& names) const;
 
     /// Adds folders of the dataset that usually have the images of a workspace. They are searched last.
@@ -61,10 +62,10 @@ class ImageFinder {
     std::vector<std::filesystem::path> listed(const std::map<std::string, std::vector<size_t>>& map,
                                               size_t place, const std::filesystem::path& key,
                                               const std::filesystem::path& name, bool strict) const;
-    /// The images of a place with this very name; case does not count.
+    /// The images of a place with exactly this name; upper and lower case are the same.
     std::vector<std::filesystem::path> named(size_t place, const std::filesystem::path& name,
                                              bool strict) const;
-    /// Those images of the place that a name of settle() is the name of.
+    /// The images of the place that names of settle() refer to.
     const std::set<std::filesystem::path>& claimed(size_t place, bool strict) const;
     /// The images of a place that the name may mean.
     std::vector<std::filesystem::path> matches(size_t place, const std::filesystem::path& name,
@@ -83,14 +84,14 @@ class ImageFinder {
 /// The entry of the folder with this name; else one whose name differs in case alone (ASCII). folder / name if there is none.
 std::filesystem::path entry_in(const std::filesystem::path& folder, const std::string& name);
 
-/// Whether files beside the folder may belong to it: neither has ewa made it, nor is it an archive's.
+/// Whether files beside the folder may belong to it. False if ewa made the folder, or it is an unpacked archive.
 bool has_outside(const std::filesystem::path& folder);
 
-/// Whether the folder has one for photos: images/ or input/.
+/// Whether the folder has a subfolder for photos: images/ or input/.
 bool has_photos_folder(const std::filesystem::path& folder);
 
-/// Visits the folders below, level after level, three in all and in the order of names, but for those of pictures, links, and results of
-/// ewa. What is in a folder is visited where `visit` returns true. A result of ewa has none.
+/// Calls `visit` for the folders below `root`, three levels deep, level by level, in the order of names. Skips folders of images,
+/// links, and results of ewa. Enters a folder only if `visit` returns true. Visits nothing if `root` is a result of ewa.
 void visit_folders_below(const std::filesystem::path& root,
                          const std::function<bool(const std::filesystem::path&)>& visit);
 

@@ -22,18 +22,18 @@ class ImageFinder;
 
 /// What an importer reads.
 struct ImportSource {
-    std::filesystem::path file;     // with the cameras; the first one, if each image has a file
+    std::filesystem::path file;  // file with the cameras; if each image has its own file, the first of these
     std::filesystem::path dataset;  // the folder that the images are in or below
     bool with_points = true;
 };
 
-/// A format. World and cameras are as in the file, but cameras get OpenCV's axes. Throws InputError of one line that names the file
-/// and the place.
+/// A file format of cameras. `read` keeps the file's world frame, and gives cameras OpenCV's axes. It throws InputError of one line
+/// that names the file and the place in it.
 struct CameraImporter {
     std::string_view format;  // Dataset::format
-    /// Folders of a dataset that may hold the file. "" is the dataset's own.
+    /// Folders of a dataset that may hold the file. "" is the dataset's own folder.
     std::vector<std::string_view> places;
-    /// How the file's name begins, where nobody names the file: photos may have other files beside them.
+    /// The beginning that the file's name must have if the user does not name the file. Other files may lie beside photos.
     std::string_view usual;
     bool (*named)(const std::filesystem::path& name);  // whether a file's name may be of the format
     bool (*begins)(std::string_view head);             // whether these first bytes are; at most kHeadBytes
@@ -46,7 +46,7 @@ inline constexpr std::string_view kImportedFrom =
     "OpenSfM, OpenDroneMap, OpenMVG, Metashape, RealityScan, Polycam, Record3D, Bundler, LLFF or INRIA's "
     "trainer";
 
-/// In the order in which they are tried.
+/// All importers, in the order in which they are tried.
 const std::vector<CameraImporter>& camera_importers();
 
 struct FoundImporter {
@@ -57,14 +57,15 @@ struct FoundImporter {
 /// The importer of a dataset's folder, or of a file that the user names. Empty if none reads it.
 std::optional<FoundImporter> find_importer(const std::filesystem::path& path);
 
-/// Whether an entry of an archive has cameras, or may be a transforms.json. head: gives the entry's first bytes, and is only called for names that fit.
+/// Whether an entry of an archive has cameras, or may be a transforms.json. head: returns the entry's first bytes; only called
+/// for names that fit.
 bool is_imported(const std::filesystem::path& entry, const std::function<std::string()>& head);
 /// Another file of the dataset's folder that has cameras and is not among the files that were read. Empty: none.
 std::filesystem::path other_cameras(const std::filesystem::path& dataset, const FoundImporter& found,
                                     const std::vector<std::filesystem::path>& read);
 
-/// Advice on what to export, for a folder or file with a program's cameras in a form that ewa does not read, such as its project. Or
-/// the reason why a file has not the format of its name. Empty: no advice.
+/// Advice on what to export, if the path has a program's cameras in a form that ewa does not read, such as its project file. Or the
+/// reason why a file does not have the format that its name states. Empty: no advice.
 std::string export_advice(const std::filesystem::path& path);
 
 /// Whether a file may be a transforms.json by its name: one that begins with "transforms", in any case.
@@ -79,17 +80,17 @@ std::string head_of(const std::filesystem::path& file);
 /// The folder's files in the order of names.
 std::vector<std::filesystem::path> files_of_folder(const std::filesystem::path& folder);
 
-/// The records of one file. folder: of the images.
+/// Empty records, to be filled from one file of cameras. folder: the folder of the images.
 ImageRecords begin_records(const ImportSource& source, std::string_view program,
                            const std::filesystem::path& folder);
 
-/// The record of an image, with the "width", "height" (px), "fx" and "fy" of its camera.
+/// The record of an image, with "width", "height" (px), "fx" and "fy" from its camera in the file.
 ImageRecord begin_record(const ImageFinder& images, const std::string& name, const core::JsonField& camera);
 
 /// Checks the intrinsics and the rotation of a record. `where` begins the errors.
 void finish_record(ImageRecord& record, const std::string& where);
 
-/// Adds the points of the PLY of points that is alone in the folder, unless there are points.
+/// Adds the points of the folder's only PLY of points, unless the records have points already.
 void add_points_beside(const std::filesystem::path& folder, bool with_points, ImageRecords& records);
 
 /// A note about `count` images of the file without a pose, if there are any.
@@ -105,7 +106,8 @@ using CsvColumns = std::map<std::string, size_t>;
 /// before it.
 std::string_view reality_scan_heading(std::string_view head);
 
-/// Other spellings, such as yaw for heading, have RealityScan's names. A name may occur twice: the first one counts.
+/// The columns that the line names. Other spellings, such as yaw for heading, count as RealityScan's names. If a name occurs twice,
+/// the first one counts.
 CsvColumns reality_scan_columns(std::string_view heading);
 
 ImageRecords import_open_sfm(const ImportSource& source);

@@ -22,7 +22,7 @@ class XmlFile {
     XmlFile(const XmlFile&) = delete;
     XmlFile& operator=(const XmlFile&) = delete;
 
-    /// The element at the top.
+    /// The document's root element.
     XmlField top() const;
 
   private:
@@ -39,9 +39,9 @@ class XmlField {
     bool has(const char* child) const { return find(child).has_value(); }
     /// The first child of that name.
     std::optional<XmlField> find(const char* child) const;
-    /// A child that must be there. Places in its errors begin with this element's, and `what` if it is not empty.
+    /// A required child. Its errors begin with this element's place, then `what` if that is not empty. Throws if it is missing.
     XmlField at(const char* child, const std::string& what = {}) const;
-    /// All child elements; those of one name if it is not null.
+    /// All child elements, or only those of this name if it is not null.
     std::vector<XmlField> children(const char* name = nullptr) const;
     /// The text of an attribute or of the element; empty if there is none.
     std::string attribute(const char* name) const;
