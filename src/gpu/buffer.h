@@ -58,7 +58,7 @@ class Buffer {
     std::byte* mapped() const {
         return memory_ && memory_->mapped() ? memory_->mapped() + memory_offset_ : nullptr;
     }
-    /// The same for memory that the host reads fast.
+    /// The host's address, if the host reads this memory fast; else null.
     const std::byte* readable() const {
         return memory_ && memory_->access() == HostAccess::read_write ? mapped() : nullptr;
     }

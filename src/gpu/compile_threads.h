@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Threads that compile pipelines while their owner does something else.
+// Threads that compile pipelines in the background.
 #pragma once
 #include <cstddef>
 #include <functional>
@@ -18,8 +18,8 @@ class CompileThreads {
     ~CompileThreads();
     CompileThreads(const CompileThreads&) = delete;
 
-    /// Calls `work` on a thread, larger work first. It is not called where no thread can start: who needs its result
-    /// has to be able to do without. It must not throw.
+    /// Calls `work` on a thread, larger work first. If no thread can start, `work` is not called, so the caller must manage
+    /// without its result. `work` must not throw.
     void add(size_t size, std::function<void()> work);
 
   private:

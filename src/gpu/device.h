@@ -71,14 +71,14 @@ class Device {
 
     /// Throws out_of_memory if the driver has no memory left.
     Memory allocate(const vk::MemoryRequirements& requirements, bool host_visible);
-    /// States the bytes that are wanted and those that are allocated.
+    /// The error of a failed allocation. It states the requested bytes and the allocated ones.
     RunError out_of_memory(uint64_t bytes) const;
-    /// Kernels and buffers that are made from now on suit a device of these limits. For tests.
+    /// Replaces the limits for which kernels and buffers are made from now on. For tests.
     void pretend(const Limits& limits) { limits_ = limits; }
-    /// Device memory is mapped for no more than this from now on, as on other devices. For tests.
+    /// As MemoryPool::limit_host_access().
     void limit_host_access(HostAccess most) { memory_->limit_host_access(most); }
-    /// All blocks together take at most this many bytes from now on; 0: as many as there are. make_room: frees something
-    /// that is not needed now, when an allocation does not fit; false if there is nothing.
+    /// Limits the bytes of all memory blocks together, from now on; 0: no limit. make_room: called when an allocation does
+    /// not fit, to free memory that is not needed now; returns false if there is none.
     void limit_memory(uint64_t bytes, std::function<bool()> make_room);
     void make_room_with(std::function<bool()> make_room) { make_room_ = std::move(make_room); }
     uint64_t memory_limit() const { return memory_->limit(); }
@@ -90,7 +90,7 @@ class Device {
 
     /// Throws RunError with the validation layer's first message since the last call.
     void check_validation();
-    /// Ignores messages that are not about ewa's calls.
+    /// Stores a message of the validation layer for check_validation(). Ignores messages that are not about ewa's calls.
     void add_validation_message(const std::string& message);
 
   private:
@@ -120,7 +120,7 @@ class Device {
     std::vector<std::string> messages_;
 };
 
-/// Calls action, and gives the driver's errors words.
+/// Calls action. Turns the driver's exceptions into RunError with the device's name.
 template <class Action>
 void with_driver_errors(const Device& device, Action action) {
     try {

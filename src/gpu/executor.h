@@ -24,8 +24,8 @@ class Executor {
     ~Executor();
     Executor(const Executor&) = delete;
 
-    /// Submits. What the recording refers to must live until wait() has returned for it. timed: also measures
-    /// each command. Throws RunError if the device is lost, std::logic_error if too many are unfinished.
+    /// Submits a recording. Its buffers and pipelines must live until wait() has returned for it. timed: also measures
+    /// each command. Throws RunError if the device is lost, std::logic_error if too many submissions are unfinished.
     void submit(const Recording& recording, bool timed = false);
     /// Submissions that wait() has not returned for.
     uint32_t unfinished() const { return unfinished_; }
@@ -35,8 +35,8 @@ class Executor {
     /// Submits, and waits for this and all before it.
     void run(const Recording& recording, bool timed = false);
 
-    /// What is copied into each target, pixel after pixel in rows of `stride` pixels. source has a word or, for
-    /// VK_FORMAT_R32G32B32A32_SFLOAT, four words a pixel.
+    /// A copy of an image from a buffer to a target. The source has rows of `stride` pixels, with one word a pixel, or four
+    /// words for VK_FORMAT_R32G32B32A32_SFLOAT.
     struct CopyOut {
         const Buffer* source;
         uint32_t stride, width, height;

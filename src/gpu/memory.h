@@ -12,7 +12,7 @@
 
 namespace ewa::gpu {
 
-/// Memory that the host does not cache can be written fast, but is read a hundred times slower.
+/// How the host can access a memory fast. write: memory that the host does not cache, whose reads are a hundred times slower.
 enum class HostAccess { none, write, read_write };
 
 /// The free parts of one block.
@@ -22,7 +22,7 @@ class FreeRanges {
     /// Takes `bytes` bytes of the first range with room for them, and returns their offset. alignment: a power of
     /// two. Empty if no range has room.
     std::optional<uint64_t> take(uint64_t bytes, uint64_t alignment);
-    /// Bytes that were taken are free again.
+    /// Frees bytes that take() returned.
     void give_back(uint64_t offset, uint64_t bytes);
     bool all_free() const { return ranges_.size() == 1 && ranges_.begin()->second == bytes_; }
 
@@ -31,9 +31,9 @@ class FreeRanges {
     std::map<uint64_t, uint64_t> ranges_;  // offset -> bytes; no two touch
 };
 
-/// Bytes of a new block: a whole number of the buffers that need it, `stride` bytes each. It is a sixteenth of the
-/// `held` bytes in blocks of this type, so what is not used stays small beside what is. A buffer of more has a
-/// block of its own.
+/// The size of a new block, bytes: a whole number of buffers of `stride` bytes. It is about a sixteenth of the `held`
+/// bytes in blocks of this type, so that unused memory stays a small share. A larger buffer gets a block of
+/// its own.
 uint64_t block_bytes(uint64_t stride, uint64_t held, uint64_t heap);
 
 struct MemoryUse {
@@ -88,10 +88,10 @@ class MemoryPool {
 
     /// Empty if the driver has no such memory left, or allows no further allocation.
     std::optional<Memory> allocate(const vk::MemoryRequirements& requirements, bool host_visible);
-    /// Memory of the device is mapped for no more than this from now on, as on other devices. For tests.
+    /// Limits the host access to device memory that is allocated from now on, to test on one device the code for others.
     void limit_host_access(HostAccess most) { most_access_ = most; }
-    /// All blocks together take at most this many bytes from now on. A small part is for memory that the host can see:
-    /// copies go through it. 0: no limit.
+    /// Limits the bytes of all blocks together, from now on. A small part of the limit is for memory that the host can see,
+    /// through which it copies. 0: no limit.
     void limit_bytes(uint64_t bytes) { limit_ = bytes; }
     uint64_t limit() const { return limit_; }
     /// The part of the limit for memory that the host can see.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One compiled compute shader with its specialisation constants, and what its SPIR-V module declares:
-// bindings, accesses, push constants. Recordings take every access from here.
+// One compiled compute shader with its specialisation constants, and the declarations of its SPIR-V module:
+// bindings, accesses, push constants. Recordings derive all accesses from these.
 #pragma once
 #include <compare>
 #include <cstdint>
@@ -51,7 +51,7 @@ struct SpecConstant {
 std::vector<uint32_t> with_values(std::span<const uint32_t> spirv,
                                   const std::vector<SpecConstant>& constants);
 
-/// The module with an entry point that asks for these modes of its 32-bit floats. SPIR-V has them from 1.4 on.
+/// The module with an entry point that requests these modes of 32-bit floats. SPIR-V has the modes from version 1.4 on.
 std::vector<uint32_t> with_float_modes(std::span<const uint32_t> spirv, const FloatModes& modes);
 
 class Pipeline {
@@ -68,7 +68,7 @@ class Pipeline {
     vk::Pipeline handle() const { return *pipeline_.get(); }
     vk::PipelineLayout layout() const { return *layout_; }
     vk::DescriptorSetLayout set_layout() const { return *set_layout_; }
-    /// Compiles it, or waits for that, without a word of errors: handle() throws them.
+    /// A function that compiles the pipeline, or waits until it is compiled. It does not report errors; handle() throws them.
     std::function<void()> compilation() const {
         return [pipeline = pipeline_] { pipeline.wait(); };
     }
@@ -81,15 +81,15 @@ class Pipeline {
     std::shared_future<vk::UniquePipeline> pipeline_;
 };
 
-/// The pipelines of a device, which live as long as it. Each is compiled once, for all who share the device. A CPU device
-/// compiles on all cores. Calls may come from any thread.
+/// The pipelines of a device, which live as long as the device. Each is compiled once, for all users of the device. A CPU
+/// device compiles on all cores. Calls may come from any thread.
 class PipelineStore {
   public:
     PipelineStore();
-    /// spirv: a module that outlives the device; its address stands for it. Throws as Pipeline's constructor does.
+    /// spirv: a module that outlives the device; its address identifies it. Throws as Pipeline's constructor does.
     const Pipeline& get(Device& device, const std::string& name, std::span<const uint32_t> spirv,
                         const std::vector<SpecConstant>& constants);
-    /// Those that were asked for so far.
+    /// The number of pipelines that get() has created so far.
     size_t count() const;
 
   private:

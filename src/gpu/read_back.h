@@ -9,8 +9,8 @@
 
 namespace ewa::gpu {
 
-/// The value lies in device memory, since every invocation may use it. Where the host cannot map that memory, a copy
-/// lies in the host's.
+/// The value lies in device memory, since every invocation may use it. If the host cannot map that memory, record()
+/// copies the value to host memory.
 template <class T>
 class ReadBack {
   public:
@@ -19,7 +19,7 @@ class ReadBack {
     }
     const Buffer& buffer() const { return buffer_; }
     void clear(Recording& recording) const { recording.fill(buffer_, 0, 0, sizeof(T)); }
-    /// The last command that concerns the value.
+    /// Records the copy to host memory, if one is needed. Call it after all commands that write the value.
     void record(Recording& recording) const {
         if (copy_) recording.copy(buffer_, 0, copy_, 0, sizeof(T));
     }
