@@ -153,7 +153,7 @@ class PassCache {
     std::map<std::pair<std::string_view, Constants>, const gpu::Pipeline*> pipelines_;
 };
 
-/// Where passes are recorded.
+/// Records passes: the recording, and the passes of its device.
 struct Recorder {
     gpu::Recording& recording;
     PassCache& cache;

@@ -82,9 +82,9 @@ struct UpdateViews {
         moments2_out, statistics;
 };
 
-// A training camera's motion.
+// The motion of a training camera: the learned correction of its pose and focal length.
 
-/// Writes the camera that a frame uses: the dataset's, moved.
+/// Writes the camera that a frame uses: the dataset's camera with its motion applied.
 struct MoveCamera {
     static constexpr char shader[] = "move_camera";
     using Work = OneSubgroup<shared::MoveCameraPush>;
@@ -408,7 +408,7 @@ struct DepthLoss {
     gpu::BufferPart planes, depths, image_gradient, partials;
 };
 
-/// Adds the floats of each row in a fixed order.
+/// Sums the floats of each row in a fixed order, so that the sums are reproducible.
 struct Reduce {
     static constexpr char shader[] = "reduce";
     struct Work : OneSubgroup<shared::ReducePush> {
