@@ -69,10 +69,10 @@ class Server {
     /// Whether splats of this step should be taken: somebody asked since the last ones, and taking them
     /// costs at most a twentieth of the time.
     bool wants_splats(int step) const;
-    /// seconds: how long taking them took.
+    /// Gives the server new splats. seconds: the time that copying them from the trainer took.
     void offer(Snapshot&& snapshot, double seconds);
     bool paused();
-    /// Whether saving was asked for since the last call.
+    /// Whether a client has requested /save since the last call.
     bool take_save();
 
   private:

@@ -47,11 +47,11 @@ class Client {
     // Each throws InputError for a refusal, or an answer that is not a trainer's. Each throws RunError if nobody
     // answers or the connection ends.
 
-    /// With the metrics from line `first_line` on.
+    /// Requests the run's status, with the lines of metrics from `first_line` on.
     Status status(size_t first_line);
-    /// Splats with another tag than this, or nothing if there are none. tag: empty for any splats.
+    /// Requests splats whose tag differs from `tag`. Returns nothing if the server has none. tag: empty for any splats.
     std::optional<TaggedSplats> splats(const std::string& tag);
-    /// pause, resume or save.
+    /// Sends a command to the trainer. name: pause, resume or save.
     void command(const std::string& name);
 
   private:
@@ -69,14 +69,14 @@ std::optional<LiveFile> read_live_file(const std::filesystem::path& folder);
 /// The token that was given, else that of the file, which is a live file or the token alone, else that of the variable
 /// EWA_TOKEN. Empty if there is none of these. Throws InputError for a file without a token.
 std::string find_token(const std::string& given, const std::filesystem::path& file);
-/// Writes it. Throws RunError.
+/// Writes the live file of a run's folder. Throws RunError.
 void write_live_file(const std::filesystem::path& folder, const LiveFile& live);
 
 struct WhatToWatch {
     std::filesystem::path folder;    // of the run; may be empty
     std::optional<Address> address;  // of the trainer; else the folder's live file has it
     std::string token;
-    // Files that have not changed since then are ignored.
+    // A splats.ply that is not newer than this is ignored.
     std::filesystem::file_time_type splats_after = std::filesystem::file_time_type::min();
     std::filesystem::file_time_type metrics_after = std::filesystem::file_time_type::min();
     std::chrono::milliseconds patience = kPatience;  // with a trainer that does not answer

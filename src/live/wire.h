@@ -17,7 +17,7 @@ class Wire final : public httplib::Stream {
          const std::atomic<bool>* stop = nullptr,
          std::chrono::milliseconds write_grace = std::chrono::seconds(30));
 
-    /// So many bytes more may come. `patience` now limits each wait for some of them.
+    /// Allows so many further bytes to arrive. From now on, `patience` limits each wait for bytes, not the whole exchange.
     void allow(uint64_t bytes);
 
     bool is_readable() const override { return left_ > 0; }
