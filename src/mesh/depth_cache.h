@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Depth of views that is asked for again and again.
+// Caches the depth images of views that are used several times.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -10,7 +10,7 @@
 
 namespace ewa::mesh {
 
-/// Keeps the first views up to a limit of memory, and the last one that was asked for. Others are drawn again.
+/// Caches the first views up to a limit of memory, and the last requested one. Renders other views again at each request.
 class DepthCache {
   public:
     DepthCache(size_t views, std::function<Image(size_t)> draw) : draw_(std::move(draw)), kept_(views) {}

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Depth that pinholes see, and where they show points.
+// Depth images of pinhole cameras, and the pixels at which they show points.
 #pragma once
 #include <cmath>
 #include <functional>
@@ -17,7 +17,7 @@ inline double focal(const Camera& camera) {
     return std::sqrt(camera.fx * camera.fy);
 }
 
-/// px of a point in view coordinates, whose z is above zero.
+/// The pixel position (px) of a point in view coordinates, whose z is above zero.
 template <class Point>
 auto pixel_of(const Camera& camera, const Point& p) {
     using Value = decltype(p.x);

@@ -12,7 +12,7 @@
 
 namespace ewa::mesh {
 
-/// Triangles, or points, in which the nearest point to any other is found.
+/// Triangles, or the points of a scan, with a search for the nearest point of them to a given one.
 class Surface {
   public:
     /// At least one of the scene's triangles has an area.

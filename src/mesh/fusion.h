@@ -37,7 +37,7 @@ struct Fused {
     double voxel = 0;
     Space space;
     size_t blocks = 0;
-    /// The side of a voxel at a point in the world, along which it is longest.
+    /// The longest side of the voxel at a point of the world, world units.
     double voxel_at(const glm::dvec3& world) const { return voxel * space.outward_growth(world); }
 };
 

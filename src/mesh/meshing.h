@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The functions of libewa_meshing.so for this module: a sparse volume and its surface by OpenVDB, fewer triangles by meshoptimizer.
-// Both libraries with all that is behind them take longer to load than a short command runs.
+// They are in a module of their own, because loading them with their dependencies takes longer than a short command runs.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -26,7 +26,7 @@ struct IndexedTriangles {
     std::vector<std::array<uint32_t, 3>> triangles;
 };
 
-/// Values at the integer positions of space. They are known in blocks; elsewhere they are 1.
+/// A sparse grid of values at integer positions. Blocks store the values; outside blocks the values are 1.
 class Volume {
   public:
     virtual ~Volume() = default;
@@ -34,8 +34,8 @@ class Volume {
     virtual void add(std::span<const glm::ivec3> places) = 0;
     /// All blocks. Their order depends on nothing but the places. The pointers hold until the next add.
     virtual std::vector<Block> blocks() = 0;
-    /// Where the values cross 0. Triangles are counter-clockwise as seen from the side of positive values. A vertex lies in the
-    /// cell that its position, rounded down, names.
+    /// The surface where the values cross 0. Triangles are counter-clockwise as seen from the side of positive values. A vertex's
+    /// position, rounded down, is the index of the cell that it lies in.
     virtual IndexedTriangles surface() = 0;
 };
 

@@ -27,7 +27,7 @@ std::string watertight_text(const Topology& topology);
 /// Returns the number of dropped parts.
 size_t drop_small_parts(scene::TriangleMesh& mesh, double least);
 
-/// At most `most` triangles, as far as the topology allows it. Throws RunError where the module is not here.
+/// Reduces the mesh to at most `most` triangles, if the topology allows it. Throws RunError if libewa_meshing.so is missing.
 void simplify(scene::TriangleMesh& mesh, size_t most);
 
 /// Fills mesh.normals with means over the triangles at a vertex, weighted by their area. Where none has an area, they are means over the

@@ -12,7 +12,7 @@
 
 namespace ewa::mesh {
 
-/// Those of ewa mesh.
+/// The options of ewa mesh.
 struct SceneMeshOptions {
     double voxel = 0;         // world units; 0: two pixels on the surfaces
     size_t triangles = 0;     // at most; 0: all
@@ -27,10 +27,10 @@ struct SceneMesh {
     std::string note;           // for the user; may be empty
 };
 
-/// Around the scene from all directions, for splats whose cameras are not known.
+/// Cameras around the scene in all directions, for splats whose training cameras are not known.
 Pinholes cameras_around(const Gaussians& gaussians);
 
-/// How many steps mesh_of_scene has.
+/// The number of steps that mesh_of_scene() reports to `done`.
 size_t steps_of_mesh(const Pinholes& pinholes, const SceneMeshOptions& options);
 
 /// renderer: of the splats. done: called with the steps that are done; what it throws ends the work. Throws InputError (no surface, or a

@@ -32,12 +32,12 @@ struct Space {
         const glm::dvec3 outward = glm::dot(direction, out) * out;
         return outward / (far * far) + (direction - outward) / growth(world);
     }
-    /// A length across the line from the middle, in the world over contracted.
+    /// The ratio of world length to contracted length, for directions perpendicular to the line from the middle.
     double growth(const glm::dvec3& world) const {
         const double far = glm::length(world - middle) / radius;
         return far > 1 ? far / (2 - 1 / far) : 1;
     }
-    /// The same for a length along that line, which grows most.
+    /// The ratio of world length to contracted length along the line from the middle, where it is largest.
     double outward_growth(const glm::dvec3& world) const {
         const double far = glm::length(world - middle) / radius;
         return far > 1 ? far * far : 1;
