@@ -36,7 +36,7 @@ struct ReportData {
     bool held_out = true;                                       // the views were not trained on
 };
 
-/// Escapes every string. A part without data is skipped.
+/// The report as HTML. Escapes every string. Skips parts without data.
 std::string html_report(const ReportData& data);
 
 }  // namespace ewa::report

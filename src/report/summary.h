@@ -24,10 +24,10 @@ using ewa::MetricsLine;
 using ewa::Summary;
 
 Json to_json(const Summary& summary);
-/// A sentence without a full stop.
+/// A sentence, without a full stop, on how far refinement has moved the cameras.
 std::string cameras_text(const CameraMoves& moves);
 
-/// Whether more updates were shortened than the few of ordinary scenes: one in a thousand.
+/// Whether more than one in a thousand updates were shortened. Ordinary scenes have fewer.
 bool shortens_many(const Summary& summary);
 
 /// The number under this key; NaN for null. Throws InputError if there is neither.

@@ -47,7 +47,7 @@ struct LeftOutView {
 };
 /// image: RGB. mask: one channel of any size, 0 at masked pixels.
 LeftOutView left_out_view(const std::string& name, const Image& image, const Image& mask, double share);
-/// As HTML, in their order. Empty without views.
+/// The training images with masked pixels as HTML, in their order. Empty without views.
 std::string left_out_html(const std::vector<LeftOutView>& views);
 
 /// "23.46 dB", or "∞ dB" for equal images.

@@ -40,7 +40,7 @@ struct WorkPrecision {
     std::vector<WorkTable> tables = {};  // below the diagram
 };
 
-/// How the series are drawn is not in it.
+/// The diagram's numbers and texts as JSON, without the style in which series are drawn.
 nlohmann::ordered_json work_precision_json(const WorkPrecision& diagram);
 
 }  // namespace ewa::report
