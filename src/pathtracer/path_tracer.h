@@ -34,7 +34,7 @@ class PathTracer {
     };
     Seen seen(const Camera& camera);
 
-    /// Totals so far: rays that the limit on steps ended, and paths that were not finite and count as black.
+    /// Totals so far. Unfinished rays: ended by the limit on steps. The other total: paths that were not finite and count as black.
     uint64_t unfinished_rays() const { return unfinished_; }
     uint64_t dropped_samples() const { return dropped_; }
 

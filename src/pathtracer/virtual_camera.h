@@ -22,7 +22,7 @@ std::vector<Camera> dome_cameras(const scene::Box& box, int count, int width, in
 /// The pinhole of a file's camera for an image of this size in px, with its vertical angle and square pixels.
 Camera pinhole_of(const scene::FileCamera& camera, int width, int height);
 
-/// sRGB's curve over min(1, value). NaN and negative values become 0.
+/// The sRGB transfer function of min(1, value). NaN and negative values become 0.
 float developed(double value);
 
 /// Composites the pixels over the sky. `radiance` is as in develop; afterwards all pixels are fully covered.
