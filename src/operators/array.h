@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How arrays of the host reach a device.
+// Makes arrays of the host available to a device.
 #pragma once
 #include <algorithm>
 #include <optional>
@@ -33,7 +33,7 @@ class Array {
         buffer_.upload(values);
         return buffer_;
     }
-    /// upload, for values that stay where they are until the last use of the buffer in this call.
+    /// As upload(), without a copy if the device can read host memory. The values must stay until the last use in this call.
     template <class T>
     const gpu::Buffer& lend(gpu::Device& device, std::span<const T> values) {
         constexpr size_t kWorthIt = size_t(64) << 10;  // bytes; fewer are copied in the time that this takes
@@ -42,7 +42,7 @@ class Array {
             host_ = gpu::Buffer::in_host_memory(device, name_, std::as_bytes(values));
         return host_ ? *host_ : upload(device, values);
     }
-    /// The end of the call.
+    /// Ends a call: the buffer no longer refers to the host's array.
     void give_back() { host_.reset(); }
     template <class T>
     std::vector<T> download(size_t count) const {
