@@ -43,8 +43,8 @@ struct Accuracy {
 Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
                           const Camera& camera, const RenderOptions& options);
 
-/// What the points of all series are worth. "on the front": no other point of the same exact image is faster and less
-/// wrong. Otherwise the name of one that is.
+/// Sets each point's verdict. "on the front": no other point of the same exact image is faster and has less error.
+/// Otherwise the name of a point that is and has.
 void set_verdicts(std::vector<report::WorkSeries>& series);
 
 /// Measures the scene file of the options through its camera. Prints the tables, and writes them as JSON: `rendering` has

@@ -125,7 +125,7 @@ struct Instances {
     std::vector<uint64_t> first_of_tile;  // count() + 1 bounds into sorted
 };
 
-/// `order` is depth_order's result.
+/// Lists the (splat, tile) instances. order: the result of depth_order().
 Instances make_instances(std::span<const Projected> projected, std::span<const uint32_t> order,
                          const TileGrid& grid, const Smoothing& smoothing = {});
 

@@ -28,10 +28,10 @@ struct Loss {
     Raster gradient;     // dL/d(rendered), RGB
 };
 
-/// Both RGB of one size.
+/// The loss of a render. Both images are RGB and of one size.
 Loss image_loss(const Raster& rendered, const Raster& target, const LossWeights& terms = {});
 
-/// The same with weights of [0, 1], one channel of that size.
+/// The loss with a weight in [0, 1] for each pixel. weights: one channel, of the images' size.
 Loss image_loss(const Raster& rendered, const Raster& target, const Raster& weights,
                 const LossWeights& terms = {});
 
@@ -39,7 +39,7 @@ struct AlphaLoss {
     double difference = 0;  // mean |1 - T - alpha|
     Raster gradient;        // d(difference)/dT, one channel
 };
-/// Both of one channel and one size.
+/// The loss of the render's opacity. Both images have one channel and one size.
 AlphaLoss alpha_loss(const Raster& transmittance, const Raster& alpha);
 
 struct DepthLoss {

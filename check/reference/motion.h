@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The gradient by a camera's motion.
+// The gradient of the loss with respect to a camera's motion.
 #pragma once
 #include "ewa/camera_motion.h"
 

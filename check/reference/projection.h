@@ -92,16 +92,16 @@ struct ProjectionSteps {
     glm::dvec3 raw_color{0};  // before the max
 };
 
-/// `steps` is set if it is given and the splat is visible.
+/// Projects a splat. steps: receives the intermediate values if the splat is visible; may be null.
 Projected project(const Splat& splat, const Camera& camera, const RenderOptions& options,
                   ProjectionSteps* steps = nullptr);
-/// The same for splat i of Gaussians or Values.
+/// Projects splat i of Gaussians or Values.
 template <class Scene>
 Projected project(const Scene& scene, size_t i, const Camera& camera, const RenderOptions& options) {
     return project(read_splat(scene, i), camera, options);
 }
 
-/// The columns are the rotated axes. The quaternion (w x y z) must have unit norm.
+/// The rotation matrix of a quaternion (w x y z) of unit norm. Its columns are the rotated axes.
 glm::dmat3 rotation_matrix(const std::array<double, 4>& unit_quaternion);
 
 /// dL/d(unit quaternion) from dL/d(rotation_matrix).

@@ -9,7 +9,7 @@
 
 namespace ewa::reference {
 
-/// With an integrator along rays, there is no order and there are no instances.
+/// Renders an image. With an integrator along rays, `order` and `instances` of the result are empty.
 Rendered render(const Values& values, const Camera& camera, const RenderOptions& options,
                 const ReferenceOptions& reference = {});
 

@@ -16,7 +16,7 @@
 
 namespace ewa::reference {
 
-/// As SkyMap.
+/// A sky map with the layout of SkyMap, in double.
 struct Sky {
     int size = 0;
     std::vector<double> texels;

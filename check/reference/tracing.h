@@ -27,7 +27,7 @@ std::optional<Hit> meet(const Ray& ray, const pathtracer::DeviceTriangle& triang
 /// The nearest hit, by testing every triangle.
 std::optional<Hit> nearest_of_all(const Ray& ray, std::span<const pathtracer::DeviceTriangle> triangles);
 
-/// The same through the hierarchy, in the order of the shader. `deepest` gets the largest size of the stack.
+/// The nearest hit, by traversing the hierarchy in the order of the shader. deepest: receives the largest size of the stack.
 std::optional<Hit> trace(const Ray& ray, std::span<const pathtracer::Node> nodes,
                          std::span<const pathtracer::DeviceTriangle> triangles, size_t* deepest = nullptr);
 

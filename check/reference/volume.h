@@ -64,7 +64,7 @@ class Volume {
     /// approximations, if there are any.
     glm::dvec3 exact(double x, double y) const;
 
-    /// The same by ray marching, with `samples` midpoints evenly from the nearest to the farthest splat.
+    /// The ray's colour by ray marching, with `samples` midpoints evenly from the nearest to the farthest splat.
     glm::dvec3 marched(double x, double y, int samples) const;
 
   private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The same work in plain C++ on the host's cores: the ceiling that passes are compared with.
+// The work of some passes in plain C++ on the host's cores. The benchmark compares the time of passes with its time.
 #pragma once
 #include <algorithm>
 #include <atomic>
