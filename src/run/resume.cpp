@@ -194,8 +194,11 @@ void check_resumable(const std::filesystem::path& path, const std::string& store
                              other.dump().substr(0, kLongestValue) + ", not " + value.dump() +
                              "; with its own value the run continues, -o DIR starts another run");
     }
+    const auto is_usual = [](const Json& value) {
+        return value == false || (value.is_string() && value.get_ref<const std::string&>().empty());
+    };
     for (const auto& [name, value] : then["options"].items())
-        if (!is_option(name) && value != false && value != "")
+        if (!is_option(name) && !is_usual(value))
             throw InputError(path.string() + ": was written with --" + core::one_line(name) + " " +
                              value.dump().substr(0, kLongestValue) + ", which this version of ewa lacks" +
                              kWaysOut);
