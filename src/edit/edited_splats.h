@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// Splats with a state each. Edits of a selection change states and values, and never move a splat to another index.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <memory>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "edit/filters.h"
+#include "ewa/gaussians.h"
+
+namespace ewa::edit {
+
+/// Bits of a splat's state. Renderer::mark takes the same bits.
+enum State : uint8_t {
+    kSelected = 1,
+    kLocked = 2,   // drawn, but neither selected nor changed
+    kHidden = 4,   // not drawn, neither selected nor changed
+    kDeleted = 8,  // not drawn, not written
+};
+
+/// A change of colours: of SH coefficients, in the order of the members.
+struct Adjustment {
+    std::array<float, 3> tint{1, 1, 1};  // factor of each channel
+    float brightness = 0;                // added to every channel
+    float contrast = 1;                  // factor about the middle grey, 0.5
+    float white = 1;                     // the value that becomes 1
+    float opacity = 1;                   // factor of the opacity
+    bool operator==(const Adjustment&) const = default;
+};
+
+/// Back to the values that the splats had at first.
+struct Reset {
+    bool operator==(const Reset&) const = default;
+};
+
+/// An edit of values: an affine transform in the world, a change of colours, or a reset.
+using ValueEdit = std::variant<glm::dmat4, Adjustment, Reset>;
+
+class EditedSplats {
+  public:
+    /// cameras: of the run that trained the splats; for the filter `views`.
+    explicit EditedSplats(std::shared_ptr<const Gaussians> splats, Cameras cameras = {});
+
+    size_t size() const { return states_.size(); }  // deleted ones included
+    /// Size() splats, deleted ones included. A copy of the first splats exists only while values differ.
+    const std::shared_ptr<const Gaussians>& splats() const { return now_; }
+    const std::vector<uint8_t>& states() const { return states_; }
+    const Cameras& cameras() const { return cameras_; }
+    /// The splats that are not deleted, in order.
+    Gaussians result() const;
+
+    bool selectable(size_t i) const { return (states_[i] & (kLocked | kHidden | kDeleted)) == 0; }
+    /// Whether an edit of the selection changes splat i.
+    bool affected(size_t i) const { return selectable(i) && (states_[i] & kSelected) != 0; }
+    size_t count(uint8_t bits) const;  // splats that are not deleted, with any of these bits
+    size_t left() const;               // splats that are not deleted
+
+    /// Sets the states of all splats. Requires size() of them.
+    void set_states(std::vector<uint8_t> states);
+    /// Changes the values of the affected splats. Throws InputError, and changes nothing, for a transform that is no affine one or
+    /// takes values out of the range of float32.
+    void change(const ValueEdit& edit);
+    /// Appends a copy of each affected splat, and selects the copies in place of the originals.
+    void duplicate();
+
+    // What undo needs.
+    /// Goes back to the number of splats and of groups that there was before, with the values of that time.
+    struct Mark {
+        size_t splats, groups;
+    };
+    Mark mark() const { return {size(), parents_.size()}; }
+    void rewind(const Mark& mark);
+    uint64_t bytes() const;  // of everything but the first splats
+
+  private:
+    /// A group of splats that were changed by the same edits: those of the parent, then its own.
+    struct Group {
+        uint32_t parent;
+        ValueEdit edit;
+    };
+    void set_values(const std::vector<uint32_t>& indices, const Gaussians& values);
+    Gaussians& writable();
+
+    std::shared_ptr<const Gaussians> first_, now_;
+    std::shared_ptr<Gaussians> own_;  // now_, once values have changed
+    Cameras cameras_;
+    std::vector<uint8_t> states_;
+    std::vector<uint32_t> sources_;  // in first_, of the splats behind its last one
+    std::vector<uint32_t> groups_;   // of each splat; empty: all in group 0, which has the first values
+    std::vector<Group> parents_;     // of group 1, 2, ...
+};
+
+/// Changes the colours and opacities of splats.
+void adjust_splats(Gaussians& gaussians, const Adjustment& adjustment);
+
+}  // namespace ewa::edit

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Edits with undo and redo. A step keeps what has changed of the states, compressed, and no splat.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "edit/edits.h"
+
+namespace ewa::edit {
+
+/// An edit as a user types it: --name value.
+struct Words {
+    std::string name, value;  // value: empty if the edit has none
+    bool operator==(const Words&) const = default;
+};
+
+/// Edits that are done and undone together.
+struct Step {
+    std::string title;  // for people, such as "Delete"
+    std::vector<Words> edits;
+    bool operator==(const Step&) const = default;
+};
+
+class History {
+  public:
+    explicit History(std::shared_ptr<const Gaussians> splats, Cameras cameras = {});
+
+    /// Performs a step, and drops the steps that were undone. Throws InputError, and changes nothing, for an edit that cannot be
+    /// read or done. Only edits of a selection are allowed (Row::selects). Returns whether any splat has changed.
+    bool perform(const Step& step);
+    bool undo();  // false: there is nothing to undo
+    bool redo();
+
+    const EditedSplats& splats() const { return splats_; }
+    const std::vector<Step>& steps() const { return steps_; }  // the undone ones too
+    size_t done() const { return done_; }                      // steps that are in effect
+    /// The edits in effect, in order.
+    std::vector<Words> edits() const;
+    /// Rises with every change. The number of values changes only if splats() has others.
+    uint64_t version() const { return version_; }
+    uint64_t values_version() const { return values_version_; }
+    uint64_t bytes() const;  // host memory of the history and the states, without splats
+
+  private:
+    struct Before {
+        EditedSplats::Mark mark;
+        std::vector<uint8_t> changed;  // zlib: the bits of states that the step has changed
+        bool values;
+    };
+    void restore(const Before& before);
+
+    EditedSplats splats_;
+    std::vector<Step> steps_;
+    std::vector<Before> before_;  // of the steps, as far as they were done
+    size_t done_ = 0;
+    uint64_t version_ = 1, values_version_ = 1;
+};
+
+/// The line that does the same to other files: "ewa convert IN OUT --select ... --delete". Words are quoted for a POSIX shell.
+std::string command_line(const std::vector<Words>& edits, const std::string& input, const std::string& output);
+
+}  // namespace ewa::edit

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Shapes of --select: which splats they take. A shape is evaluated on the host in float64, so that a journal selects the same
+// splats on every machine.
+#pragma once
+#include <functional>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <string>
+#include <vector>
+
+#include "edit/edited_splats.h"
+#include "ewa/camera.h"
+
+namespace ewa::edit {
+
+enum class Operation { set, add, remove, intersect };
+
+/// For each splat, whether the shape takes it. Splats that are not selectable are left out by select().
+using Shape = std::function<std::vector<bool>(const EditedSplats&)>;
+
+/// A parsed --select.
+struct Selection {
+    Operation operation = Operation::set;
+    Shape shape;
+};
+
+/// Parses "[add:|remove:|and:]SHAPE". Throws InputError that begins with `what`. SHAPE is one of
+///   all, none, invert
+///   a filter of --where (edit/filters.h): COLUMN=LOW..HIGH, box=x,y,z,X,Y,Z, sphere=x,y,z,R
+///   polygon=x,y,x,y,...;view=VIEW     centres inside this polygon in the image of a view, px
+///   brush=R,x,y,x,y,...;view=VIEW     centres within R px of this line
+///     Both may end in ;front (only splats that others do not cover) and ;extent (any part of a splat, to 2 standard deviations).
+///   color=r,g,b,T                     colours within T of this one in each channel, 0 to 1
+///   flood=x,y,z,T                     the splats that touch the nearest one to this point, and so on, with colours within T of its
+///   cluster=x,y,z                     the group of touching splats that the nearest one to this point is in
+///   floaters                          groups of fewer than 10 touching splats
+///   far                               all but the largest group
+///   grow=R, shrink=R                  of the present selection, by R world units
+/// VIEW is "fx,fy,cx,cy,w,x,y,z,tx,ty,tz": a pinhole's intrinsics (px), and the pose of world points in camera axes. With "parallel:"
+/// before it, fx and fy are px per world unit of parallel rays.
+Selection parse_selection(const std::string& text, const std::string& what = "--select");
+
+/// The VIEW of a camera: a pinhole, or an orthographic lens as of the window. Other lenses give the pinhole with their focal length.
+std::string view_text(const Camera& camera);
+
+// What tools write.
+std::string rectangle_shape(const Camera& camera, const glm::dvec2& from, const glm::dvec2& to);
+std::string polygon_shape(const Camera& camera, const std::vector<glm::dvec2>& points);
+std::string brush_shape(const Camera& camera, double radius, const std::vector<glm::dvec2>& points);
+std::string box_shape(const glm::dvec3& low, const glm::dvec3& high);
+std::string sphere_shape(const glm::dvec3& center, double radius);
+
+/// Selects. The states that do not change stay.
+void select(EditedSplats& splats, const Selection& selection);
+
+}  // namespace ewa::edit

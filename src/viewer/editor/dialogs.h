@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// The dialogs of files: Save as, unsaved work, the journal of a crashed session, recent files, and Publish.
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "viewer/editor/editor.h"
+#include "viewer/file_dialog.h"
+
+namespace ewa::viewer {
+
+class Dialogs {
+  public:
+    /// say: shows a message.
+    Dialogs(Editor& editor, FileDialog& files, std::function<void()> wake, std::function<void(const std::string&)> say);
+    ~Dialogs();
+
+    void save();     // to the file that was saved last; the first time as save_as()
+    void save_as();  // format, what it loses, file
+    void publish();  // page, SOG, streamed levels
+    /// Asks whether to save unsaved work, then calls `go_on`, unless the user cancels. Calls it at once without unsaved work.
+    void leave(std::function<void()> go_on);
+    /// Asks whether to restore the edits of a crashed session, if the file has some.
+    void offer_journal(const std::filesystem::path& file, size_t splats);
+    /// Draws what is open. Call it once per frame of ImGui.
+    void draw();
+    bool open() const;
+    /// Takes the answers of the file dialog and of background work. Call it once per turn of the window's loop.
+    void take();
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+/// The files that were opened last, newest first, at most ten; in the settings of the user.
+std::vector<std::filesystem::path> recent_files();
+void remember_file(const std::filesystem::path& file);
+
+}  // namespace ewa::viewer

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// The tab "Edit" of the panel: selection, transform, colours, cleaning, histogram, scenes and history.
+#pragma once
+#include <memory>
+
+#include "viewer/editor/editor.h"
+
+namespace ewa::viewer {
+
+class EditPanel {
+  public:
+    EditPanel();
+    ~EditPanel();
+    /// Draws the rows into the present window of ImGui. live: a training is watched, and edits go to it.
+    void draw(Editor& editor, bool live);
+    /// Opens the section of cleaning.
+    void show_cleaning();
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace ewa::viewer

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// The editor of the window: scenes with their histories, and the edits that tools and panels ask for. Edits run on a thread of their
+// own, one after another, so that the window goes on while a large scene is edited.
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <future>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "edit/history.h"
+#include "edit/journal.h"
+#include "edit/shapes.h"
+
+namespace ewa::viewer {
+
+/// The tools of the toolbar. One is active at a time; `view` moves the camera alone.
+enum class Tool { view, rectangle, lasso, polygon, brush, sphere, box, flood, eyedropper, move, rotate, scale, measure, level, origin };
+
+/// What the tools and the panel share: settings of selecting and of gizmos. The keys of docs/editor.md change them too.
+struct EditSettings {
+    bool shown = true;  // the toolbar and the panel of edits
+    Tool tool = Tool::view;
+    edit::Operation operation = edit::Operation::set;  // Shift: add, Ctrl: remove, both: intersect
+    bool front = false, extent = false;
+    float brush = 40;         // radius, px of the window
+    float tolerance = 0.15f;  // of flood and eyedropper, 0 to 1
+    bool local = false;       // axes of gizmos
+    glm::dvec3 box_low{-1}, box_high{1}, sphere_center{0};  // world
+    double sphere_radius = 1;
+};
+
+/// A scene in the list of scenes.
+struct EditedScene {
+    std::string name;
+    std::filesystem::path file;  // empty: never saved
+    std::shared_ptr<edit::History> history;
+    std::unique_ptr<edit::Journal> journal;  // null: the folder cannot be written
+    bool shown = true;
+    bool unsaved = false;
+};
+
+/// What the window shows of a scene after the last finished edit. It never changes.
+struct EditSnapshot {
+    std::shared_ptr<const Gaussians> splats;
+    std::shared_ptr<const std::vector<uint8_t>> states;
+    size_t left = 0, selected = 0, locked = 0, hidden = 0;
+    std::optional<std::array<glm::dvec3, 2>> bounds;  // of the selection: its lowest and highest corner, world
+    glm::dvec3 middle{0};                             // of the selection: the mean of the means
+    std::vector<edit::Step> steps;
+    size_t done = 0;
+    uint64_t version = 0, values_version = 0, history_bytes = 0;
+    double milliseconds = 0;  // of the last edit
+};
+
+class Editor {
+  public:
+    /// wake: called when take() has something new.
+    explicit Editor(std::function<void()> wake);
+    ~Editor();
+
+    // Scenes.
+    /// Replaces all scenes by this one. journaled: it is a file of its own, and gets a journal.
+    void enter(const std::string& name, const std::filesystem::path& file, std::shared_ptr<const Gaussians> splats,
+               edit::Cameras cameras, bool journaled);
+    void add(const std::string& name, const std::filesystem::path& file, std::shared_ptr<const Gaussians> splats);
+    size_t scenes() const { return scenes_.size(); }
+    const EditedScene& scene(size_t i) const { return *scenes_[i]; }
+    size_t active() const { return active_; }
+    void activate(size_t scene);
+    void show(size_t scene, bool shown);
+    void close(size_t scene);
+    /// The selection becomes a scene of its own: this history and --select invert --delete.
+    void separate();
+
+    // Edits of the active scene, in the background and in order. An error is News::note.
+    void perform(edit::Step step);
+    /// --select with the operation and the modifiers of the settings. shape: as the functions of edit/shapes.h write it.
+    void select(const std::string& shape);
+    void undo();
+    void redo();
+    /// Shows what a selection would take, in red, without changing anything; empty: ends that.
+    void preview(const std::string& selection);
+    std::optional<size_t> preview_count() const { return preview_count_; }
+
+    /// While a gizmo is dragged: the transform of the selection that is drawn. Empty: none. The edit itself is perform().
+    void drag(const std::optional<glm::dmat4>& transform);
+
+    bool busy() const;  // edits are being done
+    /// Takes what has been done. Call it once per turn of the window's loop, before anything reads snapshot().
+    struct News {
+        bool states = false, splats = false;  // marks() or splats() are others
+        std::string note;                     // a message for the user; empty: none
+    };
+    News take();
+    /// Of the active scene.
+    const EditSnapshot& snapshot() const { return *snapshot_; }
+    /// Of all scenes that are shown, joined: what the render thread gets.
+    std::shared_ptr<const Gaussians> splats() const { return drawn_; }
+    std::shared_ptr<const std::vector<uint8_t>> marks() const { return marks_; }  // ewa::Mark bits; null: none
+
+    // Files.
+    /// Replays the edits on the file as it was read, and writes the result. In the background. all: joins all scenes that are shown.
+    void save(const std::filesystem::path& file, bool all);
+    bool saving() const { return saving_.valid(); }
+    bool unsaved() const;  // any scene has edits that were not saved
+    /// The journal of a crashed session, if `file` has one with edits.
+    static std::optional<edit::ReadJournal> left_journal(const std::filesystem::path& file, size_t splats);
+    void restore(const edit::ReadJournal& journal);
+    /// The ewa convert line of the active scene's edits.
+    std::string command() const;
+
+    EditSettings settings;
+
+  private:
+    std::vector<std::unique_ptr<EditedScene>> scenes_;
+    size_t active_ = 0;
+    std::shared_ptr<const EditSnapshot> snapshot_ = std::make_shared<EditSnapshot>();
+    std::shared_ptr<const Gaussians> drawn_;
+    std::shared_ptr<const std::vector<uint8_t>> marks_;
+    std::optional<size_t> preview_count_;
+    std::future<std::string> saving_;
+    std::function<void()> wake_;
+};
+
+}  // namespace ewa::viewer
