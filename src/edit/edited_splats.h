@@ -49,7 +49,8 @@ class EditedSplats {
     /// Size() splats, deleted ones included. A copy of the first splats exists only while values differ.
     const std::shared_ptr<const Gaussians>& splats() const { return now_; }
     const std::vector<uint8_t>& states() const { return states_; }
-    const Cameras& cameras() const { return cameras_; }
+    /// Empty once splats have moved.
+    Cameras cameras() const;
     /// The splats that are not deleted, in order.
     Gaussians result() const;
 
@@ -68,20 +69,24 @@ class EditedSplats {
     void duplicate();
 
     // What undo needs.
-    /// Goes back to the number of splats and of groups that there was before, with the values of that time.
-    struct Mark {
+    struct Extent {
         size_t splats, groups;
     };
-    Mark mark() const { return {size(), parents_.size()}; }
-    void rewind(const Mark& mark);
-    uint64_t bytes() const;  // of everything but the first splats
+    Extent extent() const { return {size(), groups_.size()}; }
+    /// Goes back to an earlier extent, with the values of that time. The states of the splats that remain stay.
+    void rewind(const Extent& extent);
+    uint64_t bytes() const;  // of states and groups; splats() are not counted
 
   private:
-    /// A group of splats that were changed by the same edits: those of the parent, then its own.
+    /// Splats that were changed by the same edits: those of the parent, then this one. Group 0 has the first values, and no entry.
     struct Group {
         uint32_t parent;
         ValueEdit edit;
+        glm::dvec3 origin;  // of the splats after the edit
     };
+    std::vector<uint32_t> affected_splats() const;
+    const glm::dvec3& origin_of(uint32_t group) const;
+    Gaussians values_of(uint32_t group, const std::vector<uint32_t>& indices) const;
     void set_values(const std::vector<uint32_t>& indices, const Gaussians& values);
     Gaussians& writable();
 
@@ -89,9 +94,9 @@ class EditedSplats {
     std::shared_ptr<Gaussians> own_;  // now_, once values have changed
     Cameras cameras_;
     std::vector<uint8_t> states_;
-    std::vector<uint32_t> sources_;  // in first_, of the splats behind its last one
-    std::vector<uint32_t> groups_;   // of each splat; empty: all in group 0, which has the first values
-    std::vector<Group> parents_;     // of group 1, 2, ...
+    std::vector<uint32_t> sources_;   // of the splats behind those of first_: where they are in it
+    std::vector<uint32_t> group_of_;  // of each splat; empty: all in group 0
+    std::vector<Group> groups_;       // 1, 2, ...
 };
 
 /// Changes the colours and opacities of splats.

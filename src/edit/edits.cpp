@@ -8,10 +8,13 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "core/text.h"
 #include "core/typing.h"
+#include "edit/edited_splats.h"
+#include "edit/shapes.h"
 #include "edit/steps.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
@@ -95,6 +98,87 @@ Edit sort(const std::string& value) {
     return {.text = "--sort", .change = [](Gaussians& g) { select_splats(g, morton_order(g)); }};
 }
 
+constexpr double kMostFactor = 1000;  // of an adjustment
+
+Edit select_shape(const std::string& value) {
+    return {.text = "--select",
+            .act = [selection = parse_selection(value)](EditedSplats& splats) { select(splats, selection); }};
+}
+
+/// Sets and clears bits of the states of the affected splats.
+template <uint8_t set, uint8_t cleared>
+Edit mark_selected(const char* text) {
+    return {.text = text, .act = [](EditedSplats& splats) {
+                std::vector<uint8_t> states = splats.states();
+                for (size_t i = 0; i < states.size(); ++i)
+                    if (splats.affected(i)) states[i] = uint8_t((states[i] | set) & ~cleared);
+                splats.set_states(std::move(states));
+            }};
+}
+
+template <uint8_t cleared>
+Edit unmark_all(const char* text) {
+    return {.text = text, .act = [](EditedSplats& splats) {
+                std::vector<uint8_t> states = splats.states();
+                for (uint8_t& state : states) state &= uint8_t(~cleared);
+                splats.set_states(std::move(states));
+            }};
+}
+
+Edit duplicate(const std::string&) {
+    return {.text = "--duplicate", .act = [](EditedSplats& splats) { splats.duplicate(); }};
+}
+
+Edit reset(const std::string&) {
+    return {.text = "--reset", .act = [](EditedSplats& splats) { splats.change(Reset()); }};
+}
+
+/// text: steps of Adjustment, such as "tint=1,0.9,0.8;opacity=0.5".
+Adjustment parse_adjustment(const std::string& text) {
+    Adjustment a;
+    const auto refuse = [&] {
+        throw InputError("--adjust: '" + text +
+                         "' is not tint=r,g,b, brightness=x, contrast=x, white=x or opacity=x, or several of "
+                         "them with ; between; factors are above 0");
+    };
+    size_t begin = 0;
+    while (begin <= text.size()) {
+        const size_t end = std::min(text.find(';', begin), text.size());
+        const std::string step = text.substr(begin, end - begin);
+        const size_t equals = std::min(step.find('='), step.size());
+        const std::string name = step.substr(0, equals);
+        const auto n = core::parse_list(equals < step.size() ? step.substr(equals + 1) : "");
+        const auto factor = [&](float& member) {
+            if (!n || n->size() != 1 || !(n->front() > 0 && n->front() <= kMostFactor)) refuse();
+            member = float(n->front());
+        };
+        if (name == "tint" && n && n->size() == 3) {
+            for (size_t c = 0; c < 3; ++c) {
+                a.tint[c] = float((*n)[c]);
+                if (!(a.tint[c] >= 0 && (*n)[c] <= kMostFactor)) refuse();
+            }
+        } else if (name == "brightness" && n && n->size() == 1 && std::abs(n->front()) <= 1) {
+            a.brightness = float(n->front());
+        } else if (name == "contrast") {
+            factor(a.contrast);
+        } else if (name == "white") {
+            factor(a.white);
+        } else if (name == "opacity") {
+            factor(a.opacity);
+        } else {
+            refuse();
+        }
+        begin = end + 1;
+    }
+    return a;
+}
+
+Edit adjust(const std::string& value) {
+    return {.text = "--adjust", .act = [adjustment = parse_adjustment(value)](EditedSplats& splats) {
+                splats.change(adjustment);
+            }};
+}
+
 constexpr std::array kRows{
     Row{"transform", "STEP",
         "Of the joined scene: move=x,y,z, turn=x,y,z,degrees, scale=s, or a matrix of 12 or 16 numbers, row "
@@ -127,6 +211,29 @@ constexpr std::array kRows{
         "Merge near splats until N or P% are left"},
     Row{"sort", "ORDER",
         "Order of the splats: morton puts neighbours in space next to each other in the file", sort},
+    Row{"select", "SHAPE",
+        "Select splats; --transform and the options from here on then change these alone. SHAPE: a FILTER of "
+        "--where, "
+        "all, none, invert, color=r,g,b,T, flood=x,y,z,T, cluster=x,y,z, floaters, far, grow=R, shrink=R, or "
+        "a polygon or "
+        "brush in a view, as ewa-view writes it. add:, remove: or and: before it combines it with the "
+        "selection",
+        select_shape},
+    Row{"delete", "", "Delete the selected splats",
+        [](const std::string&) { return mark_selected<kDeleted, kSelected>("--delete"); }},
+    Row{"duplicate", "", "Copy the selected splats, and select the copies", duplicate},
+    Row{"adjust", "STEP",
+        "Change the colours and opacities of the selected splats: tint=r,g,b (factors), brightness=x "
+        "(added), contrast=x, "
+        "white=x (what becomes white), opacity=x (a factor); several with ; between",
+        adjust},
+    Row{"reset", "", "Give the selected splats the values of the file back", reset},
+    Row{"lock", "", "Keep the selected splats from later selections and edits",
+        [](const std::string&) { return mark_selected<kLocked, kSelected>("--lock"); }},
+    Row{"unlock", "", "End every --lock", [](const std::string&) { return unmark_all<kLocked>("--unlock"); }},
+    Row{"hide", "", "As --lock; ewa-view does not draw them either",
+        [](const std::string&) { return mark_selected<kHidden, kSelected>("--hide"); }},
+    Row{"unhide", "", "End every --hide", [](const std::string&) { return unmark_all<kHidden>("--unhide"); }},
 };
 
 /// Steps that are not applied yet.
@@ -149,17 +256,80 @@ struct Steps {
     }
 };
 
-/// Removes splats. left: their numbers.
-void remove_others(Gaussians& gaussians, const std::vector<bool>& stay, std::vector<uint32_t>& left) {
-    std::vector<uint32_t> staying, numbers;
-    for (size_t i = 0; i < stay.size(); ++i) {
-        if (!stay[i]) continue;
-        staying.push_back(uint32_t(i));
-        if (!left.empty()) numbers.push_back(left[i]);
+/// The state of apply().
+class Chain {
+  public:
+    Chain(Gaussians& gaussians, const Cameras& cameras) : gaussians_(gaussians), cameras_(cameras) {
+        applied_.left.resize(gaussians.size());
+        std::iota(applied_.left.begin(), applied_.left.end(), 0u);
     }
-    left = std::move(numbers);
-    if (staying.size() < stay.size()) keep_splats(gaussians, staying);
-}
+
+    void perform(const Edit& edit) {
+        if (edit.act || (edit.place && selection_)) return act(edit);
+        if (edit.place) return steps_.add(edit, applied_.remarks);
+        end_selection();
+        place();
+        const size_t before = gaussians_.size();
+        if (edit.filter) {
+            keep(edit.filter(gaussians_, applied_.moved ? Cameras() : cameras_));
+        } else {
+            edit.change(gaussians_);
+            applied_.left.clear();
+        }
+        if (edit.filter || gaussians_.size() != before)
+            applied_.outcomes.push_back({edit.text, bool(edit.filter), before, gaussians_.size()});
+    }
+
+    Applied finish() {
+        end_selection();
+        place();
+        return std::move(applied_);
+    }
+
+  private:
+    void act(const Edit& edit) {
+        place();
+        if (!selection_)
+            selection_.emplace(std::make_shared<const Gaussians>(std::move(gaussians_)),
+                               applied_.moved ? Cameras() : cameras_);
+        EditedSplats& splats = *selection_;
+        const size_t before = splats.left(), all = splats.size();
+        perform_on(splats, edit);
+        if (splats.left() != before)
+            applied_.outcomes.push_back({edit.text, splats.left() < before, before, splats.left()});
+        if (splats.size() != all) applied_.left.clear();
+        applied_.moved = applied_.moved || edit.place;
+    }
+
+    void end_selection() {
+        if (!selection_) return;
+        std::vector<uint32_t> left;
+        for (size_t i = 0; i < applied_.left.size(); ++i)
+            if ((selection_->states()[i] & kDeleted) == 0) left.push_back(applied_.left[i]);
+        applied_.left = std::move(left);
+        gaussians_ = selection_->result();
+        selection_.reset();
+    }
+
+    void place() { applied_.moved = steps_.apply(gaussians_) || applied_.moved; }
+
+    void keep(const std::vector<bool>& stay) {
+        std::vector<uint32_t> staying, numbers;
+        for (size_t i = 0; i < stay.size(); ++i) {
+            if (!stay[i]) continue;
+            staying.push_back(uint32_t(i));
+            if (!applied_.left.empty()) numbers.push_back(applied_.left[i]);
+        }
+        applied_.left = std::move(numbers);
+        if (staying.size() < stay.size()) keep_splats(gaussians_, staying);
+    }
+
+    Gaussians& gaussians_;  // empty while there is a selection
+    const Cameras& cameras_;
+    Applied applied_;
+    Steps steps_;
+    std::optional<EditedSplats> selection_;
+};
 
 }  // namespace
 
@@ -173,30 +343,16 @@ Edit parse(std::string_view name, const std::string& value) {
     return row->parse(value);
 }
 
+void perform_on(EditedSplats& splats, const Edit& edit) {
+    if (edit.act) return edit.act(splats);
+    std::vector<std::string> remarks;
+    splats.change(edit.place(glm::dmat4(1.0), remarks));
+}
+
 Applied apply(Gaussians& gaussians, std::span<const Edit> edits, const Cameras& cameras) {
-    Applied applied;
-    applied.left.resize(gaussians.size());
-    std::iota(applied.left.begin(), applied.left.end(), 0u);
-    Steps steps;
-    for (const Edit& edit : edits) {
-        if (edit.place) {
-            steps.add(edit, applied.remarks);
-            continue;
-        }
-        applied.moved = steps.apply(gaussians) || applied.moved;
-        const size_t before = gaussians.size();
-        if (edit.filter) {
-            remove_others(gaussians, edit.filter(gaussians, applied.moved ? Cameras() : cameras),
-                          applied.left);
-        } else {
-            edit.change(gaussians);
-            applied.left.clear();
-        }
-        if (edit.filter || gaussians.size() != before)
-            applied.outcomes.push_back({edit.text, bool(edit.filter), before, gaussians.size()});
-    }
-    applied.moved = steps.apply(gaussians) || applied.moved;
-    return applied;
+    Chain chain(gaussians, cameras);
+    for (const Edit& edit : edits) chain.perform(edit);
+    return chain.finish();
 }
 
 }  // namespace ewa::edit

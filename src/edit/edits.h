@@ -12,7 +12,9 @@
 
 namespace ewa::edit {
 
-/// A parsed edit. Exactly one of `filter`, `place` and `change` is set.
+class EditedSplats;
+
+/// A parsed edit. Exactly one of `filter`, `place`, `change` and `act` is set.
 struct Edit {
     std::string text;  // such as "--where opacity=0.1.."
     Filter filter = {};
@@ -21,6 +23,8 @@ struct Edit {
     std::function<glm::dmat4(const glm::dmat4& before, std::vector<std::string>& remarks)> place = {};
     /// Merges, reduces or sorts splats.
     std::function<void(Gaussians&)> change = {};
+    /// Selects splats, or changes the selected ones.
+    std::function<void(EditedSplats&)> act = {};
 };
 
 struct Row {
@@ -36,9 +40,12 @@ std::span<const Row> rows();
 /// The edit of this name, without dashes. Throws InputError for a value that cannot be read.
 Edit parse(std::string_view name, const std::string& value = "");
 
+/// Performs an edit with `act` or `place`. A place edit moves the selected splats. Throws InputError, and has changed nothing then.
+void perform_on(EditedSplats& splats, const Edit& edit);
+
 struct Outcome {
     std::string text;      // Edit::text
-    bool removes;          // the edit is a filter; else it merged splats
+    bool removes;          // splats; else it merged or copied some
     size_t before, after;  // splats
 };
 
@@ -47,11 +54,12 @@ struct Applied {
     std::vector<std::string> remarks;  // of place edits
     bool moved = false;
     std::vector<uint32_t>
-        left;  // indices of the splats that filters have kept; only if no edit merges or sorts splats
+        left;  // indices of the splats that are kept; only if no edit merges, sorts or copies splats
 };
 
-/// Applies the edits in order. Consecutive place edits transform the scene once. cameras: those of the splats' run, in the world
-/// before any edit. Throws InputError that names the edit.
+/// Applies the edits in order. Consecutive place edits transform the scene once. After --select, edits with `act` and place edits
+/// change the selected splats alone, each by itself, until a filter or a change ends the selection. cameras: those of the splats' run,
+/// in the world before any edit. Throws InputError that names the edit.
 Applied apply(Gaussians& gaussians, std::span<const Edit> edits, const Cameras& cameras = {});
 
 }  // namespace ewa::edit

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "edit/edited_splats.h"
 #include "edit/edits.h"
 
 namespace ewa::edit {
@@ -45,11 +46,11 @@ class History {
 
   private:
     struct Before {
-        EditedSplats::Mark mark;
+        EditedSplats::Extent extent;
         std::vector<uint8_t> changed;  // zlib: the bits of states that the step has changed
         bool values;
     };
-    void restore(const Before& before);
+    void flip(const Before& before, size_t splats);  // splats: as many as there were after the step
 
     EditedSplats splats_;
     std::vector<Step> steps_;
@@ -59,6 +60,7 @@ class History {
 };
 
 /// The line that does the same to other files: "ewa convert IN OUT --select ... --delete". Words are quoted for a POSIX shell.
-std::string command_line(const std::vector<Words>& edits, const std::string& input, const std::string& output);
+std::string command_line(const std::vector<Words>& edits, const std::string& input,
+                         const std::string& output);
 
 }  // namespace ewa::edit

@@ -15,7 +15,8 @@ namespace ewa::viewer {
 class Dialogs {
   public:
     /// say: shows a message.
-    Dialogs(Editor& editor, FileDialog& files, std::function<void()> wake, std::function<void(const std::string&)> say);
+    Dialogs(Editor& editor, FileDialog& files, std::function<void()> wake,
+            std::function<void(const std::string&)> say);
     ~Dialogs();
 
     void save();     // to the file that was saved last; the first time as save_as()

@@ -17,7 +17,23 @@
 namespace ewa::viewer {
 
 /// The tools of the toolbar. One is active at a time; `view` moves the camera alone.
-enum class Tool { view, rectangle, lasso, polygon, brush, sphere, box, flood, eyedropper, move, rotate, scale, measure, level, origin };
+enum class Tool {
+    view,
+    rectangle,
+    lasso,
+    polygon,
+    brush,
+    sphere,
+    box,
+    flood,
+    eyedropper,
+    move,
+    rotate,
+    scale,
+    measure,
+    level,
+    origin
+};
 
 /// What the tools and the panel share: settings of selecting and of gizmos. The keys of docs/editor.md change them too.
 struct EditSettings {
@@ -25,9 +41,9 @@ struct EditSettings {
     Tool tool = Tool::view;
     edit::Operation operation = edit::Operation::set;  // Shift: add, Ctrl: remove, both: intersect
     bool front = false, extent = false;
-    float brush = 40;         // radius, px of the window
-    float tolerance = 0.15f;  // of flood and eyedropper, 0 to 1
-    bool local = false;       // axes of gizmos
+    float brush = 40;                                       // radius, px of the window
+    float tolerance = 0.15f;                                // of flood and eyedropper, 0 to 1
+    bool local = false;                                     // axes of gizmos
     glm::dvec3 box_low{-1}, box_high{1}, sphere_center{0};  // world
     double sphere_radius = 1;
 };
@@ -47,8 +63,9 @@ struct EditSnapshot {
     std::shared_ptr<const Gaussians> splats;
     std::shared_ptr<const std::vector<uint8_t>> states;
     size_t left = 0, selected = 0, locked = 0, hidden = 0;
-    std::optional<std::array<glm::dvec3, 2>> bounds;  // of the selection: its lowest and highest corner, world
-    glm::dvec3 middle{0};                             // of the selection: the mean of the means
+    std::optional<std::array<glm::dvec3, 2>>
+        bounds;            // of the selection: its lowest and highest corner, world
+    glm::dvec3 middle{0};  // of the selection: the mean of the means
     std::vector<edit::Step> steps;
     size_t done = 0;
     uint64_t version = 0, values_version = 0, history_bytes = 0;
@@ -63,9 +80,10 @@ class Editor {
 
     // Scenes.
     /// Replaces all scenes by this one. journaled: it is a file of its own, and gets a journal.
-    void enter(const std::string& name, const std::filesystem::path& file, std::shared_ptr<const Gaussians> splats,
-               edit::Cameras cameras, bool journaled);
-    void add(const std::string& name, const std::filesystem::path& file, std::shared_ptr<const Gaussians> splats);
+    void enter(const std::string& name, const std::filesystem::path& file,
+               std::shared_ptr<const Gaussians> splats, edit::Cameras cameras, bool journaled);
+    void add(const std::string& name, const std::filesystem::path& file,
+             std::shared_ptr<const Gaussians> splats);
     size_t scenes() const { return scenes_.size(); }
     const EditedScene& scene(size_t i) const { return *scenes_[i]; }
     size_t active() const { return active_; }
@@ -99,7 +117,9 @@ class Editor {
     const EditSnapshot& snapshot() const { return *snapshot_; }
     /// Of all scenes that are shown, joined: what the render thread gets.
     std::shared_ptr<const Gaussians> splats() const { return drawn_; }
-    std::shared_ptr<const std::vector<uint8_t>> marks() const { return marks_; }  // ewa::Mark bits; null: none
+    std::shared_ptr<const std::vector<uint8_t>> marks() const {
+        return marks_;
+    }  // ewa::Mark bits; null: none
 
     // Files.
     /// Replays the edits on the file as it was read, and writes the result. In the background. all: joins all scenes that are shown.

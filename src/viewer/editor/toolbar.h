@@ -10,8 +10,8 @@ namespace ewa::viewer {
 
 /// What the user asked for in the bar.
 struct BarActions {
-    bool open = false, save = false, save_as = false, clean = false, film = false, publish = false, picture = false, help = false,
-         panel = false;
+    bool open = false, save = false, save_as = false, clean = false, film = false, publish = false,
+         picture = false, help = false, panel = false;
 };
 
 /// In px of the framebuffer: what the bars take of the window.
@@ -22,8 +22,8 @@ BarSizes bar_sizes(double text_height);
 
 struct BarFacts {
     bool film_shown = false, panel_shown = false, can_save = false;
-    bool live = false;       // a training is watched: edits go to it
-    std::string status;      // at the right of the status line: device, time of the frame
+    bool live = false;   // a training is watched: edits go to it
+    std::string status;  // at the right of the status line: device, time of the frame
 };
 
 /// area: the part of the window beside the panel, with the bars, px of the framebuffer.

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "edit/shapes.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <optional>
+#include <unordered_map>
+
+#include "core/text.h"
+#include "core/typing.h"
+#include "edit/view_shapes.h"
+#include "ewa/error.h"
+#include "scene/splat_groups.h"
+#include "shared/constants.h"
+
+namespace ewa::edit {
+namespace {
+
+[[noreturn]] void refuse_shape(const std::string& what, const std::string& text, const std::string& form) {
+    throw InputError(what + ": '" + text + "' is not " + form);
+}
+
+std::vector<double> numbers_of(const std::string& what, const std::string& text, const std::string& value,
+                               size_t count, const std::string& form) {
+    const auto n = core::parse_list(value);
+    if (!n || n->size() != count) refuse_shape(what, text, form);
+    return *n;
+}
+
+/// The selectable splats as a scene of their own, and where they are in the whole one.
+struct Part {
+    Gaussians splats;
+    std::vector<uint32_t> indices;
+};
+
+template <class Condition>
+Part part_of(const EditedSplats& all, const Condition& belongs) {
+    Part part;
+    for (size_t i = 0; i < all.size(); ++i)
+        if (all.selectable(i) && belongs(i)) part.indices.push_back(uint32_t(i));
+    const Gaussians& from = *all.splats();
+    part.splats.sh_degree = 0;  // groups do not depend on colours
+    part.splats.origin = from.origin;
+    part.splats.resize(part.indices.size());
+    const size_t stride = from.sh_stride();
+    for (size_t k = 0; k < part.indices.size(); ++k) {
+        const size_t i = part.indices[k];
+        std::copy_n(&from.means[3 * i], 3, &part.splats.means[3 * k]);
+        std::copy_n(&from.quaternions[4 * i], 4, &part.splats.quaternions[4 * k]);
+        std::copy_n(&from.log_scales[3 * i], 3, &part.splats.log_scales[3 * k]);
+        part.splats.opacity_logits[k] = from.opacity_logits[i];
+        std::copy_n(&from.sh[stride * i], 3, &part.splats.sh[3 * k]);
+    }
+    return part;
+}
+
+Part whole(const EditedSplats& all) {
+    return part_of(all, [](size_t) { return true; });
+}
+
+/// Takes the splats of a part whose flag is set.
+std::vector<bool> taken(const EditedSplats& all, const Part& part, const std::vector<bool>& flags) {
+    std::vector<bool> result(all.size());
+    for (size_t k = 0; k < flags.size(); ++k)
+        if (flags[k]) result[part.indices[k]] = true;
+    return result;
+}
+
+glm::dvec3 color_of_splat(const Gaussians& g, size_t i) {
+    const float* sh = &g.sh[g.sh_stride() * i];
+    return shared::COLOR_OFFSET + shared::SH_C0 * glm::dvec3(sh[0], sh[1], sh[2]);
+}
+
+bool like(const glm::dvec3& a, const glm::dvec3& b, double tolerance) {
+    return std::abs(a.x - b.x) <= tolerance && std::abs(a.y - b.y) <= tolerance &&
+           std::abs(a.z - b.z) <= tolerance;
+}
+
+/// The splat of the part whose mean is nearest.
+std::optional<size_t> nearest_to(const Part& part, const glm::dvec3& point) {
+    std::optional<size_t> nearest;
+    double least = std::numeric_limits<double>::infinity();
+    for (size_t k = 0; k < part.splats.size(); ++k) {
+        const glm::dvec3 from = part.splats.world_mean(k) - point;
+        const double distance = glm::dot(from, from);
+        if (!(distance < least)) continue;
+        least = distance;
+        nearest = k;
+    }
+    return nearest;
+}
+
+/// The group that the nearest splat is in.
+std::vector<bool> group_at(const Part& part, size_t seed) {
+    const scene::SplatGroups groups = scene::touching_groups(part.splats);
+    std::vector<bool> flags(part.splats.size());
+    for (size_t k = 0; k < flags.size(); ++k) flags[k] = groups.of[k] == groups.of[seed];
+    return flags;
+}
+
+Shape cluster(const glm::dvec3& point) {
+    return [=](const EditedSplats& all) {
+        const Part part = whole(all);
+        const auto seed = nearest_to(part, point);
+        return taken(all, part, seed ? group_at(part, *seed) : std::vector<bool>());
+    };
+}
+
+Shape flood(const glm::dvec3& point, double tolerance) {
+    return [=](const EditedSplats& all) {
+        const Part everything = whole(all);
+        const auto nearest = nearest_to(everything, point);
+        if (!nearest) return std::vector<bool>(all.size());
+        const glm::dvec3 color = color_of_splat(everything.splats, *nearest);
+        const Part part =
+            part_of(all, [&](size_t i) { return like(color_of_splat(*all.splats(), i), color, tolerance); });
+        return taken(all, part, group_at(part, nearest_to(part, point).value()));
+    };
+}
+
+/// least: groups of fewer splats are taken. 0: all but the largest group.
+Shape small_groups(bool all_but_largest) {
+    return [=](const EditedSplats& all) {
+        const Part part = whole(all);
+        std::vector<bool> flags =
+            all_but_largest ? largest_cluster(part.splats) : grounded_splats(part.splats);
+        flags.flip();
+        return taken(all, part, flags);
+    };
+}
+
+/// Cells of the edge `size`, for searches within that distance.
+class Cells {
+  public:
+    explicit Cells(double size) : size_(size) {}
+    void add(const glm::dvec3& point) { cells_[key(cell(point))].push_back(point); }
+    bool any_within(const glm::dvec3& point, double radius) const {
+        const auto middle = cell(point);
+        for (int64_t z = -1; z <= 1; ++z)
+            for (int64_t y = -1; y <= 1; ++y)
+                for (int64_t x = -1; x <= 1; ++x) {
+                    const auto found = cells_.find(key({middle[0] + x, middle[1] + y, middle[2] + z}));
+                    if (found == cells_.end()) continue;
+                    for (const glm::dvec3& other : found->second) {
+                        const glm::dvec3 d = other - point;
+                        if (glm::dot(d, d) <= radius * radius) return true;
+                    }
+                }
+        return false;
+    }
+
+  private:
+    using Cell = std::array<int64_t, 3>;
+    Cell cell(const glm::dvec3& p) const {
+        constexpr double kMost = 1e15;  // beyond it, points share a cell
+        Cell c{};
+        for (int axis = 0; axis < 3; ++axis)
+            c[size_t(axis)] = int64_t(std::clamp(std::floor(p[axis] / size_), -kMost, kMost));
+        return c;
+    }
+    /// Cells that share a key are searched together.
+    static uint64_t key(const Cell& c) {
+        return uint64_t(c[0]) * 0x9e3779b97f4a7c15u ^ uint64_t(c[1]) * 0xc2b2ae3d27d4eb4fu ^
+               uint64_t(c[2]) * 0x165667b19e3779f9u;
+    }
+    double size_;
+    std::unordered_map<uint64_t, std::vector<glm::dvec3>> cells_;
+};
+
+/// The selected splats and those near them, or the selected ones that are not near others.
+Shape resized(double radius, bool grow) {
+    return [=](const EditedSplats& all) {
+        const Gaussians& g = *all.splats();
+        Cells cells(radius);
+        const auto selected = [&](size_t i) { return (all.states()[i] & kSelected) != 0; };
+        for (size_t i = 0; i < all.size(); ++i)
+            if (all.selectable(i) && selected(i) == grow) cells.add(g.world_mean(i));
+        std::vector<bool> flags(all.size());
+        for (size_t i = 0; i < all.size(); ++i) {
+            if (!all.selectable(i)) continue;
+            if (grow)
+                flags[i] = selected(i) || cells.any_within(g.world_mean(i), radius);
+            else
+                flags[i] = selected(i) && !cells.any_within(g.world_mean(i), radius);
+        }
+        return flags;
+    };
+}
+
+Shape of_filter(const Filter& filter) {
+    return [=](const EditedSplats& all) { return filter(*all.splats(), all.cameras()); };
+}
+
+Shape same(bool value) {
+    return [=](const EditedSplats& all) { return std::vector<bool>(all.size(), value); };
+}
+
+Shape inverted() {
+    return [](const EditedSplats& all) {
+        std::vector<bool> flags(all.size());
+        for (size_t i = 0; i < flags.size(); ++i) flags[i] = (all.states()[i] & kSelected) == 0;
+        return flags;
+    };
+}
+
+Shape shape_of_color(const glm::dvec3& color, double tolerance) {
+    return [=](const EditedSplats& all) {
+        std::vector<bool> flags(all.size());
+        for (size_t i = 0; i < flags.size(); ++i)
+            flags[i] = like(color_of_splat(*all.splats(), i), color, tolerance);
+        return flags;
+    };
+}
+
+double radius_of(const std::string& what, const std::string& text, const std::string& value) {
+    constexpr const char* kForm = "grow=R or shrink=R with a distance above 0";
+    const double radius = numbers_of(what, text, value, 1, kForm).front();
+    if (!(radius > 0)) refuse_shape(what, text, kForm);
+    return radius;
+}
+
+Shape parse_shape(const std::string& text, const std::string& what) {
+    if (text == "all") return same(true);
+    if (text == "none") return same(false);
+    if (text == "invert") return inverted();
+    if (text == "floaters" || text == "far") return small_groups(text == "far");
+    const size_t equals = std::min(text.find('='), text.size());
+    const std::string name = text.substr(0, equals),
+                      value = equals < text.size() ? text.substr(equals + 1) : "";
+    if (name == "polygon" || name == "brush") return parse_view_shape(text, what);
+    if (name == "color" || name == "flood") {
+        const auto n = numbers_of(what, text, value, 4, name == "color" ? "color=r,g,b,T" : "flood=x,y,z,T");
+        const glm::dvec3 at(n[0], n[1], n[2]);
+        return name == "color" ? shape_of_color(at, n[3]) : flood(at, n[3]);
+    }
+    if (name == "cluster") {
+        const auto n = numbers_of(what, text, value, 3, "cluster=x,y,z");
+        return cluster({n[0], n[1], n[2]});
+    }
+    if (name == "grow" || name == "shrink") return resized(radius_of(what, text, value), name == "grow");
+    if (equals == text.size())
+        refuse_shape(what, text,
+                     "all, none, invert, floaters, far, a filter of --where, color=, flood=, cluster=, "
+                     "grow=, shrink=, "
+                     "polygon= or brush=" +
+                         core::did_you_mean(text, {"all", "none", "invert", "floaters", "far"}));
+    return of_filter(parse_filter(text, what));
+}
+
+}  // namespace
+
+Selection parse_selection(const std::string& text, const std::string& what) {
+    constexpr std::pair<std::string_view, Operation> kOperations[] = {
+        {"add:", Operation::add}, {"remove:", Operation::remove}, {"and:", Operation::intersect}};
+    for (const auto& [word, operation] : kOperations)
+        if (text.starts_with(word)) return {operation, parse_shape(text.substr(word.size()), what)};
+    return {Operation::set, parse_shape(text, what)};
+}
+
+void select(EditedSplats& splats, const Selection& selection) {
+    const std::vector<bool> flags = selection.shape(splats);
+    std::vector<uint8_t> states = splats.states();
+    for (size_t i = 0; i < states.size(); ++i) {
+        if (!splats.selectable(i)) continue;
+        const bool before = (states[i] & kSelected) != 0, flag = flags[i];
+        bool now = flag;
+        if (selection.operation == Operation::add) now = before || flag;
+        if (selection.operation == Operation::remove) now = before && !flag;
+        if (selection.operation == Operation::intersect) now = before && flag;
+        states[i] = uint8_t((states[i] & ~kSelected) | (now ? kSelected : 0));
+    }
+    splats.set_states(std::move(states));
+}
+
+std::string box_shape(const glm::dvec3& low, const glm::dvec3& high) {
+    return fmt::format("box={:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}", low.x, low.y, low.z, high.x, high.y,
+                       high.z);
+}
+
+std::string sphere_shape(const glm::dvec3& center, double radius) {
+    return fmt::format("sphere={:.9g},{:.9g},{:.9g},{:.9g}", center.x, center.y, center.z, radius);
+}
+
+}  // namespace ewa::edit

@@ -1,0 +1,343 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "edit/view_shapes.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat2x2.hpp>
+#include <limits>
+#include <optional>
+
+#include "core/parallel.h"
+#include "core/typing.h"
+#include "ewa/error.h"
+#include "scene/splat_shape.h"
+#include "shared/constants.h"
+
+namespace ewa::edit {
+namespace {
+
+constexpr double kExtent = 2;  // standard deviations that belong to a splat, with ;extent
+constexpr double kFar = std::numeric_limits<double>::infinity();
+
+/// A pinhole, or parallel rays.
+struct View {
+    double fx = 1, fy = 1, cx = 0, cy = 0;
+    glm::dmat3 rotation{1.0};
+    glm::dvec3 translation{0.0};
+    bool parallel = false;
+};
+
+/// A splat in the image of a view.
+struct Seen {
+    glm::dvec2 at{0};
+    double depth = 0;            // camera z
+    glm::dmat2 covariance{0.0};  // squared px; zero unless it is asked for
+    double deviation = 0;        // the largest, world units
+};
+
+struct Bounds {
+    glm::dvec2 low{kFar}, high{-kFar};
+    void add(const glm::dvec2& p) {
+        low = glm::min(low, p);
+        high = glm::max(high, p);
+    }
+    bool has(const glm::dvec2& p, double margin = 0) const {
+        return p.x >= low.x - margin && p.x <= high.x + margin && p.y >= low.y - margin &&
+               p.y <= high.y + margin;
+    }
+};
+
+struct Region {
+    std::vector<glm::dvec2> points;
+    std::optional<double> brush;  // radius, px; empty: a polygon
+    Bounds bounds;
+    View view;
+    bool front = false, extent = false;
+};
+
+/// Empty behind the near plane, and for means that are not finite.
+std::optional<Seen> seen_splat(const Gaussians& g, size_t i, const View& view, bool shape) {
+    const glm::dvec3 p = view.rotation * g.world_mean(i) + view.translation;
+    if (!(p.z > double(shared::NEAR_PLANE) && std::isfinite(p.x + p.y + p.z))) return std::nullopt;
+    Seen seen;
+    const double scale = view.parallel ? 1 : 1 / p.z;
+    seen.at = {view.fx * p.x * scale + view.cx, view.fy * p.y * scale + view.cy};
+    seen.depth = p.z;
+    if (!shape) return seen;
+    if (!drawable(g, i)) return std::nullopt;
+    const glm::dmat3 covariance = view.rotation * scene::covariance_of(g, i) * glm::transpose(view.rotation);
+    // The rows of the projection's Jacobian.
+    const glm::dvec3 x(view.fx * scale, 0, view.parallel ? 0 : -view.fx * p.x * scale * scale);
+    const glm::dvec3 y(0, view.fy * scale, view.parallel ? 0 : -view.fy * p.y * scale * scale);
+    const glm::dvec3 sx = covariance * x, sy = covariance * y;
+    seen.covariance = glm::dmat2(glm::dot(x, sx), glm::dot(x, sy), glm::dot(x, sy), glm::dot(y, sy));
+    seen.deviation = std::sqrt(std::max({covariance[0][0], covariance[1][1], covariance[2][2]}));
+    return seen;
+}
+
+/// By the even-odd rule.
+bool in_polygon(const std::vector<glm::dvec2>& corners, const glm::dvec2& p) {
+    bool inside = false;
+    for (size_t i = 0, k = corners.size() - 1; i < corners.size(); k = i++) {
+        const glm::dvec2 &a = corners[i], &b = corners[k];
+        if ((a.y > p.y) != (b.y > p.y) && p.x < (b.x - a.x) * (p.y - a.y) / (b.y - a.y) + a.x)
+            inside = !inside;
+    }
+    return inside;
+}
+
+/// The point of a segment that is nearest to p.
+glm::dvec2 nearest_on(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& p) {
+    const glm::dvec2 along = b - a;
+    const double length = glm::dot(along, along);
+    return length > 0 ? a + std::clamp(glm::dot(p - a, along) / length, 0.0, 1.0) * along : a;
+}
+
+/// Calls meets(a, b) for each segment until it returns true.
+template <class Meets>
+bool any_segment(const Region& region, const Meets& meets) {
+    const auto& p = region.points;
+    for (size_t i = 0; i + 1 < p.size(); ++i)
+        if (meets(p[i], p[i + 1])) return true;
+    const glm::dvec2 &last = p.back(), &next = region.brush ? p.back() : p.front();
+    return meets(last, next);
+}
+
+/// Whether the ellipse of a splat touches the border of a polygon: in units of its standard deviations, the splat is a circle.
+bool ellipse_meets(const Region& region, const Seen& seen) {
+    const double a = seen.covariance[0][0], b = seen.covariance[0][1], c = seen.covariance[1][1];
+    const double l = std::sqrt(a), m = l > 0 ? b / l : 0,
+                 n = std::sqrt(std::max(c - m * m, 0.0));  // Cholesky
+    if (!(l > 0 && n > 0)) return false;
+    const auto whitened = [&](const glm::dvec2& p) {
+        const double x = (p.x - seen.at.x) / l;
+        return glm::dvec2(x, (p.y - seen.at.y - m * x) / n);
+    };
+    return any_segment(region, [&](const glm::dvec2& from, const glm::dvec2& to) {
+        const glm::dvec2 near = nearest_on(whitened(from), whitened(to), glm::dvec2(0));
+        return glm::dot(near, near) <= kExtent * kExtent;
+    });
+}
+
+bool in_brush(const Region& region, const Seen& seen) {
+    return any_segment(region, [&](const glm::dvec2& from, const glm::dvec2& to) {
+        const glm::dvec2 away = seen.at - nearest_on(from, to, seen.at);
+        const double distance = glm::length(away);
+        double reach = *region.brush;
+        if (region.extent && distance > 0) {
+            const glm::dvec2 n = away / distance;
+            reach += kExtent * std::sqrt(std::max(glm::dot(n, seen.covariance * n), 0.0));
+        }
+        return distance <= reach;
+    });
+}
+
+bool in_region(const Region& region, const Seen& seen) {
+    const double largest = std::max(seen.covariance[0][0], seen.covariance[1][1]);
+    const double margin = region.brush.value_or(0) + (region.extent ? kExtent * std::sqrt(largest) : 0);
+    if (!region.bounds.has(seen.at, margin)) return false;
+    if (region.brush) return in_brush(region, seen);
+    return in_polygon(region.points, seen.at) || (region.extent && ellipse_meets(region, seen));
+}
+
+/// The depth behind which splats of a region are covered: where the transmittance falls below a half, in cells of its bounds.
+class Cover {
+  public:
+    Cover(const EditedSplats& all, const Region& region) : bounds_(region.bounds) {
+        const double margin = region.brush.value_or(0);
+        bounds_.low -= margin;
+        bounds_.high += margin;
+        const glm::dvec2 size = bounds_.high - bounds_.low;
+        edge_ = std::max({1.0, size.x / kMostCells, size.y / kMostCells});
+        columns_ = int(size.x / edge_) + 1;
+        rows_ = int(size.y / edge_) + 1;
+        depths_.assign(size_t(columns_) * size_t(rows_), kFar);
+        blend(all, region.view);
+    }
+
+    bool shows(const Seen& seen) const {
+        const int column = int((seen.at.x - bounds_.low.x) / edge_),
+                  row = int((seen.at.y - bounds_.low.y) / edge_);
+        const size_t cell = size_t(std::clamp(row, 0, rows_ - 1)) * size_t(columns_) +
+                            size_t(std::clamp(column, 0, columns_ - 1));
+        return seen.depth <= depths_[cell] + seen.deviation;
+    }
+
+  private:
+    static constexpr double kMostCells = 256;  // a side
+    static constexpr double kReach = 3;        // standard deviations that are blended
+    struct Drawn {
+        Seen seen;
+        double opacity;
+    };
+
+    void blend(const EditedSplats& all, const View& view) {
+        std::vector<Drawn> drawn;
+        const Gaussians& g = *all.splats();
+        for (size_t i = 0; i < all.size(); ++i) {
+            if ((all.states()[i] & (kDeleted | kHidden)) != 0) continue;
+            const auto seen = seen_splat(g, i, view, true);
+            if (!seen) continue;
+            const double reach = kReach * std::sqrt(std::max(seen->covariance[0][0], seen->covariance[1][1]));
+            if (bounds_.has(seen->at, reach))
+                drawn.push_back({*seen, 1 / (1 + std::exp(-double(g.opacity_logits[i])))});
+        }
+        std::ranges::stable_sort(drawn, {}, [](const Drawn& d) { return d.seen.depth; });
+        std::vector<double> transmittance(depths_.size(), 1);
+        for (const Drawn& splat : drawn) blend(splat, transmittance);
+    }
+
+    void blend(const Drawn& splat, std::vector<double>& transmittance) {
+        // Smaller than a cell, a splat still covers a part of one.
+        const double least = edge_ * edge_ / 12;
+        const double a = splat.seen.covariance[0][0] + least, b = splat.seen.covariance[0][1],
+                     c = splat.seen.covariance[1][1] + least, determinant = a * c - b * b;
+        if (!(determinant > 0)) return;
+        const double peak =
+            splat.opacity * std::sqrt(std::max((a - least) * (c - least) - b * b, 0.0) / determinant);
+        const double rx = kReach * std::sqrt(a), ry = kReach * std::sqrt(c);
+        const auto cell = [&](double at, int count) {
+            return int(std::clamp(at / edge_, 0.0, double(count - 1)));
+        };
+        const glm::dvec2 at = splat.seen.at - bounds_.low;
+        for (int y = cell(at.y - ry, rows_); y <= cell(at.y + ry, rows_); ++y)
+            for (int x = cell(at.x - rx, columns_); x <= cell(at.x + rx, columns_); ++x) {
+                const size_t k = size_t(y) * size_t(columns_) + size_t(x);
+                if (depths_[k] < kFar) continue;
+                const double dx = (x + 0.5) * edge_ - at.x, dy = (y + 0.5) * edge_ - at.y;
+                const double square = (c * dx * dx - 2 * b * dx * dy + a * dy * dy) / determinant;
+                if (!(square < kReach * kReach)) continue;
+                transmittance[k] *= 1 - peak * std::exp(-square / 2);
+                if (transmittance[k] < 0.5) depths_[k] = splat.seen.depth;
+            }
+    }
+
+    Bounds bounds_;
+    double edge_ = 1;
+    int columns_ = 1, rows_ = 1;
+    std::vector<double> depths_;
+};
+
+std::vector<bool> splats_in(const Region& region, const EditedSplats& all) {
+    const Gaussians& g = *all.splats();
+    const std::optional<Cover> cover =
+        region.front ? std::optional<Cover>(std::in_place, all, region) : std::nullopt;
+    constexpr size_t kChunk = 65536;
+    std::vector<uint8_t> flags(all.size());
+    core::on_all_cores((all.size() + kChunk - 1) / kChunk, [&](size_t chunk) {
+        for (size_t i = chunk * kChunk; i < std::min(all.size(), (chunk + 1) * kChunk); ++i) {
+            if (!all.selectable(i)) continue;
+            const auto seen = seen_splat(g, i, region.view, region.extent || region.front);
+            flags[i] = seen && in_region(region, *seen) && (!cover || cover->shows(*seen));
+        }
+    });
+    return {flags.begin(), flags.end()};
+}
+
+constexpr const char* kForm =
+    "polygon=x,y,x,y,x,y,...;view=VIEW or brush=R,x,y,...;view=VIEW, with ;front and ;extent behind it if "
+    "wanted; "
+    "VIEW is fx,fy,cx,cy,w,x,y,z,tx,ty,tz, with parallel: before it for parallel rays";
+
+std::optional<View> parse_view(std::string text) {
+    View view;
+    constexpr std::string_view kParallel = "parallel:";
+    view.parallel = text.starts_with(kParallel);
+    if (view.parallel) text.erase(0, kParallel.size());
+    const auto n = core::parse_list(text);
+    constexpr size_t kNumbers = 11;
+    if (!n || n->size() != kNumbers) return std::nullopt;
+    const glm::dquat q((*n)[4], (*n)[5], (*n)[6], (*n)[7]);
+    if (!(glm::length(q) > 0) || (*n)[0] == 0 || (*n)[1] == 0) return std::nullopt;
+    view.fx = (*n)[0], view.fy = (*n)[1], view.cx = (*n)[2], view.cy = (*n)[3];
+    view.rotation = glm::mat3_cast(glm::normalize(q));
+    view.translation = {(*n)[8], (*n)[9], (*n)[10]};
+    return view;
+}
+
+/// Coordinates, from the first of `numbers` on.
+bool add_points(Region& region, const std::vector<double>& numbers, size_t first) {
+    for (size_t i = first; i + 1 < numbers.size(); i += 2) {
+        region.points.emplace_back(numbers[i], numbers[i + 1]);
+        region.bounds.add(region.points.back());
+    }
+    return (numbers.size() - first) % 2 == 0 && region.points.size() >= (region.brush ? 1u : 3u);
+}
+
+std::optional<Region> parse_region(const std::string& text) {
+    Region region;
+    bool has_view = false;
+    size_t begin = 0;
+    while (begin <= text.size()) {
+        const size_t end = std::min(text.find(';', begin), text.size());
+        const std::string part = text.substr(begin, end - begin);
+        const auto value_of = [&](std::string_view name) -> std::optional<std::string> {
+            if (!part.starts_with(name)) return std::nullopt;
+            return part.substr(name.size());
+        };
+        if (const auto view = value_of("view=")) {
+            const auto parsed = parse_view(*view);
+            if (!parsed) return std::nullopt;
+            region.view = *parsed;
+            has_view = true;
+        } else if (const auto polygon = begin == 0 ? value_of("polygon=") : std::nullopt) {
+            const auto n = core::parse_list(*polygon);
+            if (!n || !add_points(region, *n, 0)) return std::nullopt;
+        } else if (const auto brush = begin == 0 ? value_of("brush=") : std::nullopt) {
+            const auto n = core::parse_list(*brush);
+            if (!n || n->empty() || !(n->front() > 0)) return std::nullopt;
+            region.brush = n->front();
+            if (!add_points(region, *n, 1)) return std::nullopt;
+        } else if (part == "front") {
+            region.front = true;
+        } else if (part == "extent") {
+            region.extent = true;
+        } else {
+            return std::nullopt;
+        }
+        begin = end + 1;
+    }
+    return has_view ? std::optional(region) : std::nullopt;
+}
+
+std::string points_text(const std::vector<glm::dvec2>& points) {
+    std::string text;
+    for (const glm::dvec2& p : points)
+        text += fmt::format("{}{:.7g},{:.7g}", text.empty() ? "" : ",", p.x, p.y);
+    return text;
+}
+
+}  // namespace
+
+Shape parse_view_shape(const std::string& text, const std::string& what) {
+    const auto region = parse_region(text);
+    if (!region) throw InputError(what + ": '" + text + "' is not " + kForm);
+    return [region = *region](const EditedSplats& all) { return splats_in(region, all); };
+}
+
+std::string view_text(const Camera& camera) {
+    const glm::dquat q = glm::quat_cast(camera.rotation);
+    const glm::dvec3& t = camera.translation;
+    return fmt::format("{}{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}",
+                       camera.distortion.lens == Lens::orthographic ? "parallel:" : "", camera.fx, camera.fy,
+                       camera.cx, camera.cy, q.w, q.x, q.y, q.z, t.x, t.y, t.z);
+}
+
+std::string polygon_shape(const Camera& camera, const std::vector<glm::dvec2>& points) {
+    return "polygon=" + points_text(points) + ";view=" + view_text(camera);
+}
+
+std::string rectangle_shape(const Camera& camera, const glm::dvec2& from, const glm::dvec2& to) {
+    return polygon_shape(camera, {from, {to.x, from.y}, to, {from.x, to.y}});
+}
+
+std::string brush_shape(const Camera& camera, double radius, const std::vector<glm::dvec2>& points) {
+    return fmt::format("brush={:.7g},{};view={}", radius, points_text(points), view_text(camera));
+}
+
+}  // namespace ewa::edit
