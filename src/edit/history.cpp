@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "edit/history.h"
 
+#include <spdlog/fmt/fmt.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -39,9 +40,13 @@ std::string quoted(const std::string& word) {
         word.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
                                "_-+=.,:/%@") == std::string::npos)
         return word;
-    std::string text = "'";
-    for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    return text + "'";
+    std::string text(1, '\'');
+    for (const char c : word) {
+        if (c == '\'') text.append("'\\'");  // closes, an escaped quote, opens again
+        text.push_back(c);
+    }
+    text.push_back('\'');
+    return text;
 }
 
 }  // namespace
@@ -125,12 +130,11 @@ uint64_t History::bytes() const {
     return bytes;
 }
 
-std::string command_line(const std::vector<Words>& edits, const std::string& input,
-                         const std::string& output) {
-    std::string line = "ewa convert " + quoted(input) + " " + quoted(output);
+std::string command_line(const std::vector<Words>& edits, const std::string& input, const std::string& output) {
+    std::string line = fmt::format("ewa convert {} {}", quoted(input), quoted(output));
     for (const Words& words : edits) {
-        line += " --" + words.name;
-        if (!words.value.empty()) line += " " + quoted(words.value);
+        line += fmt::format(" --{}", words.name);
+        if (!words.value.empty()) line += fmt::format(" {}", quoted(words.value));
     }
     return line;
 }
