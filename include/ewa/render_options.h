@@ -54,7 +54,9 @@ enum class Drawing {
 struct DrawOptions {
     RenderOptions render;
     Drawing drawing = Drawing::color;
-    double splat_scale = 1;  // factor of every splat's scales, above 0
+    double splat_scale = 1;     // factor of every splat's scales, above 0
+    bool draft = false;         // splats with kMarkFine are not drawn (Renderer::mark)
+    bool plain_colors = false;  // marks hide splats, but do not tint them (for pictures and films)
 };
 
 }  // namespace ewa

@@ -35,6 +35,16 @@ struct Rendering {
     Image normal{};
 };
 
+/// Bits of a splat's mark, see Renderer::mark.
+enum Mark : uint8_t {
+    kMarkSelected = 1,  // drawn in the selection's colour
+    kMarkLocked = 2,    // drawn darker
+    kMarkHidden = 4,    // not drawn
+    kMarkDeleted = 8,   // not drawn
+    kMarkPreview = 16,  // drawn red: what a cleaning rule would remove
+    kMarkFine = 128,    // not drawn in a draft
+};
+
 /// Holds a scene on a device and renders it. One thread at a time may use it.
 class Renderer {
   public:
@@ -59,6 +69,10 @@ class Renderer {
     /// Replaces the scene. Compiled kernels are used again. Throws as the constructor does; after a RunError the renderer has no
     /// splats.
     void replace(const Gaussians& gaussians);
+
+    /// Marks the splats: a byte of Mark bits each, in the order of the scene; empty: no marks. Splats stay as they are. The marks
+    /// stay until replace(). Renders along rays throw InputError if marks would change them. Throws InputError for another length.
+    void mark(std::span<const uint8_t> marks);
 
     /// Splats skipped in the last render because a stored value is not finite or the quaternion is zero.
     uint32_t skipped_nonfinite() const;

@@ -4,7 +4,7 @@
 // One invocation owns splat i. It reads its parameters and the camera, and writes its record, its depth key and the
 // number of tiles that it reaches. A splat that is not visible gets count 0 and the last key.
 // SPEC_MODE, bits: PROJECT_DEBUG shifts the scales and counts the visible splats; PROJECT_NORMALS and PROJECT_SLOPES write
-// the splat's surface in place of its colour.
+// the splat's surface in place of its colour; PROJECT_MARKS hides and tints splats by their marks.
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_CAMERA 1
 #include "lib/prelude.glsl"
@@ -26,9 +26,16 @@ layout(set = 0, binding = 4, scalar) writeonly buffer TileCounts { uint tile_cou
 layout(set = 0, binding = 5, scalar) buffer CountsBlock { Counts counts; };
 layout(push_constant, scalar) uniform Push { ProjectPush push; };
 #include "lib/splat_color.glsl"
+#include "lib/marks.glsl"
 
 // Whether splat i reaches a tile.
 bool project(uint i) {
+    const uint mark = mark_of(i);
+    if ((mark & push.hidden_marks) != 0u) {
+        depth_keys[i] = 0xffffffffu;
+        tile_counts[i] = 0u;
+        return false;
+    }
     const vec4 p0 = param(0, i), p1 = param(1, i), p2 = param(2, i);
     const vec3 log_scale = DEBUG ? p2.xyz + push.log_scale_shift : p2.xyz;
     const StoredProjection stored = project_splat(StoredSplat(p0.xyz, p0.w, p1, log_scale));
@@ -36,6 +43,7 @@ bool project(uint i) {
     const float z = depth_of_splat(p);
     bool finite_color;
     vec3 color = sh_color(i, p2, seen_along(p), finite_color);
+    if (MARKED) color = tinted(color, mark & push.tinted_marks);
     if ((MODE & PROJECT_NORMALS) != 0u) color = normal_of(p);
     if ((MODE & PROJECT_SLOPES) != 0u) color = vec3(depth_slopes(p), 0.0);
 

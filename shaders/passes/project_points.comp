@@ -4,7 +4,8 @@
 // One invocation owns splat i. It reads its parameters and the camera, and writes its record, its depth key and the
 // number of tiles that it reaches. A splat that is not visible gets count 0 and the last key.
 // The record's whitener is the inverse of the radii. Its opacity is the one whose footprint ends where u^2 + v^2 = 1.
-// SPEC_MODE: PROJECT_DEBUG shifts the scales and counts the visible splats.
+// SPEC_MODE, bits: PROJECT_DEBUG shifts the scales and counts the visible splats; PROJECT_MARKS hides and tints splats by
+// their marks.
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_CAMERA 1
 #include "lib/prelude.glsl"
@@ -15,7 +16,7 @@
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
-const bool DEBUG = MODE == PROJECT_DEBUG;
+const bool DEBUG = (MODE & PROJECT_DEBUG) != 0u;
 
 TEXELS(0, params);
 STORED_TEXELS(2, records);
@@ -24,14 +25,22 @@ layout(set = 0, binding = 4, scalar) writeonly buffer TileCounts { uint tile_cou
 layout(set = 0, binding = 5, scalar) buffer CountsBlock { Counts counts; };
 layout(push_constant, scalar) uniform Push { ProjectPush push; };
 #include "lib/splat_color.glsl"
+#include "lib/marks.glsl"
 
 // Whether splat i reaches a tile.
 bool project(uint i) {
+    const uint mark = mark_of(i);
+    if ((mark & push.hidden_marks) != 0u) {
+        depth_keys[i] = 0xffffffffu;
+        tile_counts[i] = 0u;
+        return false;
+    }
     const vec4 p0 = param(0, i), p1 = param(1, i), p2 = param(2, i);
     const SphereProjection p = project_sphere(p0.xyz, p1, DEBUG ? p2.xyz + push.log_scale_shift : p2.xyz);
     const float z = p.view.z.x;
     bool finite_color;
-    const vec3 color = sh_color(i, p2, normalize(p.view.offset), finite_color);
+    vec3 color = sh_color(i, p2, normalize(p.view.offset), finite_color);
+    if (MARKED) color = tinted(color, mark & push.tinted_marks);
 
     const vec2 x = pixel_position(p.view.x, p.view.z, 0), y = pixel_position(p.view.y, p.view.z, 1);
     const float e = 2.718282;  // rounded up

@@ -45,6 +45,12 @@ EWA_REAL(ELLIPSOID_REACH, 2.0);    // radius in standard deviations
 EWA_REAL(ELLIPSOID_OPACITY, 0.1);  // splats of a lower opacity are not drawn
 EWA_REAL(ELLIPSOID_RIM, 0.35);     // shade at the outline; 1 in the middle
 
+// Splats with marks. Red and the accent (1, MARK_ACCENT_GREEN, MARK_ACCENT_BLUE) take this share of a colour.
+EWA_REAL(MARK_SHARE, 0.65);
+EWA_REAL(MARK_ACCENT_GREEN, 0.7);
+EWA_REAL(MARK_ACCENT_BLUE, 0.1);
+EWA_REAL(MARK_LOCKED_LIGHT, 0.45);  // factor of the colours of locked splats
+
 // Real spherical harmonics in INRIA's order and signs (3DGS, utils/sh_utils.py; Sloan 2013).
 EWA_REAL(SH_C0, 0.28209479177387814);
 EWA_REAL(SH_C1, 0.4886025119029199);

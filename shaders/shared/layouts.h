@@ -45,6 +45,11 @@ EWA_UINT(PARAM_SH, 11u);         // 3 (degree + 1)^2 floats: coefficient after c
 // 2: colour r g b, view z
 EWA_UINT(RECORD_TEXELS, 3u);
 
+// ---- A splat's mark, a byte, four in a word. ewa::Mark has all bits; these change the colour ----
+EWA_UINT(MARK_SELECTED, 1u);
+EWA_UINT(MARK_LOCKED, 2u);
+EWA_UINT(MARK_PREVIEW, 16u);
+
 // ---- A splat as rays meet it: 3 texels at 3 * i. Its record's texels 0 and 1 are an ellipse for the tiles' lists ----
 // 0: mean in px, as in a record
 // 1: ux, k, vy of the footprint without a low-pass, optical depth of the ray through the centre
@@ -99,6 +104,7 @@ EWA_UINT(PLANE_MEDIAN, 4u);  // depth of the splat that takes T to MEDIAN_TRANSM
 EWA_UINT(PROJECT_DEBUG, 1u);    // shifts the scales, and counts the visible splats
 EWA_UINT(PROJECT_NORMALS, 2u);  // in place of the colour: the normal in world axes, towards the eye
 EWA_UINT(PROJECT_SLOPES, 4u);   // in place of the colour: d(depth)/du and d(depth)/dv, for BLEND_MEDIAN
+EWA_UINT(PROJECT_MARKS, 8u);    // reads the splats' marks
 // project_rays.comp
 EWA_UINT(PROJECT_RAYS_DEEP, 1u);     // a splat counts to MARCH_DEPTH_MIN, not to the cut-off
 EWA_UINT(PROJECT_RAYS_BY_MEAN, 2u);  // the key is the depth of the mean
@@ -325,6 +331,8 @@ struct ProjectPush {
     uint splats;
     uint planes;            // texel planes a splat
     float log_scale_shift;  // with PROJECT_DEBUG: added to every log scale
+    uint hidden_marks;      // with PROJECT_MARKS: bits of marks whose splats are not drawn
+    uint tinted_marks;      // with PROJECT_MARKS: MARK_* bits that change the colour
 };
 
 struct ViewsPush {

@@ -13,9 +13,11 @@ struct ProjectBuffers {
     gpu::BufferPart params, camera, records, depth_keys, tile_counts, counts;
 };
 
-/// Projects every splat into pixels. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (PROJECT_*), SPEC_LENSES, SPEC_WRAP.
+/// Projects every splat into pixels. marks: a byte a splat. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (PROJECT_* bits),
+/// SPEC_LENSES, SPEC_WRAP.
 struct Project : ProjectBuffers {
     static constexpr char shader[] = "project";
+    gpu::BufferPart marks;
 };
 
 /// Prepares splats for rays. rays: how a ray meets each. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (0,
@@ -98,9 +100,11 @@ struct MotionUpdate {
     gpu::BufferPart sums, motions, moments1, moments2, bases, counts;
 };
 
-/// Projects every splat as a sphere. Variant: SPEC_SH_DEGREE, SPEC_MODE (0 or PROJECT_DEBUG).
+/// Projects every splat as a sphere. marks: a byte a splat. Variant: SPEC_SH_DEGREE, SPEC_MODE (PROJECT_DEBUG,
+/// PROJECT_MARKS).
 struct ProjectPoints : ProjectBuffers {
     static constexpr char shader[] = "project_points";
+    gpu::BufferPart marks;
 };
 
 /// Gradient of ProjectPoints, fused with Adam. Variant: SPEC_SH_DEGREE, SPEC_MODE (UPDATE_* bits without

@@ -11,12 +11,13 @@ namespace {
 constexpr uint32_t kBlendModes[] = {shared::BLEND_COLOR,      shared::BLEND_DEPTH,  shared::BLEND_COUNT,
                                     shared::BLEND_ELLIPSOIDS, shared::BLEND_MEDIAN, shared::BLEND_COLOR};
 
-/// What project writes in place of colours.
+/// What project writes in place of colours, and what it reads.
 uint32_t project_mode(const Plan& plan) {
     const uint32_t surface = plan.drawing == Drawing::median_depth ? shared::PROJECT_SLOPES
                              : plan.drawing == Drawing::normal     ? shared::PROJECT_NORMALS
                                                                    : 0;
-    return surface | (plan.debug ? shared::PROJECT_DEBUG : 0);
+    return surface | (plan.debug ? shared::PROJECT_DEBUG : 0) |
+           (plan.reads_marks() ? shared::PROJECT_MARKS : 0);
 }
 
 /// Leaves the splats in depth order in order[0]: later buffers may share the memory of the other one. Each pass of a sort writes
@@ -141,7 +142,11 @@ void FramePasses::project(const Model& model) const {
                                          .counts = frame.counts};
     passes_of(*plan.method)
         .project(*this, buffers,
-                 {.splats = model.splats, .planes = model.planes(), .log_scale_shift = plan.log_scale_shift},
+                 {.splats = model.splats,
+                  .planes = model.planes(),
+                  .log_scale_shift = plan.log_scale_shift,
+                  .hidden_marks = plan.hidden_marks,
+                  .tinted_marks = plan.tinted_marks},
                  {shared::SPEC_MODE, project_mode(plan)});
 }
 

@@ -48,6 +48,7 @@ struct FrameInputs {
     int sh_degree = kMaxShDegree;  // degree to evaluate, at most the plan's stored degree
     uint32_t samples = 1;          // of a ray, with Integrator::march
     Band band{};
+    const gpu::Buffer* marks = nullptr;  // of the model's splats, if the plan reads them: a byte each
 };
 
 /// Band `band` of a view that is cut into `bands` bands of whole tile rows, with its halo. A view needs a tile row for each.

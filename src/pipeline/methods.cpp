@@ -11,10 +11,16 @@ namespace {
 using On = const FramePasses&;
 using Mode = gpu::SpecConstant;
 
+/// A binding that a mode does not use needs a buffer.
+gpu::BufferPart marks_or_any(On on, const passes::ProjectBuffers& buffers) {
+    return on.inputs.marks ? gpu::BufferPart(*on.inputs.marks)
+                           : gpu::BufferPart(*buffers.params.buffer, 0, 16);
+}
+
 constexpr MethodPasses kSplats{
     .project =
         [](On on, auto& buffers, auto& push, Mode mode) {
-            on.record(passes::Project{buffers}, push,
+            on.record(passes::Project{buffers, marks_or_any(on, buffers)}, push,
                       {on.degree(), mode, on.kernel(), on.lenses(), on.wrap()});
         },
     .blend =
@@ -35,7 +41,7 @@ constexpr MethodPasses kSplats{
 constexpr MethodPasses kSpheres{
     .project =
         [](On on, auto& buffers, auto& push, Mode mode) {
-            on.record(passes::ProjectPoints{buffers}, push, {on.degree(), mode});
+            on.record(passes::ProjectPoints{buffers, marks_or_any(on, buffers)}, push, {on.degree(), mode});
         },
     .blend =
         [](On on, auto& buffers, auto& push, Mode mode) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "ewa/error.h"
+#include "ewa/renderer.h"
 #include "pipeline/model.h"
 #include "scene/looks.h"
 #include "shared/layouts.h"
@@ -50,6 +51,11 @@ Plan plan_for(const PlanRequest& request) {
         plan.drawing = request.drawing;
         plan.debug = request.debug;
         plan.log_scale_shift = request.debug ? float(std::log(request.splat_scale)) : 0;
+        plan.hidden_marks = request.marks & (kMarkHidden | kMarkDeleted | (request.draft ? kMarkFine : 0));
+        if (!request.plain_colors && !plan.surface())
+            plan.tinted_marks = request.marks & (kMarkSelected | kMarkLocked | kMarkPreview);
+        if (plan.reads_marks() && method.rays)
+            throw InputError(std::string(method.subject) + " cannot hide or tint marked splats");
         return plan;
     }
     plan.gradients = true;

@@ -29,8 +29,10 @@ struct PlanRequest {
 
     // For an image.
     Drawing drawing = Drawing::color;
-    bool debug = false;      // splat_scale applies, and the visible splats are counted
-    double splat_scale = 1;  // factor of every splat's scales, above 0
+    bool debug = false;                        // splat_scale applies, and the visible splats are counted
+    double splat_scale = 1;                    // factor of every splat's scales, above 0
+    uint32_t marks = 0;                        // Mark bits that some splat has
+    bool draft = false, plain_colors = false;  // as in DrawOptions
 
     // For a gradient or a training.
     LossWeights loss{};
@@ -57,6 +59,8 @@ struct Plan {
     Drawing drawing = Drawing::color;
     bool debug = false;
     float log_scale_shift = 0;    // with debug: added to every log scale
+    uint32_t hidden_marks = 0;    // Mark bits of splats that are not drawn
+    uint32_t tinted_marks = 0;    // Mark bits that change a splat's colour
     bool gradients = false;       // loss, backward passes and their buffers
     bool adam = false;            // both moments
     bool packed_moments = false;  // in 16 bits each
@@ -79,6 +83,8 @@ struct Plan {
     }
     /// Whether the surfaces of splats are drawn in place of their colours.
     bool surface() const { return drawing == Drawing::median_depth || drawing == Drawing::normal; }
+    /// Whether the splats' marks change the image.
+    bool reads_marks() const { return (hidden_marks | tinted_marks) != 0; }
     /// Whether a frame has a buffer with each splat's geometry for rays.
     bool rays() const { return method->rays; }
     /// The SH degree that a frame evaluates.

@@ -21,6 +21,9 @@ namespace {
 
 using namespace pipeline;
 
+static_assert(kMarkSelected == shared::MARK_SELECTED && kMarkLocked == shared::MARK_LOCKED &&
+              kMarkPreview == shared::MARK_PREVIEW);
+
 /// The scene without coefficients above a degree, which is lower than its own.
 Gaussians with_degree(const Gaussians& gaussians, int degree) {
     Gaussians result = gaussians;
@@ -52,6 +55,7 @@ std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions
 struct ScenePart {
     Model model;
     std::vector<std::byte> params;
+    std::vector<uint8_t> marks;  // a byte a splat, if some splat of the scene is marked
 };
 
 struct Renderer::State {
@@ -62,6 +66,8 @@ struct Renderer::State {
     PlanRequest request;           // of the scene; drawings ask for more
     Model model;                   // without arrays if the scene is in parts
     std::vector<ScenePart> parts;  // of a scene that would take too much of the device's limit
+    gpu::Buffer marks;             // a byte a splat of the scene or part, if some splat is marked
+    uint32_t marked = 0;           // Mark bits that some splat has
     FrameBuffers frame;
     shared::Counts counts{};
     std::shared_ptr<const SkyMap> sky;  // that was uploaded
@@ -91,6 +97,8 @@ struct Renderer::State {
     }
 
     void divide(const Gaussians& gaussians, uint64_t part_bytes);
+    void mark(std::span<const uint8_t> all);
+    void upload_marks(std::span<const uint8_t> of_splats);
     /// Lists what a view sees of all parts: records for draw_list. Sets the counts.
     std::vector<std::byte> list(const Plan& plan, const FrameInputs& inputs, FrameRequest size);
     /// then: what to record after the image.
@@ -123,6 +131,28 @@ void Renderer::State::divide(const Gaussians& gaussians, uint64_t part_bytes) {
     model.origin = gaussians.origin;
 }
 
+void Renderer::State::mark(std::span<const uint8_t> all) {
+    if (!all.empty() && all.size() != model.splats)
+        throw InputError(std::to_string(all.size()) + " marks for " + std::to_string(model.splats) +
+                         " splats");
+    marked = 0;  // if the upload fails
+    uint32_t bits = 0;
+    for (const uint8_t each : all) bits |= each;
+    if (bits == 0) return;
+    if (parts.empty()) upload_marks(all);
+    auto next = all.begin();
+    for (ScenePart& part : parts) {
+        part.marks.assign(next, next + part.model.splats);
+        next += part.model.splats;
+    }
+    marked = bits;
+}
+
+void Renderer::State::upload_marks(std::span<const uint8_t> of_splats) {
+    if (marks.bytes() < of_splats.size()) marks = gpu::Buffer(*device, "marks", of_splats.size());
+    marks.upload(of_splats);
+}
+
 std::vector<std::byte> Renderer::State::list(const Plan& plan, const FrameInputs& inputs, FrameRequest size) {
     std::vector<std::byte> records;
     ViewBuffers buffers;
@@ -135,6 +165,7 @@ std::vector<std::byte> Renderer::State::list(const Plan& plan, const FrameInputs
         buffers.reserve(*device, m.splats, 1, 1, m.splats);
         frame.reserve(*device, cache.config(), size);
         gpu::Recording recording(device->limits());
+        if (plan.reads_marks()) upload_marks(part.marks);
         FramePasses{{recording, cache}, plan, frame, inputs}.list(m, buffers, {});
         frame.record_counts(recording);
         executor.run(recording, true);
@@ -175,6 +206,7 @@ void Renderer::State::submit(const Camera& camera, const Plan& plan, const Rende
         inputs.background = {};
     else
         inputs.sky = sky_of(look);
+    if (plan.reads_marks()) inputs.marks = &marks;
     FrameRequest size = frame_request(plan, inputs.camera.width, inputs.camera.height);
     size.splats = model.splats;
     size.instances = std::max(frame.instance_capacity, first_capacity(model.splats));
@@ -201,6 +233,9 @@ Plan Renderer::State::plan_of(const DrawOptions& o) const {
     drawing.drawing = o.drawing;
     drawing.debug = true;
     drawing.splat_scale = o.splat_scale;
+    drawing.marks = marked;
+    drawing.draft = o.draft;
+    drawing.plain_colors = o.plain_colors;
     return plan_for(drawing);
 }
 
@@ -259,6 +294,7 @@ Rendering Renderer::render(const Camera& camera, Drawing drawing) {
     State& s = *state_;
     PlanRequest request = s.request;
     request.drawing = drawing;
+    request.marks = s.marked;
     return s.draw(camera, plan_for(request), s.options);
 }
 
@@ -329,7 +365,13 @@ void Renderer::replace(const Gaussians& gaussians) {
     State& s = *state_;
     s.request = image_request(gaussians, s.options);
     s.model = {};  // free its memory first
+    s.marks = {};
+    s.marked = 0;
     s.upload(gaussians);
+}
+
+void Renderer::mark(std::span<const uint8_t> marks) {
+    state_->mark(marks);
 }
 
 uint32_t Renderer::skipped_nonfinite() const {

@@ -74,7 +74,9 @@ void compile_splatting(Compiler& compiler) {
     using namespace shared;
     compiler.compile<passes::Project>({{SPEC_SH_DEGREE, kDegrees},
                                        {SPEC_KERNEL, kFootprints},
-                                       {SPEC_MODE, {0, PROJECT_DEBUG, PROJECT_NORMALS, PROJECT_SLOPES}}});
+                                       {SPEC_MODE,
+                                        {0, PROJECT_DEBUG, PROJECT_DEBUG | PROJECT_MARKS, PROJECT_NORMALS,
+                                         PROJECT_SLOPES, PROJECT_SLOPES | PROJECT_MARKS}}});
     const uint32_t packed = UPDATE_PACKED_MOMENTS;
     // Without SPEC_LENSES, these three are compiled by their modules for pinholes.
     const Values other_lenses = {LENSES_ANY, LENSES_ROLLING};
@@ -137,7 +139,8 @@ void compile_splatting(Compiler& compiler) {
 void compile_points(Compiler& compiler) {
     using namespace shared;
     const Values nearest = {1, 8};
-    compiler.compile<passes::ProjectPoints>({{SPEC_SH_DEGREE, kDegrees}, {SPEC_MODE, {0, PROJECT_DEBUG}}});
+    compiler.compile<passes::ProjectPoints>(
+        {{SPEC_SH_DEGREE, kDegrees}, {SPEC_MODE, {0, PROJECT_DEBUG, PROJECT_DEBUG | PROJECT_MARKS}}});
     compiler.compile<passes::BlendPoints>(
         {{SPEC_NEAREST, nearest}, {SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH, BLEND_COUNT}}});
     compiler.compile<passes::BlendPointsBackward>(

@@ -33,8 +33,8 @@ Output run_project(const Scene& scene, bool debug = false, float log_scale_shift
             .get<passes::Project>({{shared::SPEC_SH_DEGREE, uint32_t(scene.gaussians.sh_degree)},
                                    {shared::SPEC_KERNEL, uint32_t(scene.options.kernel)},
                                    {shared::SPEC_MODE, debug ? shared::PROJECT_DEBUG : 0}})
-            .record(recording, {model.params, camera, records, keys, tile_counts, counts},
-                    {model.splats, model.planes(), log_scale_shift});
+            .record(recording, {model.params, camera, records, keys, tile_counts, counts, model.params},
+                    {model.splats, model.planes(), log_scale_shift, 0, 0});
     });
     expect_intact({&records, &keys, &tile_counts, &counts});
     Output out{records.read<float>(), keys.read<uint32_t>(), tile_counts.read<uint32_t>(),

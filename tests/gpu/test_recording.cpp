@@ -247,7 +247,7 @@ TEST_F(Dispatches, RefuseAUniformBlockOnABufferThatIsNotOne) {
                 {{shared::SPEC_SH_DEGREE, 0}, {shared::SPEC_KERNEL, 0}, {shared::SPEC_MODE, 0}})
             .pipeline;
     const auto parts = [&](const gpu::Buffer& camera) {
-        return std::vector<BufferPart>{texels, camera, b, c, a, a};
+        return std::vector<BufferPart>{texels, camera, b, c, a, a, texels};
     };
     expect_parts(error(project, parts(a), shared::ProjectPush{}), {"project", "binding 1", "(a)", "uniform"});
     const gpu::Buffer camera(*device(), "camera", 1024, gpu::Texel::none, true);

@@ -7,6 +7,7 @@
 
 #include "ewa/error.h"
 #include "ewa/evaluation.h"
+#include "ewa/renderer.h"
 #include "portions/portions.h"
 #include "train/divided.h"
 
@@ -64,6 +65,27 @@ TEST(Chunks, AScenesPicturesAreDrawnWithinTheLimit) {
     }
     EXPECT_GT(peak_device_bytes(*free), 3 * kMiB);
     EXPECT_LE(peak_device_bytes(*limited), 3 * kMiB);
+}
+
+/// Each part of the scene has its own marks.
+TEST(Chunks, AScenesMarksHideAndTintWithinTheLimit) {
+    const Gaussians scene = tall_scene(28000);
+    const Camera& camera = seven_views().dataset.frames.front().camera;
+    const auto free = open_test_device(false), limited = open_test_device(false);
+    limited->limit_memory(3 * kMiB, {});
+    Renderer whole(free, scene, {}), parts(limited, scene, {});
+    const std::vector<uint8_t> before = parts.render_bytes(camera, {});
+    std::vector<uint8_t> marks(28000);
+    for (size_t i = 0; i < marks.size(); ++i)
+        marks[i] = uint8_t(i % 7 == 0 ? kMarkHidden : i % 5 == 0 ? kMarkSelected : 0);
+    whole.mark(marks);
+    parts.mark(marks);
+    EXPECT_EQ(whole.render_bytes(camera, {}), parts.render_bytes(camera, {}));
+    EXPECT_NE(parts.render_bytes(camera, {}), before);
+    EXPECT_EQ(whole.splats_drawn(), parts.splats_drawn());
+    EXPECT_LE(peak_device_bytes(*limited), 3 * kMiB);
+    parts.mark({});
+    EXPECT_EQ(parts.render_bytes(camera, {}), before);
 }
 
 TEST(Chunks, ALimitThatNoStepFitsInIsOneError) {

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "ewa/error.h"
+#include "ewa/renderer.h"
 #include "pipeline/plan.h"
 #include "scene/looks.h"
 #include "train/schedule.h"
@@ -89,6 +90,9 @@ TEST(Methods, OfPlansSayWhatTheyLack) {
               "only the integrator splat draws normals");
     EXPECT_EQ(plan({.render = kSpheres, .drawing = Drawing::median_depth}),
               "--points draws no surface, so the median depth cannot be drawn");
+    EXPECT_EQ(plan({.render = kByRay, .marks = kMarkHidden}),
+              "the integrator ray cannot hide or tint marked splats");
+    EXPECT_EQ(plan({.render = kByRay, .marks = kMarkFine}), "");
     EXPECT_EQ(plan({.render = kSpheres, .drawing = Drawing::count}), "");
     EXPECT_EQ(plan({.purpose = Purpose::training, .render = kByRay}), "");
 }
