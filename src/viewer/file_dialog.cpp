@@ -16,24 +16,26 @@ namespace {
 namespace fs = std::filesystem;
 
 /// The command of the dialog; empty if neither program is installed.
-std::vector<std::string> dialog_command(Wanted wanted) {
-    const bool folder = wanted == Wanted::folder;
+std::vector<std::string> dialog_command(Wanted wanted, const fs::path& proposed) {
+    const bool folder = wanted == Wanted::folder, save = wanted == Wanted::save;
     if (!core::find_program("zenity").empty()) {
-        std::vector<std::string> command{"zenity", "--file-selection", "--title=Open"};
+        std::vector<std::string> command{"zenity", "--file-selection",
+                                         save ? "--title=Save" : "--title=Open"};
         if (folder) command.emplace_back("--directory");
+        if (save) command.insert(command.end(), {"--save", "--filename=" + proposed.string()});
         return command;
     }
-    if (!core::find_program("kdialog").empty())
-        return {"kdialog", folder ? "--getexistingdirectory" : "--getopenfilename", "."};
-    return {};
+    if (core::find_program("kdialog").empty()) return {};
+    if (save) return {"kdialog", "--getsavefilename", proposed.empty() ? "." : proposed.string()};
+    return {"kdialog", folder ? "--getexistingdirectory" : "--getopenfilename", "."};
 }
 
-fs::path ask_program(Wanted wanted, const std::atomic<bool>& stop) {
-    std::vector<std::string> command = dialog_command(wanted);
+fs::path ask_program(Wanted wanted, const fs::path& proposed, const std::atomic<bool>& stop) {
+    std::vector<std::string> command = dialog_command(wanted, proposed);
     if (command.empty())
         throw RunError(
-            "there is no file dialog here: install zenity (Debian: apt install zenity), or drop the file on "
-            "the window");
+            std::string("there is no file dialog here: install zenity (Debian: apt install zenity), or ") +
+            (wanted == Wanted::save ? "type the path" : "drop the file on the window"));
     std::string text;
     // The toolkits' warnings do not concern the user.
     const core::Program program{.command = std::move(command), .environment = {}, .log = "/dev/null"};
@@ -48,12 +50,15 @@ fs::path ask_program(Wanted wanted, const std::atomic<bool>& stop) {
 
 }  // namespace
 
-void FileDialog::ask(Wanted wanted) {
+void FileDialog::ask(Wanted wanted, const fs::path& proposed) {
     if (open()) return;
-    answer_ = std::async(std::launch::async, [this, wanted] {
+    wanted_ = wanted;
+    std::error_code unknown;  // dialogs know no current folder
+    fs::path begin = proposed.empty() ? fs::path() : fs::absolute(proposed, unknown);
+    answer_ = std::async(std::launch::async, [this, wanted, begin = std::move(begin)] {
         const Wake at_end{wake_};
         fs::path chosen;
-        return ask_portal(wanted, stop_, chosen) ? chosen : ask_program(wanted, stop_);
+        return ask_portal(wanted, begin, stop_, chosen) ? chosen : ask_program(wanted, begin, stop_);
     });
 }
 

@@ -60,16 +60,32 @@ std::string request_path(sd_bus* bus) {
     return "/org/freedesktop/portal/desktop/request/" + sender + "/" + kToken;
 }
 
-bool call_portal(sd_bus* bus, Wanted wanted) {
+/// The options of a dialog to save: the name in the field, and the folder that is shown (ay, with a zero byte at the end).
+bool append_proposed(sd_bus_message* call, const fs::path& proposed) {
+    const std::string folder = proposed.parent_path().string();
+    return sd_bus_message_append(call, "{sv}", "current_name", "s", proposed.filename().c_str()) >= 0 &&
+           sd_bus_message_open_container(call, 'e', "sv") >= 0 &&
+           sd_bus_message_append(call, "s", "current_folder") >= 0 &&
+           sd_bus_message_open_container(call, 'v', "ay") >= 0 &&
+           sd_bus_message_append_array(call, 'y', folder.c_str(), folder.size() + 1) >= 0 &&
+           sd_bus_message_close_container(call) >= 0 && sd_bus_message_close_container(call) >= 0;
+}
+
+bool call_portal(sd_bus* bus, Wanted wanted, const fs::path& proposed) {
+    const bool save = wanted == Wanted::save;
     sd_bus_message* made = nullptr;
     if (sd_bus_message_new_method_call(bus, &made, kPortal, "/org/freedesktop/portal/desktop",
-                                       "org.freedesktop.portal.FileChooser", "OpenFile") < 0)
+                                       "org.freedesktop.portal.FileChooser",
+                                       save ? "SaveFile" : "OpenFile") < 0)
         return false;
     const Message call(made, sd_bus_message_unref);
     const int folder = wanted == Wanted::folder;
-    if (sd_bus_message_append(call.get(), "ss", "", "Open") < 0 ||
-        sd_bus_message_append(call.get(), "a{sv}", 2, "handle_token", "s", kToken, "directory", "b", folder) <
-            0)
+    if (sd_bus_message_append(call.get(), "ss", "", save ? "Save" : "Open") < 0 ||
+        sd_bus_message_open_container(call.get(), 'a', "{sv}") < 0 ||
+        sd_bus_message_append(call.get(), "{sv}", "handle_token", "s", kToken) < 0 ||
+        (!save && sd_bus_message_append(call.get(), "{sv}", "directory", "b", folder) < 0) ||
+        (save && !proposed.empty() && !append_proposed(call.get(), proposed)) ||
+        sd_bus_message_close_container(call.get()) < 0)
         return false;
     sd_bus_message* reply = nullptr;
     const int status = sd_bus_call(bus, call.get(), kStartMicroseconds, nullptr, &reply);
@@ -79,7 +95,7 @@ bool call_portal(sd_bus* bus, Wanted wanted) {
 
 }  // namespace
 
-bool ask_portal(Wanted wanted, const std::atomic<bool>& stop, fs::path& chosen) {
+bool ask_portal(Wanted wanted, const fs::path& proposed, const std::atomic<bool>& stop, fs::path& chosen) {
     sd_bus* opened = nullptr;
     if (sd_bus_open_user(&opened) < 0) return false;
     // The portal closes its dialog when the connection ends.
@@ -89,7 +105,7 @@ bool ask_portal(Wanted wanted, const std::atomic<bool>& stop, fs::path& chosen) 
     if (request.empty() ||
         sd_bus_match_signal(bus.get(), nullptr, nullptr, request.c_str(), "org.freedesktop.portal.Request",
                             "Response", take_response, &answer) < 0 ||
-        !call_portal(bus.get(), wanted))
+        !call_portal(bus.get(), wanted, proposed))
         return false;
     while (!answer.here && !stop) {
         const int status = sd_bus_process(bus.get(), nullptr);
@@ -104,7 +120,8 @@ bool ask_portal(Wanted wanted, const std::atomic<bool>& stop, fs::path& chosen) 
 #else
 namespace ewa::viewer {
 
-bool ask_portal(Wanted /*wanted*/, const std::atomic<bool>& /*stop*/, std::filesystem::path& /*chosen*/) {
+bool ask_portal(Wanted /*wanted*/, const std::filesystem::path& /*proposed*/,
+                const std::atomic<bool>& /*stop*/, std::filesystem::path& /*chosen*/) {
     return false;
 }
 

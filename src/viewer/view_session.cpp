@@ -81,6 +81,7 @@ void ViewSession::take_opened() {
 }
 
 void ViewSession::take_chosen() {
+    if (dialog.wanted() == Wanted::save) return;  // the dialogs of the editor take it
     try {
         if (const auto path = dialog.take()) open({*path}, {});
     } catch (const std::exception& error) {

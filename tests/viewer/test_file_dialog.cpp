@@ -30,9 +30,10 @@ void make_zenity(const Folder& folder, const std::string& script) {
     chmod((folder / "bin/zenity").c_str(), 0755);
 }
 
-std::optional<fs::path> answer(Wanted wanted) {
+std::optional<fs::path> answer(Wanted wanted, const fs::path& proposed = {}) {
     FileDialog dialog([] {});
-    dialog.ask(wanted);
+    dialog.ask(wanted, proposed);
+    EXPECT_EQ(dialog.wanted(), wanted);
     std::optional<fs::path> chosen;
     EXPECT_TRUE(soon([&] {
         chosen = dialog.take();
@@ -51,15 +52,32 @@ TEST(TheFileDialog, IsZenityWithoutAPortal) {
     EXPECT_FALSE(answer(Wanted::file)) << "it was cancelled";
 }
 
+TEST(TheFileDialog, SavesUnderAProposedName) {
+    const Folder folder;
+    const Variable bus("DBUS_SESSION_BUS_ADDRESS", kNoBus), path("PATH", folder / "bin" + ":/usr/bin:/bin");
+    make_zenity(folder, "echo \"/$# $2 $3 $4\"");
+    EXPECT_EQ(answer(Wanted::save, "/a folder/x.ply"), "/4 --title=Save --save --filename=/a folder/x.ply");
+    EXPECT_EQ(answer(Wanted::save, "x.ply"),
+              "/4 --title=Save --save --filename=" + fs::absolute("x.ply").string());
+    EXPECT_EQ(answer(Wanted::file), "/2 --title=Open  ");
+    fs::rename(folder / "bin/zenity", folder / "bin/kdialog");
+    const Variable own("PATH", folder / "bin");  // /usr/bin may have a zenity
+    EXPECT_EQ(answer(Wanted::save, "/a folder/x.ply"), "/2 /a folder/x.ply  ");
+}
+
 TEST(TheFileDialog, ThatIsMissingSaysWhatToInstall) {
     const Folder folder;
     const Variable bus("DBUS_SESSION_BUS_ADDRESS", kNoBus), path("PATH", folder / "bin");
-    try {
-        answer(Wanted::file);
-        FAIL() << "nothing was thrown";
-    } catch (const RunError& error) {
-        EXPECT_NE(std::string(error.what()).find("apt install zenity"), std::string::npos) << error.what();
-    }
+    for (const auto& [wanted, advice] :
+         {std::pair(Wanted::file, "drop the file"), {Wanted::save, "type the path"}})
+        try {
+            answer(wanted);
+            FAIL() << "nothing was thrown";
+        } catch (const RunError& error) {
+            EXPECT_NE(std::string(error.what()).find("apt install zenity"), std::string::npos)
+                << error.what();
+            EXPECT_NE(std::string(error.what()).find(advice), std::string::npos) << error.what();
+        }
 }
 
 TEST(TheFileDialog, IsClosedWithTheWindow) {
@@ -105,7 +123,8 @@ class FakePortal {
         };
         if (!soon([&] { return fs::exists(folder / "bus") && connected(); })) return;
         static const sd_bus_vtable methods[] = {
-            SD_BUS_VTABLE_START(0), SD_BUS_METHOD("OpenFile", "ssa{sv}", "o", opened, 0), SD_BUS_VTABLE_END};
+            SD_BUS_VTABLE_START(0), SD_BUS_METHOD("OpenFile", "ssa{sv}", "o", opened, 0),
+            SD_BUS_METHOD("SaveFile", "ssa{sv}", "o", opened, 0), SD_BUS_VTABLE_END};
         ready_ = sd_bus_add_object_vtable(bus_, nullptr, "/org/freedesktop/portal/desktop",
                                           "org.freedesktop.portal.FileChooser", methods, this) >= 0 &&
                  sd_bus_request_name(bus_, "org.freedesktop.portal.Desktop", 0) >= 0;
@@ -128,6 +147,8 @@ class FakePortal {
     bool ready() const { return ready_; }
     const std::string& address() const { return address_; }
     bool asked_for_folder() const { return folder_; }
+    /// The path that the last dialog proposed. Call it after the answer.
+    std::string proposed() const { return proposed_; }
 
   private:
     static int opened(sd_bus_message* call, void* data, sd_bus_error* /*error*/) {
@@ -143,6 +164,20 @@ class FakePortal {
                 sd_bus_message_read(call, "v", "b", &folder);
                 self.folder_ = folder != 0;
             }
+            if (name == std::string("current_name")) {
+                const char* text = "";
+                sd_bus_message_read(call, "v", "s", &text);
+                self.proposed_ = text;
+            }
+            if (name == std::string("current_folder")) {
+                const void* bytes = nullptr;
+                size_t count = 0;
+                sd_bus_message_enter_container(call, 'v', "ay");
+                sd_bus_message_read_array(call, 'y', &bytes, &count);
+                sd_bus_message_exit_container(call);
+                self.proposed_ =
+                    std::string(static_cast<const char*>(bytes), count - 1) + "/" + self.proposed_;
+            }
             sd_bus_message_exit_container(call);
         }
         std::string sender = sd_bus_message_get_sender(call) + 1;
@@ -156,7 +191,7 @@ class FakePortal {
                                   "choices", "a(ss)", 0, "uris", "as", 1, self.uri_.c_str());
     }
 
-    std::string uri_, address_;
+    std::string uri_, address_, proposed_;
     pid_t daemon_ = -1;
     sd_bus* bus_ = nullptr;
     bool ready_ = false;
@@ -177,6 +212,9 @@ TEST(TheFileDialog, IsThePortals) {
         EXPECT_FALSE(portal.asked_for_folder());
         EXPECT_EQ(answer(Wanted::folder), "/a folder/splats.ply");
         EXPECT_TRUE(portal.asked_for_folder());
+        EXPECT_EQ(portal.proposed(), "");
+        EXPECT_EQ(answer(Wanted::save, "/a b/x.ply"), "/a folder/splats.ply");
+        EXPECT_EQ(portal.proposed(), "/a b/x.ply");
     }
     fs::remove(folder / "bus");
     const FakePortal portal(folder, "");
