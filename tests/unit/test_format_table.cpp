@@ -21,6 +21,9 @@ TEST(FormatTable, RowsAreWhole) {
         EXPECT_FALSE(row.name.empty() || row.readers.empty());
         EXPECT_TRUE(row.read || row.writable());
         EXPECT_FALSE(row.write && row.consume);
+        EXPECT_EQ(row.purpose.empty(), !row.writable());
+        EXPECT_EQ(row.splat_bytes[0] > 0, row.writable());
+        EXPECT_EQ(row.splat_bytes[1] > 0, row.writable() && !row.no_sh);
         EXPECT_EQ(row.unread.empty(), row.read != nullptr);
         EXPECT_FALSE(row.writable() && !row.read && row.unchecked.empty());
         EXPECT_FALSE(row.beside && !row.values);

@@ -22,6 +22,12 @@ struct FormatRow {
     std::string_view meaning = {};  // what errors add to the extension
     std::string_view readers = {};  // programs that open it
 
+    // For people who choose a format to write.
+    std::string_view purpose = {};   // what it is good for
+    std::string_view rounding = {};  // how it rounds values, one or more sentences; empty: it does not
+    /// The usual bytes of a splat without SH, and of the three values of an SH coefficient. docs/sharing.md has measured files.
+    std::array<float, 2> splat_bytes = {};
+
     // How a file is recognised.
     std::array<std::string_view, 2> beginnings = {};  // first bytes
     /// Whether a file with these first bytes is of this format. Null: it is, unless another row's `confirm` returns true.
@@ -37,6 +43,7 @@ struct FormatRow {
     bool undrawable = false;  // splats that are not drawable, and values that are not finite
     bool place = false;       // on the globe
     bool morton = false;      // it has the splats in morton_order, else as they come
+    bool no_sh = false;       // colours do not depend on the view
 
     // Options of a user that apply.
     bool levels = false, spz_version = false, holds_spz = false;
