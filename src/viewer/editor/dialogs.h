@@ -22,12 +22,15 @@ class Dialogs {
     void save();     // to the file that was saved last; the first time as save_as()
     void save_as();  // format, what it loses, file
     void publish();  // page, SOG, streamed levels
+    /// The views file of the film's keys, for a page; empty: there are none. May be null. publish() calls it.
+    std::function<std::filesystem::path()> views_file;
     /// Asks whether to save unsaved work, then calls `go_on`, unless the user cancels. Calls it at once without unsaved work.
     void leave(std::function<void()> go_on);
     /// Asks whether to restore the edits of a crashed session, if the file has some.
     void offer_journal(const std::filesystem::path& file, size_t splats);
     /// Draws what is open. Call it once per frame of ImGui.
     void draw();
+    /// Whether a dialog is open. It then has all keys, and the window draws frames.
     bool open() const;
     /// Takes the answers of the file dialog and of background work. Call it once per turn of the window's loop.
     void take();
@@ -39,6 +42,7 @@ class Dialogs {
 
 /// The files that were opened last, newest first, at most ten; in the settings of the user.
 std::vector<std::filesystem::path> recent_files();
+/// Never throws. Scripted runs do not call it.
 void remember_file(const std::filesystem::path& file);
 
 }  // namespace ewa::viewer

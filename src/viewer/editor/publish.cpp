@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "viewer/editor/publish.h"
+
+#include <algorithm>
+
+#include "core/folders.h"
+#include "core/process.h"
+#include "core/text.h"
+#include "edit/edited_splats.h"
+#include "ewa/error.h"
+#include "ewa/splat_edit.h"
+#include "ewa/splat_files.h"
+#include "viewer/latest.h"
+
+namespace ewa::viewer {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr auto kWakePeriod = std::chrono::milliseconds(300);
+constexpr size_t kMostPublishText = 1u << 20;  // bytes
+
+/// Writes the splats that are left.
+void write_left(const PublishOrder& order, const fs::path& file) {
+    Gaussians splats = *order.splats;
+    if (order.states) {
+        std::vector<uint32_t> left;
+        for (size_t i = 0; i < order.states->size(); ++i)
+            if (((*order.states)[i] & edit::kDeleted) == 0) left.push_back(uint32_t(i));
+        keep_splats(splats, left);
+    }
+    save_splats(file, splats);
+}
+
+/// The last line that is not empty.
+std::string last_line(std::string_view text) {
+    text = core::trim(text);
+    const size_t begin = text.find_last_of('\n');
+    return core::one_line(begin == std::string_view::npos ? text : text.substr(begin + 1));
+}
+
+}  // namespace
+
+std::vector<std::string> publish_arguments(const PublishOrder& order) {
+    // An absolute path is no option, whatever the name.
+    const auto whole = [](const fs::path& path) { return fs::absolute(path).string(); };
+    std::vector<std::string> words{"convert", whole(order.scene), whole(order.out)};
+    if (!order.edits.empty()) words.insert(words.end(), {"--edits", whole(order.edits)});
+    if (!order.title.empty()) words.push_back("--title=" + order.title);
+    if (!order.views.empty()) words.insert(words.end(), {"--views", whole(order.views)});
+    if (order.levels > 0) words.insert(words.end(), {"--levels", std::to_string(order.levels)});
+    return words;
+}
+
+std::optional<float> share_of_line(std::string_view line) {
+    while (!line.empty()) {
+        const std::string_view word = core::next_word(line);
+        const size_t slash = word.find('/');
+        if (slash == std::string_view::npos) continue;
+        const auto done = core::parse_integer<uint64_t>(word.substr(0, slash)),
+                   all = core::parse_integer<uint64_t>(word.substr(slash + 1));
+        if (done && all && *all > 0) return float(std::min(1.0, double(*done) / double(*all)));
+    }
+    return std::nullopt;
+}
+
+void open_outside(const fs::path& path) {
+    // The shell ends at once. A program that ends with this one would close the user's browser.
+    const core::Program program{.command = {"/bin/sh", "-c", "xdg-open \"$1\" < /dev/null > /dev/null 2>&1 &",
+                                            "sh", fs::absolute(path).string()},
+                                .environment = {},
+                                .log = {}};
+    if (core::find_program("xdg-open").empty())
+        throw RunError("there is no xdg-open here (Debian: xdg-utils); open " +
+                       core::one_line(path.string()));
+    core::run_program(program, [](std::string_view) { return true; });
+}
+
+Publisher::Publisher(fs::path program, std::function<void()> wake)
+    : program_(std::move(program)), wake_(std::move(wake)) {}
+
+void Publisher::start(PublishOrder order) {
+    if (running()) return;
+    stop_ = false;
+    text_.clear();
+    started_ = woken_ = Clock::now();
+    result_ = std::async(std::launch::async, [this, order = std::move(order)]() mutable {
+        const Wake at_end{wake_};
+        try {
+            return run(std::move(order));
+        } catch (const std::exception& error) {
+            return Result{.text = core::one_line(error.what())};
+        }
+    });
+}
+
+Publisher::Result Publisher::run(PublishOrder order) {
+    std::optional<core::TemporaryFolder> folder;
+    if (order.splats) {
+        order.scene = folder.emplace("ewa-publish-").path() / "scene.ply";
+        write_left(order, order.scene);
+        order.splats = nullptr;
+    }
+    core::make_folder(order.out.parent_path());
+    core::Program program;
+    program.command = publish_arguments(order);
+    program.command.insert(program.command.begin(), program_.string());
+    program.joined = true;
+    const core::Ended ended =
+        core::run_program(program, [this](std::string_view piece) { return hear(piece); });
+    const std::lock_guard lock(mutex_);
+    return {ended == core::Ended::done, ended == core::Ended::stopped, text_};
+}
+
+/// Returns whether the program continues.
+bool Publisher::hear(std::string_view piece) {
+    {
+        const std::lock_guard lock(mutex_);
+        text_.append(piece, 0, kMostPublishText - text_.size());
+    }
+    if (const auto now = Clock::now(); now - woken_ > kWakePeriod) {
+        woken_ = now;
+        wake_();
+    }
+    return !stop_;
+}
+
+Publisher::Progress Publisher::progress() const {
+    const std::lock_guard lock(mutex_);
+    Progress progress{.text = last_line(text_),
+                      .share = 0,
+                      .seconds = std::chrono::duration<double>(Clock::now() - started_).count()};
+    progress.share = share_of_line(progress.text).value_or(0);
+    return progress;
+}
+
+std::optional<Publisher::Result> Publisher::take() {
+    if (!finished(result_)) return std::nullopt;
+    return result_.get();
+}
+
+}  // namespace ewa::viewer
