@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "ewa/error.h"
+#include "viewer/editor/offers.h"
 
 namespace ewa::viewer {
 namespace {
@@ -212,6 +213,8 @@ void App::draw_overlays() {
     if (session_.empty() && !state_.help)
         if (const auto wanted = draw_open_buttons(area)) session_.dialog.ask(*wanted);
     if (session_.search.running() && draw_search(session_.search.progress(), area)) session_.search.cancel();
+    if (session_.offers_training() && !state_.help)
+        if (const auto steps = draw_training_offer(scene, state_.on_cpu, area)) session_.answer_offer(*steps);
     if (const std::string text = session_.banner(); !text.empty()) draw_banner(text, area);
     if (!words && state_.message.hinting(Clock::now()) && !state_.help)
         draw_hint(scene.dataset != nullptr, state_.panel_shown(), area);

@@ -9,8 +9,8 @@
 
 #include "core/text.h"
 #include "core/typing.h"
-#include "run/forecast.h"
 #include "run/option_table.h"
+#include "viewer/editor/offers.h"
 #include "viewer/panel.h"
 #include "viewer/training.h"
 
@@ -97,27 +97,10 @@ void show_curves(const live::Status& status) {
 /// What the window offers, in the order of train::kQualities.
 constexpr std::array kQualityNames{"quick look", "good", "best"};
 
-std::string rough_text(double seconds) {
-    constexpr double kMinute = 60, kHour = 3600;
-    if (seconds < 1.5 * kMinute) return "a minute";
-    if (seconds < 1.5 * kHour) return std::to_string(std::lround(seconds / kMinute)) + " min";
-    return std::to_string(std::lround(seconds / kHour)) + " h";
-}
-
 /// The name with the time that such a training usually takes, if the device is known.
 std::string quality_text(const PanelFacts& facts, const char* name, int steps) {
-    const Dataset& dataset = *facts.scene.dataset;
-    if (!facts.on_cpu || dataset.frames.empty()) return name;
-    const Camera& camera = dataset.frames.front().camera;
-    const size_t photos = dataset.frames.size();
-    TrainOptions options;
-    options.steps = steps;
-    const double seconds = train::usual_seconds({.pixels = double(camera.width) * camera.height,
-                                                 .photos = photos,
-                                                 .splats = uint32_t(facts.scene.gaussians->size()),
-                                                 .evaluated = photos / 8},
-                                                options, *facts.on_cpu);
-    return std::string(name) + ", about " + rough_text(seconds);
+    const std::string time = usual_time_text(facts.scene, facts.on_cpu, steps);
+    return time.empty() ? name : std::string(name) + ", " + time;
 }
 
 void choose_training(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {

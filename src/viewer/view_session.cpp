@@ -39,6 +39,7 @@ void ViewSession::adopt(OpenedScene opened, std::optional<int> frame) {
     look.splat_scale = before.splat_scale;
     look.sh_degree = scene.sh_degree;
     state_.message.note.clear();
+    offer_answered_ = false;
     if (!scene.remark.empty()) state_.say(scene.remark);
     shown_.enter_scene();
     navigation_.enter_scene(frame);
@@ -176,6 +177,19 @@ void ViewSession::train() {
                                      std::to_string(state_.settings.train_steps), "--quiet"};
     if (!device.empty()) options.insert(options.end(), {"--device", device});
     start_training(options, first ? made_in : free_run_folder(named));
+}
+
+bool ViewSession::offers_training() const {
+    const OpenedScene& scene = state_.scene;
+    return !offer_answered_ && !scene.photos.empty() && scene.dataset && scene.points && !search.running() &&
+           !live_run.update() && !training();
+}
+
+void ViewSession::answer_offer(int steps) {
+    offer_answered_ = true;
+    if (steps == 0) return;
+    state_.settings.train_steps = steps;
+    train();
 }
 
 void ViewSession::start_training(const std::vector<std::string>& options,

@@ -26,6 +26,10 @@ class ViewSession {
     void open(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown);
     /// Starts `ewa train` on the dataset that is shown, in a folder of its own.
     void train();
+    /// Whether the picture offers a training: the dataset of photos is shown, and nothing is trained.
+    bool offers_training() const;
+    /// Starts a training with so many steps; 0: the user wants none now.
+    void answer_offer(int steps);
     /// Writes a screenshot.
     void save(Image&& image);
 
@@ -57,6 +61,7 @@ class ViewSession {
     ViewState& state_;
     Navigation& navigation_;
     Shown& shown_;
+    bool offer_answered_ = false;
     bool live_failed_ = false;    // a training that cannot be reached was reported
     std::string search_failure_;  // why photos have no cameras; one line
     std::future<OpenedScene> opening_;

@@ -76,6 +76,18 @@ TEST_F(Photos, BecomeADatasetThatCanBeTrained) {
     expect_silent(session.quit());
 }
 
+TEST_F(Photos, OfferATrainingInThePicture) {
+    if (viewer::find_font().empty()) GTEST_SKIP() << "the button has another place without a vector font";
+    Session session(shots_, {photos_, "--size", "900x800"}, environment());
+    ASSERT_TRUE(session.found());
+    ASSERT_TRUE(session.awaited(dataset_ + "/sparse/0")) << "no cameras were found";
+    EXPECT_TRUE(soon([&] { return range_of(screenshot(session)) > 0.3f; })) << "neither points nor cameras";
+    act(session, {"mousemove 602 496", "click 1"});  // the middle button, "Good"
+    ASSERT_TRUE(session.awaited(shots_ + "/out/photos/live.json")) << "no training has started";
+    EXPECT_EQ(read_json(shots_ + "/out/photos/config.json")["steps"], 7000);
+    expect_silent(session.quit());
+}
+
 TEST_F(Photos, AreTrainedOnAsTheCommandLineSays) {
     Session session(shots_, {"--train", photos_, "--steps", "20", "--quiet", "--size", "300x200"},
                     environment());

@@ -66,6 +66,16 @@ void modal_text(const std::string& text, bool warning) {
     if (warning) ImGui::PopStyleColor();
 }
 
+void modal_box(const char* name, const std::string& text, int lines) {
+    const ImVec2 size(modal_width(), float(lines) * ImGui::GetTextLineHeightWithSpacing());
+    if (ImGui::BeginChild(name, size)) {
+        ImGui::PushTextWrapPos(0);
+        ImGui::TextUnformatted(text.c_str());
+        ImGui::PopTextWrapPos();
+    }
+    ImGui::EndChild();
+}
+
 Choice draw_choices(const char* confirm, const char* other, const char* cancel, bool enabled) {
     Choice choice = Choice::none, focused = Choice::confirm;
     const auto button = [&](const char* text, Choice meaning) {

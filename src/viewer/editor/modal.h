@@ -23,6 +23,9 @@ float modal_width();
 /// Wrapped text. warning: in the colour of warnings.
 void modal_text(const std::string& text, bool warning = false);
 
+/// Text in a box of so many lines, which scrolls if it has more.
+void modal_box(const char* name, const std::string& text, int lines);
+
 enum class Choice { none, confirm, other, cancel };
 /// Draws the buttons that have a text. Enter presses the focused button, or else `confirm`, and nothing where that has none. Esc
 /// presses `cancel`. enabled: whether `confirm` is.

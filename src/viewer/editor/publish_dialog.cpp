@@ -9,7 +9,6 @@
 #include "core/process.h"
 #include "core/text.h"
 #include "viewer/editor/save_choices.h"
-#include "viewer/panel.h"
 
 namespace ewa::viewer {
 namespace {
@@ -121,7 +120,7 @@ void PublishDialog::draw_form() {
         if (ImGui::InputInt(kLevelsLabel, &levels_)) levels_ = std::clamp(levels_, 0, kMostLevels);
     }
     if (editor_.busy()) modal_text(kPublishBusy);
-    if (!text_.empty()) draw_text_box("error", text_, kPublishLines);
+    if (!text_.empty()) modal_box("error", text_, kPublishLines);
 }
 
 void PublishDialog::draw_work() {
@@ -129,11 +128,11 @@ void PublishDialog::draw_work() {
     modal_text("Writing " + core::one_line(out_.string()));
     ImGui::ProgressBar(progress.share, ImVec2(modal_width(), 0.4f * ImGui::GetTextLineHeight()), "");
     modal_text(core::duration_text(progress.seconds));
-    draw_text_box("work", progress.text, 2);
+    modal_box("work", progress.text, 2);
 }
 
 void PublishDialog::draw_done() {
-    draw_text_box("done", text_, kPublishLines);
+    modal_box("done", text_, kPublishLines);
     if (kPublishKinds[kind_].format == SplatFormat::page) {
         if (ImGui::Button(kOpenInBrowser)) open(out_);
         ImGui::SameLine();
