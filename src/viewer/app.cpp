@@ -46,7 +46,8 @@ KeptSettings App::kept() const {
     KeptSettings kept{.window = {},
                       .text_scale = state_.settings.text_scale,
                       .gain = state_.settings.gain,
-                      .film_seconds = state_.settings.film_seconds};
+                      .film_seconds = state_.settings.film_seconds,
+                      .light = state_.settings.light};
     const double scale = double(state_.window.scale()) / double(state_.window.density());
     const Size size = state_.window.size();
     if (size.width > 0 && size.height > 0)
@@ -94,13 +95,15 @@ double App::patience() const {
     return shown_.renders.reduced() || session_.waiting() ? kPollSeconds : 1.0;
 }
 
-/// Opens the screen, also with another size of the text.
+/// Opens the screen, also with another size of the text or another theme.
 void App::change_text() {
     const double text = state_.text_height();
-    if (screen_ && screen_text_ == text) return;
+    const bool light = state_.settings.light;
+    if (screen_ && screen_text_ == text && screen_light_ == light) return;
     screen_text_ = text;
+    screen_light_ = light;
     screen_.reset();
-    screen_ = std::make_unique<Screen>(state_.system, state_.window, state_.device_name, text);
+    screen_ = std::make_unique<Screen>(state_.system, state_.window, state_.device_name, text, light);
     shown_.fill(screen_->presenter);
     state_.redraw(Loop::kRedraws);
 }

@@ -50,6 +50,7 @@ KeptSettings read_settings(const fs::path& file) {
         take(json, "text_scale", kLeastText, kMostText, settings.text_scale);
         take(json, "gain", 1.0f, 16.0f, settings.gain);
         take(json, "film_seconds", 0.2f, 10.0f, settings.film_seconds);
+        settings.light = core::text_in(json, "theme") == "light";
     } catch (const std::exception&) {
         return {};
     }
@@ -60,7 +61,8 @@ void write_settings(const fs::path& file, const KeptSettings& settings) {
     if (file.empty()) return;
     Json json{{"text_scale", settings.text_scale},
               {"gain", settings.gain},
-              {"film_seconds", settings.film_seconds}};
+              {"film_seconds", settings.film_seconds},
+              {"theme", settings.light ? "light" : "dark"}};
     if (settings.window) {
         json["window_width"] = settings.window->width;
         json["window_height"] = settings.window->height;

@@ -15,6 +15,7 @@ struct KeptSettings {
     float text_scale = 1;        // times the size that the monitor asks for
     float gain = 4;              // of the difference image
     float film_seconds = 2;
+    bool light = false;  // the light theme
     bool operator==(const KeptSettings&) const = default;
 };
 

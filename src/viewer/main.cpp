@@ -226,6 +226,7 @@ void take_settings(const CLI::App& app, Arguments& arguments) {
     startup.last_size = kept.window;
     startup.settings.text_scale = kept.text_scale;
     startup.settings.gain = kept.gain;
+    startup.settings.light = kept.light;
     if (app.count("--film-seconds") == 0) startup.settings.film_seconds = kept.film_seconds;
 }
 

@@ -48,6 +48,7 @@ struct PanelSettings {
     bool measure = false;    // clicks choose points, whose distance is shown
     float film_seconds = 2;  // from one view to the next
     float text_scale = 1;    // times the size that the monitor asks for
+    bool light = false;      // the light theme
     /// Steps of a training that the window starts: those of a row of train::kQualities, or another number.
     int train_steps = 0;
 };

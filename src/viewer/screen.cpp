@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "ewa/error.h"
+#include "viewer/editor/theme.h"
 #include "viewer/font.h"
 
 namespace ewa::viewer {
@@ -51,6 +52,16 @@ Rectangle clipped(const Rectangle& rectangle, Size window) {
               top = std::clamp(rectangle.y, 0, window.height);
     return {left, top, std::clamp(rectangle.x + rectangle.width, left, window.width) - left,
             std::clamp(rectangle.y + rectangle.height, top, window.height) - top};
+}
+
+/// An ImU32. srgb: the image encodes what it is cleared with.
+vk::ClearColorValue clear_color(unsigned color, bool srgb) {
+    const auto channel = [&](unsigned shift) {
+        const float value = float((color >> shift) & 255) / 255;
+        return srgb ? (value <= 0.04045f ? value / 12.92f : std::pow((value + 0.055f) / 1.055f, 2.4f))
+                    : value;
+    };
+    return {channel(IM_COL32_R_SHIFT), channel(IM_COL32_G_SHIFT), channel(IM_COL32_B_SHIFT), 1.0f};
 }
 
 /// Between a whole image and tightly packed bytes.
@@ -128,10 +139,11 @@ void Presenter::record_upload(Slot& slot_data) {
     slot_data.fresh = false;
 }
 
-void Presenter::record_layers(vk::Image target, std::span<const Layer> layers) {
+void Presenter::record_layers(vk::Image target, std::span<const Layer> layers, bool on_black) {
     change(*commands_, target, kNothingYet, kWritten);
-    const vk::ClearColorValue black(std::array<float, 4>{0, 0, 0, 1});
-    commands_->clearColorImage(target, Layout::eTransferDstOptimal, black, kWhole);
+    const vk::ClearColorValue color =
+        on_black ? vk::ClearColorValue(0.0f, 0.0f, 0.0f, 1.0f) : clear_color(backdrop(), swapchain_.srgb());
+    commands_->clearColorImage(target, Layout::eTransferDstOptimal, color, kWhole);
     for (const Layer& layer : layers) {
         const DeviceImage& picture = pictures_[layer.slot].image;
         const Rectangle to = clipped(layer.target, swapchain_.size());
@@ -203,7 +215,7 @@ bool Presenter::draw(Size window, std::span<const Layer> layers, ImDrawData* pan
     begin();
     for (Slot& slot_data : pictures_)
         if (slot_data.fresh) record_upload(slot_data);
-    record_layers(target, layers);
+    record_layers(target, layers, capture != nullptr);
     if (capture) {
         change(*commands_, target, kWritten, kRead);
         record_capture(target);
@@ -241,7 +253,7 @@ void Gui::add_fonts(double text) {
     }
 }
 
-Gui::Gui(const Window& window, const PresentDevice& device, Presenter& presenter, double text)
+Gui::Gui(const Window& window, const PresentDevice& device, Presenter& presenter, double text, bool light)
     : device_(device) {
     const vk::DescriptorPoolSize size(vk::DescriptorType::eCombinedImageSampler, 1);
     vk::DescriptorPoolCreateInfo create;
@@ -251,7 +263,7 @@ Gui::Gui(const Window& window, const PresentDevice& device, Presenter& presenter
 
     ImGui::CreateContext();
     ImGui::GetIO().IniFilename = nullptr;  // write no settings file
-    ImGui::StyleColorsDark();
+    set_theme(light);
     const float density = window.density();
     ImGui::GetStyle().ScaleAllSizes(float(text / kTextHeight) / density);
     ImGui::GetIO().FontGlobalScale = 1 / density;

@@ -28,9 +28,9 @@ class Presenter {
     /// Sets the image of a slot for the next draw().
     void set_picture(Layer::Slot slot, const ByteImage& picture);
 
-    /// Draws one frame: the layers that have an image, in order on black, then the panel. capture: receives
-    /// the window without the panel; null: no capture. Returns false if nothing was drawn because the window
-    /// is minimised or changing.
+    /// Draws one frame: the layers that have an image, in order on the backdrop, then the panel. capture: receives
+    /// the window without the panel, on black; null: no capture. Returns false if nothing was drawn because the
+    /// window is minimised or changing.
     bool draw(Size window, std::span<const Layer> layers, ImDrawData* panel, Image* capture);
 
     const Swapchain& swapchain() const { return swapchain_; }
@@ -54,7 +54,7 @@ class Presenter {
         bool fresh = false;  // the image does not have the data of staging yet
     };
     void record_upload(Slot& slot);
-    void record_layers(vk::Image target, std::span<const Layer> layers);
+    void record_layers(vk::Image target, std::span<const Layer> layers, bool on_black);
     void record_capture(vk::Image target);
     void record_panel(uint32_t index, ImDrawData* panel);
     Image captured() const;
@@ -75,7 +75,8 @@ class Presenter {
 class Gui {
   public:
     /// Set the window's own callbacks first, because those of ImGui call them. text: height of the text, px.
-    Gui(const Window& window, const PresentDevice& device, Presenter& presenter, double text);
+    /// light: the light theme.
+    Gui(const Window& window, const PresentDevice& device, Presenter& presenter, double text, bool light);
     ~Gui();
 
     void begin_frame();
@@ -88,10 +89,13 @@ class Gui {
     vk::UniqueDescriptorPool pool_;
 };
 
-/// The objects that depend on the device and the text size. They are created again if the device is lost or the size changes.
+/// The objects that depend on the device, the text size and the theme. They are created again if the device is lost or one changes.
 struct Screen {
-    Screen(const WindowSystem& system, Window& window, const std::string& device_name, double text)
-        : device(system, window, device_name), presenter(device), gui(window, device, presenter, text) {}
+    Screen(const WindowSystem& system, Window& window, const std::string& device_name, double text,
+           bool light)
+        : device(system, window, device_name),
+          presenter(device),
+          gui(window, device, presenter, text, light) {}
     PresentDevice device;
     Presenter presenter;
     Gui gui;

@@ -67,7 +67,8 @@ TEST(Layout, AnImageWithoutItsLeftColumns) {
 
 TEST(KeptSettings, ComeBack) {
     const test::Folder folder;
-    const KeptSettings kept{.window = Size{1234, 777}, .text_scale = 1.5f, .gain = 8, .film_seconds = 3};
+    const KeptSettings kept{
+        .window = Size{1234, 777}, .text_scale = 1.5f, .gain = 8, .film_seconds = 3, .light = true};
     const std::string file = folder / "new/folder/view.json";
     write_settings(file, kept);
     EXPECT_EQ(read_settings(file), kept);
