@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// The icons of the window. They are lines in a grid of 24 units, so that they are sharp in any size.
+#pragma once
+
+struct ImVec2;
+
+namespace ewa::viewer {
+
+/// The first ones are those of Tool, in its order.
+enum class Icon {
+    view,
+    rectangle,
+    lasso,
+    polygon,
+    brush,
+    sphere,
+    box,
+    flood,
+    eyedropper,
+    move,
+    rotate,
+    scale,
+    measure,
+    level,
+    origin,
+    open,
+    save,
+    undo,
+    redo,
+    clean,
+    film,
+    publish,
+    picture,
+    help,
+    panel,
+    eye,
+    eye_off,
+    play,
+    stop,
+    key,
+    more,
+    drop
+};
+
+/// Draws into the present window of ImGui. size: of the whole grid, in ImGui's coordinates. color: ImU32.
+void draw_icon(Icon icon, const ImVec2& center, float size, unsigned color);
+
+/// A flat square button in the present line. Returns whether it is clicked. The icon is its ID: two buttons with one icon need
+/// another ImGui::PushID.
+/// tooltip: its first line stands out, as in "Undo (Ctrl+Z)\nTakes the last edit back"; null: none.
+/// active: the button stays lit. side: of the square; 0: the usual one.
+bool icon_button(Icon icon, const char* tooltip, bool active, bool enabled, float side = 0);
+
+}  // namespace ewa::viewer
