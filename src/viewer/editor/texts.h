@@ -5,6 +5,82 @@
 
 namespace ewa::viewer::texts {
 
+// The bars. Each button: its name, its key, and a line about it.
+struct ButtonText {
+    const char *name, *key, *hint;
+};
+inline constexpr ButtonText kOpenFile{"Open", "Ctrl+O",
+                                      "Splats, photos, a video, a dataset or a run; with Shift a folder"};
+inline constexpr ButtonText kSave{"Save", "Ctrl+S", "Shift or a right click: to another file"};
+inline constexpr ButtonText kUndo{"Undo", "Ctrl+Z", "Takes the last edit back"};
+inline constexpr ButtonText kRedo{"Redo", "Ctrl+Shift+Z", "Does again what was undone"};
+inline constexpr ButtonText kClean{"Clean", "", "Finds floaters, far, faint and huge splats"};
+inline constexpr ButtonText kFilm{"Film", "", "A flight through the scene as a video"};
+inline constexpr ButtonText kPublish{"Publish", "", "A web page, a small file, or streamed levels"};
+inline constexpr ButtonText kPicture{"Picture", "F12", "Writes what you see as a PNG; with Shift as an EXR"};
+inline constexpr ButtonText kPanel{"Panel", "F2", "Shows or hides the panel"};
+inline constexpr ButtonText kHelp{"Help", "F1", "All keys"};
+inline constexpr const char *kSaveAs = "Save as ...", *kMore = "More", *kSaving = "saving ...";
+inline constexpr const char *kSelected = "selected", *kWouldBeSelected = "would be selected";
+inline constexpr const char* kEditsTraining = "edits go to the training";
+
+// The panel.
+inline constexpr const char *kTabView = "View", *kTabEdit = "Edit";
+inline constexpr const char *kLook = "Look", *kTraining = "Training", *kCameras = "Cameras",
+                            *kSavedViews = "Saved views", *kDetails = "Details", *kWindow = "Window";
+inline constexpr const char* kModes =
+    "Colour\0Depth\0Opacity\0Splats per pixel\0Ellipsoids\0Median depth\0Normals\0";
+inline constexpr const char* kKernels = "Peak (3DGS)\0Antialias\0Density (EWA)\0Points (spheres)\0";
+inline constexpr const char* kComparisons = "Nothing\0Side by side\0Wipe\0Difference\0";
+inline constexpr const char* kThemes = "Dark\0Light\0";
+
+// The empty window.
+inline constexpr const char* kDropTitle = "Drop photos, a video or splats";
+inline constexpr const char* kDropExplanation = "a dataset or the folder of a training run works too";
+inline constexpr const char *kOpenAFile = "Open a file", *kOpenAFolder = "Open a folder", *kRecent = "Recent",
+                            *kKeysLine = "F1: keys";
+
+// Help (F1). The keys of tools are those of kTools.
+struct HelpRow {
+    const char *keys, *text;
+};
+inline constexpr HelpRow kMoveHelp[] = {
+    {"left drag", "orbit the scene"},
+    {"Ctrl + left drag", "look around"},
+    {"right or middle drag", "move sideways"},
+    {"wheel", "move closer or farther"},
+    {"double click", "look at this point and orbit it"},
+    {"W S  A D  Q E", "fly: forward, back; left, right; down, up"},
+    {"Shift", "fly four times as fast"},
+    {"F", "show the whole scene from the front"},
+    {"R", "return to the first view"},
+    {"T", "turntable"},
+    {"P", "parallel rays"},
+    {"U", "change the up axis"},
+};
+inline constexpr HelpRow kLookHelp[] = {
+    {"1 to 7", "colour, depth, opacity, splats per pixel, ellipsoids, median depth, normals"},
+    {"- +", "make splats smaller, larger"},
+    {"C", "show cameras; a click goes to one"},
+    {"left right", "go to the previous, next camera"},
+    {"G", "go to the nearest camera"},
+    {"V", "compare with the image: side by side, wipe, difference"},
+    {"M", "measure: click two points"},
+};
+inline constexpr HelpRow kFilesHelp[] = {
+    {"drop a file", "open it; a dataset gives its cameras to splats"},
+    {"Ctrl + O", "open a file; with Shift: a folder"},
+    {"Ctrl + 1 to 9", "save this view under a number"},
+    {"Shift + 1 to 9", "go to the saved view"},
+    {"F12", "screenshot (PNG); with Shift: EXR"},
+    {"F1", "show or hide these keys"},
+    {"F2", "show or hide the panel"},
+    {"Ctrl + Q", "quit"},
+};
+inline constexpr const char *kMoveGroup = "Move around", *kLookGroup = "Look",
+                            *kFilesGroup = "Views and files", *kToolsGroup = "Edit";
+
+// The tools.
 struct ToolText {
     Tool tool;
     const char *name, *key, *hint;  // hint: the tooltip, and the status line while the tool is active

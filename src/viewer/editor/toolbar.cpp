@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "viewer/editor/toolbar.h"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/text.h"
+#include "core/typing.h"
+#include "viewer/editor/icons.h"
+#include "viewer/editor/texts.h"
+#include "viewer/editor/theme.h"
+
+namespace ewa::viewer {
+namespace {
+
+// In heights of the text.
+constexpr double kTopBar = 2.6, kStrip = 2.6, kStatusLine = 1.7;
+constexpr float kButtonSide = 2.1f, kSmall = 0.8f;
+// In sides of a button.
+constexpr float kButtonGap = 0.1f, kGroupGap = 0.3f;
+constexpr double kEditShown = 6;  // seconds in which the status line tells of the last edit
+
+struct BarButton {
+    Icon icon;
+    texts::ButtonText text;
+    std::function<void()> act;
+    bool enabled = true, active = false, apart = false;  // apart: a separator is before it
+    std::function<void()> menu = {};                     // of a right click
+};
+using BarButtons = std::vector<BarButton>;
+
+/// The part of the window that the bars frame, in ImGui's coordinates.
+struct BarArea {
+    ImVec2 low, high;
+    float top, left, bottom;  // of bar_sizes()
+};
+
+BarArea bar_area(const Rectangle& area) {
+    const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
+    const float x = 1 / std::max(scale.x, 1e-3f), y = 1 / std::max(scale.y, 1e-3f);
+    const BarSizes sizes = bar_sizes(double(ImGui::GetTextLineHeight()) / double(y));
+    return {{float(area.x) * x, float(area.y) * y},
+            {float(area.x + area.width) * x, float(area.y + area.height) * y},
+            float(sizes.top) * y,
+            float(sizes.left) * x,
+            float(sizes.bottom) * y};
+}
+
+bool begin_bar(const char* name, const ImVec2& low, const ImVec2& high) {
+    ImGui::SetNextWindowPos(low);
+    ImGui::SetNextWindowSize({high.x - low.x, high.y - low.y});
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(0, 0));
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowMinSize, ImVec2(1, 1));
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0);
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
+    const bool open =
+        ImGui::Begin(name, nullptr,
+                     ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
+                         ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoFocusOnAppearing |
+                         ImGuiWindowFlags_NoNav | ImGuiWindowFlags_NoScrollWithMouse);
+    ImGui::PopStyleVar(4);
+    return open;
+}
+
+/// The length of the first `count` buttons.
+float bar_length(const BarButtons& buttons, size_t count, float side) {
+    float length = 0;
+    for (size_t i = 0; i < count; ++i)
+        length += side * (1 + kButtonGap + (buttons[i].apart ? kGroupGap : 0));
+    return length;
+}
+
+/// The side of the buttons, and how many of them fit. The others go behind one more button.
+struct BarFit {
+    float side;
+    size_t shown;
+};
+BarFit fit_bar(const BarButtons& buttons, float room) {
+    const float side = kButtonSide * ImGui::GetTextLineHeight();
+    for (const float share : {1.0f, kSmall})
+        if (bar_length(buttons, buttons.size(), share * side) <= room) return {share * side, buttons.size()};
+    size_t shown = buttons.size();
+    while (shown > 0 && bar_length(buttons, shown, kSmall * side) + kSmall * side > room) --shown;
+    return {kSmall * side, shown};
+}
+
+std::string bar_tooltip(const texts::ButtonText& text) {
+    std::string tooltip = text.name;
+    if (*text.key) tooltip += std::string(" (") + text.key + ")";
+    return tooltip + "\n" + text.hint;
+}
+
+/// The buttons that do not fit.
+void draw_more(const BarButtons& buttons, size_t from, float side) {
+    const bool active = std::any_of(buttons.begin() + std::ptrdiff_t(from), buttons.end(),
+                                    [](const BarButton& button) { return button.active; });
+    if (icon_button(Icon::more, texts::kMore, active, true, side)) ImGui::OpenPopup("more");
+    if (!ImGui::BeginPopup("more")) return;
+    for (size_t i = from; i < buttons.size(); ++i) {
+        const BarButton& button = buttons[i];
+        if (button.apart && i > from) ImGui::Separator();
+        if (ImGui::MenuItem(button.text.name, button.text.key, button.active, button.enabled)) button.act();
+    }
+    ImGui::EndPopup();
+}
+
+/// Draws the buttons from `at` to the right, or down. breadth: of the bar.
+void draw_buttons(const BarButtons& buttons, const BarFit& fit, ImVec2 at, bool down, float breadth) {
+    const float side = fit.side, inset = (breadth - side) / 2;
+    float& along = down ? at.y : at.x;
+    (down ? at.x : at.y) += inset;
+    for (size_t i = 0; i < fit.shown; ++i) {
+        if (buttons[i].apart) {
+            const float middle = along + side * (kGroupGap - kButtonGap) / 2, cut = 0.15f * side;
+            const ImVec2 from = down ? ImVec2(at.x + cut, middle) : ImVec2(middle, at.y + cut),
+                         to = down ? ImVec2(at.x + side - cut, middle) : ImVec2(middle, at.y + side - cut);
+            ImGui::GetWindowDrawList()->AddLine(from, to, ImGui::GetColorU32(ImGuiCol_Separator));
+            along += side * kGroupGap;
+        }
+        ImGui::SetCursorScreenPos(at);
+        const BarButton& button = buttons[i];
+        if (icon_button(button.icon, bar_tooltip(button.text).c_str(), button.active, button.enabled, side)) button.act();
+        if (button.menu) button.menu();
+        along += side * (1 + kButtonGap);
+    }
+    if (fit.shown == buttons.size()) return;
+    ImGui::SetCursorScreenPos(at);
+    draw_more(buttons, fit.shown, side);
+}
+
+std::function<void()> setter(bool& wanted) {
+    return [&wanted] { wanted = true; };
+}
+
+/// The menu of the button that saves.
+void choose_save(bool can_save, BarActions& actions) {
+    if (!can_save || !ImGui::BeginPopupContextItem("save")) return;
+    if (ImGui::MenuItem(texts::kSave.name, texts::kSave.key)) actions.save = true;
+    if (ImGui::MenuItem(texts::kSaveAs)) actions.save_as = true;
+    ImGui::EndPopup();
+}
+
+BarButtons top_buttons(Editor& editor, const BarFacts& facts, BarActions& actions) {
+    const EditSnapshot& now = editor.snapshot();
+    const bool splats = now.left > 0, can_save = facts.can_save && !editor.saving();
+    const auto save = [&actions] { (ImGui::GetIO().KeyShift ? actions.save_as : actions.save) = true; };
+    return {{Icon::open, texts::kOpenFile, setter(actions.open)},
+            {Icon::save, texts::kSave, save, can_save, false, false, [&actions, can_save] { choose_save(can_save, actions); }},
+            {Icon::undo, texts::kUndo, [&editor] { editor.undo(); }, now.done > 0, false, true},
+            {Icon::redo, texts::kRedo, [&editor] { editor.redo(); }, now.done < now.steps.size()},
+            {Icon::clean, texts::kClean, setter(actions.clean), splats, false, true},
+            {Icon::film, texts::kFilm, setter(actions.film), splats || facts.film_shown, facts.film_shown},
+            {Icon::publish, texts::kPublish, setter(actions.publish), splats},
+            {Icon::picture, texts::kPicture, setter(actions.picture)}};
+}
+
+/// A line that moves while edits are being done.
+void draw_busy(const ImVec2& low, const ImVec2& high) {
+    const float width = high.x - low.x, thickness = std::max(2.0f, 0.12f * ImGui::GetTextLineHeight());
+    const float from = low.x + width * (1.3f * float(std::fmod(ImGui::GetTime() / 1.4, 1.0)) - 0.3f);
+    ImGui::GetWindowDrawList()->AddRectFilled({std::max(low.x, from), high.y - thickness},
+                                              {std::min(high.x, from + 0.3f * width), high.y}, accent());
+}
+
+void draw_top(Editor& editor, const BarFacts& facts, const BarArea& area, BarActions& actions) {
+    const ImVec2 high(area.high.x, area.low.y + area.top);
+    if (begin_bar("top bar", area.low, high)) {
+        const BarButtons right{{Icon::panel, texts::kPanel, setter(actions.panel), true, facts.panel_shown},
+                               {Icon::help, texts::kHelp, setter(actions.help)}};
+        const BarButtons left = top_buttons(editor, facts, actions);
+        const float margin = (area.left - kButtonSide * ImGui::GetTextLineHeight()) / 2;
+        const float room = high.x - area.low.x - 2 * margin;
+        const BarFit right_fit = fit_bar(right, 0.4f * room);
+        const float right_length = bar_length(right, right.size(), right_fit.side);
+        const BarFit left_fit = fit_bar(left, room - right_length);
+        draw_buttons(left, left_fit, {area.low.x + margin, area.low.y}, false, area.top);
+        if (left_fit.shown == left.size() || right_fit.shown == right.size())
+            draw_buttons(right, right_fit, {high.x - margin - right_length, area.low.y}, false, area.top);
+        if (editor.busy() || editor.saving()) draw_busy(area.low, high);
+    }
+    ImGui::End();
+}
+
+void draw_strip(Editor& editor, const BarArea& area) {
+    const ImVec2 low(area.low.x, area.low.y + area.top), high(area.low.x + area.left, area.high.y - area.bottom);
+    if (high.y - low.y < area.left) return;
+    if (begin_bar("tools", low, high)) {
+        BarButtons tools;
+        for (const texts::ToolText& tool : texts::kTools) {
+            const bool first = tool.tool == Tool::rectangle || tool.tool == Tool::move || tool.tool == Tool::measure;
+            tools.push_back({Icon(tool.tool),
+                             {tool.name, tool.key, tool.hint},
+                             [&editor, chosen = tool.tool] { editor.settings.tool = chosen; },
+                             true,
+                             editor.settings.tool == tool.tool,
+                             first});
+        }
+        draw_buttons(tools, fit_bar(tools, high.y - low.y), low, true, area.left);
+    }
+    ImGui::End();
+}
+
+/// What the last edit did, for some seconds; then the hint of the active tool.
+std::string status_text(const Editor& editor) {
+    static struct {
+        uint64_t version = 0;
+        size_t scene = 0, left = 0, selected = 0;
+        double until = 0;
+        std::string text;
+    } last;  // seen in the frame before
+    const EditSnapshot& now = editor.snapshot();
+    if (now.version != last.version || editor.active() != last.scene) {
+        const auto change = [](size_t before, size_t after) { return before > after ? before - after : after - before; };
+        const size_t splats = now.left != last.left ? change(last.left, now.left) : change(last.selected, now.selected);
+        const bool told = editor.active() == last.scene && now.done > 0 && now.done <= now.steps.size();
+        last.text.clear();
+        if (told) {
+            last.text = now.steps[now.done - 1].title + ": ";
+            if (splats > 0) last.text += core::counted(splats, "splat") + ", ";
+            last.text += std::to_string(std::lround(now.milliseconds)) + " ms";
+        }
+        last.version = now.version;
+        last.scene = editor.active();
+        last.left = now.left;
+        last.selected = now.selected;
+        last.until = ImGui::GetTime() + kEditShown;
+    }
+    if (!last.text.empty() && ImGui::GetTime() < last.until) return last.text;
+    for (const texts::ToolText& tool : texts::kTools)
+        if (tool.tool == editor.settings.tool) return tool.hint;
+    return "";
+}
+
+/// The text without its end, if it is wider than this.
+std::string shortened(std::string text, float width) {
+    if (ImGui::CalcTextSize(text.c_str()).x <= width) return text;
+    const auto inside = [&] { return !text.empty() && (static_cast<unsigned char>(text.back()) & 0xc0) == 0x80; };
+    while (!text.empty() && ImGui::CalcTextSize((text + "...").c_str()).x > width) {
+        while (inside()) text.pop_back();  // the later bytes of a character
+        if (!text.empty()) text.pop_back();
+    }
+    return text.empty() ? text : text + "...";
+}
+
+std::string selection_text(const Editor& editor, const BarFacts& facts) {
+    if (editor.saving()) return texts::kSaving;
+    if (const auto count = editor.preview_count())
+        return core::counted(*count, "splat") + " " + texts::kWouldBeSelected;
+    if (const size_t selected = editor.snapshot().selected; selected > 0)
+        return core::grouped(selected) + " " + texts::kSelected;
+    return facts.live ? texts::kEditsTraining : "";
+}
+
+void draw_status(const Editor& editor, const BarFacts& facts, const BarArea& area) {
+    const ImVec2 low(area.low.x, area.high.y - area.bottom);
+    if (begin_bar("status", low, area.high)) {
+        ImDrawList& list = *ImGui::GetWindowDrawList();
+        const float line = ImGui::GetTextLineHeight(), y = low.y + (area.bottom - line) / 2;
+        float from = low.x + 0.6f * line, to = area.high.x - 0.6f * line;
+        const auto width = [](const std::string& text) { return ImGui::CalcTextSize(text.c_str()).x; };
+        const std::string middle = selection_text(editor, facts);
+        const float half = width(middle) / 2, center = (from + to) / 2;
+        const ImU32 quiet = ImGui::GetColorU32(ImGuiCol_TextDisabled);
+        if (const float right = width(facts.status); to - right > center + half + line) {
+            list.AddText({to - right, y}, quiet, facts.status.c_str());
+            to -= right + line;
+        }
+        if (!middle.empty()) {
+            list.AddText({std::max(from, center - half), y}, ImGui::GetColorU32(ImGuiCol_Text), middle.c_str());
+            to = center - half - line;
+        }
+        list.AddText({from, y}, quiet, shortened(status_text(editor), to - from).c_str());
+    }
+    ImGui::End();
+}
+
+}  // namespace
+
+BarSizes bar_sizes(double text_height) {
+    const auto pixels = [&](double heights) { return int(std::lround(heights * text_height)); };
+    return {pixels(kTopBar), pixels(kStrip), pixels(kStatusLine)};
+}
+
+BarActions draw_bars(Editor& editor, const BarFacts& facts, const Rectangle& rectangle) {
+    BarActions actions;
+    const BarArea area = bar_area(rectangle);
+    draw_top(editor, facts, area, actions);
+    draw_strip(editor, area);
+    draw_status(editor, facts, area);
+    return actions;
+}
+
+}  // namespace ewa::viewer
