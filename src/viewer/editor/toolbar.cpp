@@ -24,7 +24,7 @@ constexpr double kTopBar = 2.6, kStrip = 2.6, kStatusLine = 1.7;
 constexpr float kButtonSide = 2.1f, kSmall = 0.8f;
 // In sides of a button.
 constexpr float kButtonGap = 0.1f, kGroupGap = 0.3f;
-constexpr double kEditShown = 6;  // seconds in which the status line tells of the last edit
+constexpr double kEditShown = 6;  // seconds in which the status line shows the last edit
 
 struct BarButton {
     Icon icon;
@@ -59,11 +59,11 @@ bool begin_bar(const char* name, const ImVec2& low, const ImVec2& high) {
     ImGui::PushStyleVar(ImGuiStyleVar_WindowMinSize, ImVec2(1, 1));
     ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0);
     ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
-    const bool open =
-        ImGui::Begin(name, nullptr,
-                     ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
-                         ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoFocusOnAppearing |
-                         ImGuiWindowFlags_NoNav | ImGuiWindowFlags_NoScrollWithMouse);
+    const bool open = ImGui::Begin(
+        name, nullptr,
+        ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
+            ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoFocusOnAppearing |
+            ImGuiWindowFlags_NoNav | ImGuiWindowFlags_NoScrollWithMouse);
     ImGui::PopStyleVar(4);
     return open;
 }
@@ -71,8 +71,7 @@ bool begin_bar(const char* name, const ImVec2& low, const ImVec2& high) {
 /// The length of the first `count` buttons.
 float bar_length(const BarButtons& buttons, size_t count, float side) {
     float length = 0;
-    for (size_t i = 0; i < count; ++i)
-        length += side * (1 + kButtonGap + (buttons[i].apart ? kGroupGap : 0));
+    for (size_t i = 0; i < count; ++i) length += side * (1 + kButtonGap + (buttons[i].apart ? kGroupGap : 0));
     return length;
 }
 
@@ -125,7 +124,8 @@ void draw_buttons(const BarButtons& buttons, const BarFit& fit, ImVec2 at, bool 
         }
         ImGui::SetCursorScreenPos(at);
         const BarButton& button = buttons[i];
-        if (icon_button(button.icon, bar_tooltip(button.text).c_str(), button.active, button.enabled, side)) button.act();
+        if (icon_button(button.icon, bar_tooltip(button.text).c_str(), button.active, button.enabled, side))
+            button.act();
         if (button.menu) button.menu();
         along += side * (1 + kButtonGap);
     }
@@ -151,7 +151,8 @@ BarButtons top_buttons(Editor& editor, const BarFacts& facts, BarActions& action
     const bool splats = now.left > 0, can_save = facts.can_save && !editor.saving();
     const auto save = [&actions] { (ImGui::GetIO().KeyShift ? actions.save_as : actions.save) = true; };
     return {{Icon::open, texts::kOpenFile, setter(actions.open)},
-            {Icon::save, texts::kSave, save, can_save, false, false, [&actions, can_save] { choose_save(can_save, actions); }},
+            {Icon::save, texts::kSave, save, can_save, false, false,
+             [&actions, can_save] { choose_save(can_save, actions); }},
             {Icon::undo, texts::kUndo, [&editor] { editor.undo(); }, now.done > 0, false, true},
             {Icon::redo, texts::kRedo, [&editor] { editor.redo(); }, now.done < now.steps.size()},
             {Icon::clean, texts::kClean, setter(actions.clean), splats, false, true},
@@ -188,12 +189,14 @@ void draw_top(Editor& editor, const BarFacts& facts, const BarArea& area, BarAct
 }
 
 void draw_strip(Editor& editor, const BarArea& area) {
-    const ImVec2 low(area.low.x, area.low.y + area.top), high(area.low.x + area.left, area.high.y - area.bottom);
+    const ImVec2 low(area.low.x, area.low.y + area.top),
+        high(area.low.x + area.left, area.high.y - area.bottom);
     if (high.y - low.y < area.left) return;
     if (begin_bar("tools", low, high)) {
         BarButtons tools;
         for (const texts::ToolText& tool : texts::kTools) {
-            const bool first = tool.tool == Tool::rectangle || tool.tool == Tool::move || tool.tool == Tool::measure;
+            const bool first =
+                tool.tool == Tool::rectangle || tool.tool == Tool::move || tool.tool == Tool::measure;
             tools.push_back({Icon(tool.tool),
                              {tool.name, tool.key, tool.hint},
                              [&editor, chosen = tool.tool] { editor.settings.tool = chosen; },
@@ -216,11 +219,14 @@ std::string status_text(const Editor& editor) {
     } last;  // seen in the frame before
     const EditSnapshot& now = editor.snapshot();
     if (now.version != last.version || editor.active() != last.scene) {
-        const auto change = [](size_t before, size_t after) { return before > after ? before - after : after - before; };
-        const size_t splats = now.left != last.left ? change(last.left, now.left) : change(last.selected, now.selected);
-        const bool told = editor.active() == last.scene && now.done > 0 && now.done <= now.steps.size();
+        const auto change = [](size_t before, size_t after) {
+            return before > after ? before - after : after - before;
+        };
+        const size_t splats =
+            now.left != last.left ? change(last.left, now.left) : change(last.selected, now.selected);
+        const bool known = editor.active() == last.scene && now.done > 0 && now.done <= now.steps.size();
         last.text.clear();
-        if (told) {
+        if (known) {
             last.text = now.steps[now.done - 1].title + ": ";
             if (splats > 0) last.text += core::counted(splats, "splat") + ", ";
             last.text += std::to_string(std::lround(now.milliseconds)) + " ms";
@@ -240,7 +246,9 @@ std::string status_text(const Editor& editor) {
 /// The text without its end, if it is wider than this.
 std::string shortened(std::string text, float width) {
     if (ImGui::CalcTextSize(text.c_str()).x <= width) return text;
-    const auto inside = [&] { return !text.empty() && (static_cast<unsigned char>(text.back()) & 0xc0) == 0x80; };
+    const auto inside = [&] {
+        return !text.empty() && (static_cast<unsigned char>(text.back()) & 0xc0) == 0x80;
+    };
     while (!text.empty() && ImGui::CalcTextSize((text + "...").c_str()).x > width) {
         while (inside()) text.pop_back();  // the later bytes of a character
         if (!text.empty()) text.pop_back();
@@ -272,7 +280,8 @@ void draw_status(const Editor& editor, const BarFacts& facts, const BarArea& are
             to -= right + line;
         }
         if (!middle.empty()) {
-            list.AddText({std::max(from, center - half), y}, ImGui::GetColorU32(ImGuiCol_Text), middle.c_str());
+            list.AddText({std::max(from, center - half), y}, ImGui::GetColorU32(ImGuiCol_Text),
+                         middle.c_str());
             to = center - half - line;
         }
         list.AddText({from, y}, quiet, shortened(status_text(editor), to - from).c_str());
