@@ -5,9 +5,16 @@
 
 #include <algorithm>
 #include <array>
+#include <cfloat>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <string>
+
+#include "core/text.h"
+#include "core/typing.h"
+#include "viewer/editor/texts.h"
+#include "viewer/editor/theme.h"
 
 namespace ewa::viewer {
 namespace {
@@ -17,69 +24,65 @@ struct Axis {
     glm::dvec3 axis;
 };
 constexpr int kNoteLines = 3;
+constexpr float kLabelWidth = 6.2f;  // in heights of the text
 
 const std::array kAxes{Axis{"-y", {0, -1, 0}}, Axis{"+y", {0, 1, 0}}, Axis{"+z", {0, 0, 1}},
                        Axis{"-z", {0, 0, -1}}, Axis{"+x", {1, 0, 0}}, Axis{"-x", {-1, 0, 0}}};
 
-/// The height of a row with a slider, where there is none.
-void empty_row() {
-    ImGui::Dummy(ImVec2(1, ImGui::GetFrameHeight()));
-}
-
-/// Text in a row of the height of a slider.
-void text_row(const char* format, double a, double b = 0) {
-    ImGui::AlignTextToFramePadding();
-    ImGui::Text(format, a, b);
-}
-
-void show_facts(const PanelFacts& facts) {
-    ImGui::TextUnformatted(facts.scene.title.empty() ? "no file" : facts.scene.title.c_str());
-    const char* what = facts.scene.points ? "points" : "splats";
-    if (!facts.picture) {
-        ImGui::Text("%zu %s", facts.scene.gaussians->size(), what);
-        ImGui::TextUnformatted("");
-        return;
-    }
-    const RenderedFrame& shown = *facts.picture;
-    if (shown.skipped_nonfinite > 0)
-        ImGui::Text("%zu %s, %u not finite", facts.scene.gaussians->size(), what, shown.skipped_nonfinite);
-    else
-        ImGui::Text("%zu %s, %u visible", facts.scene.gaussians->size(), what, shown.splats_drawn);
-    ImGui::Text("%d x %d px in %.1f ms%s", shown.picture.width, shown.picture.height, shown.milliseconds,
-                facts.drawing ? "  ..." : "");
+/// What is open, in two lines.
+void show_title(const PanelFacts& facts) {
+    ImGui::TextUnformatted(facts.scene.title.c_str());
+    const char* what = facts.scene.points ? "point" : "splat";
+    std::string text = core::counted(facts.scene.gaussians->size(), what);
+    if (facts.picture && facts.picture->skipped_nonfinite > 0)
+        text += ", " + core::grouped(facts.picture->skipped_nonfinite) + " not finite";
+    ImGui::TextDisabled("%s", text.c_str());
 }
 
 /// What the colours of the mode mean, or the background behind them.
 void edit_background(const PanelFacts& facts, Look& look) {
     const bool shown = facts.picture && facts.picture->request.look.mode == look.mode;
-    if ((look.mode == Mode::color || look.mode == Mode::ellipsoids) && look.sky)
-        ImGui::TextUnformatted("background: the run's sky");
-    else if (look.mode == Mode::color || look.mode == Mode::ellipsoids)
-        ImGui::ColorEdit3("background", look.background.data(), ImGuiColorEditFlags_NoInputs);
-    else if ((look.mode == Mode::depth || look.mode == Mode::median_depth) && shown)
-        text_row("dark %.4g to white %.4g", double(facts.picture->picture.dark),
-                 double(facts.picture->picture.white));
-    else if (look.mode == Mode::count && shown)
-        text_row("red, yellow, white: up to %.0f", double(facts.picture->picture.white));
+    const bool color = look.mode == Mode::color || look.mode == Mode::ellipsoids;
+    const bool depth = look.mode == Mode::depth || look.mode == Mode::median_depth;
+    if (!color && !(shown && (depth || look.mode == Mode::count))) return;
+    label_field(color ? "Background" : "Scale");
+    if (color && look.sky)
+        ImGui::TextUnformatted("the run's sky");
+    else if (color)
+        ImGui::ColorEdit3("##background", look.background.data(), ImGuiColorEditFlags_NoInputs);
+    else if (depth)
+        ImGui::Text("%.4g to %.4g", double(facts.picture->picture.dark),
+                    double(facts.picture->picture.white));
     else
-        empty_row();
+        ImGui::Text("red to white: %.0f", double(facts.picture->picture.white));
 }
 
-void edit_look(const PanelFacts& facts, Look& look) {
+void edit_look(const PanelFacts& facts, PanelSettings& settings) {
+    Look& look = settings.look;
     int mode = int(look.mode);
-    if (ImGui::Combo("mode", &mode,
-                     "colour\0depth\0opacity\0splats per pixel\0ellipsoids\0median depth\0normals\0"))
-        look.mode = Mode(mode);
+    label_field("Show");
+    if (ImGui::Combo("##mode", &mode, texts::kModes)) look.mode = Mode(mode);
     edit_background(facts, look);
-    ImGui::SliderFloat("splat scale", &look.splat_scale, 0.05f, 2.0f, "%.2f", ImGuiSliderFlags_AlwaysClamp);
+    label_field("Splat size");
+    ImGui::SliderFloat("##splat scale", &look.splat_scale, 0.05f, 2.0f, "%.2f", ImGuiSliderFlags_AlwaysClamp);
+    ImGui::Checkbox("Turntable", &settings.turntable);
+    ImGui::SameLine();
+    ImGui::Checkbox("Parallel rays", &settings.parallel);
+    ImGui::Checkbox("Measure: click two points", &settings.measure);
+}
+
+/// What the rendering of splats depends on.
+void edit_rendering(const PanelFacts& facts, Look& look) {
     look.sh_degree = std::min(look.sh_degree, facts.scene.sh_degree);
-    ImGui::BeginDisabled(facts.scene.sh_degree == 0);
-    ImGui::SliderInt("SH degree", &look.sh_degree, 0, std::max(1, facts.scene.sh_degree), "%d",
-                     ImGuiSliderFlags_AlwaysClamp);
-    ImGui::EndDisabled();
+    if (facts.scene.sh_degree > 0) {
+        label_field("SH degree");
+        ImGui::SliderInt("##SH degree", &look.sh_degree, 0, facts.scene.sh_degree, "%d",
+                         ImGuiSliderFlags_AlwaysClamp);
+    }
     constexpr int kPoints = 3;
     int kernel = look.points ? kPoints : int(look.kernel);
-    if (ImGui::Combo("kernel", &kernel, "peak (3DGS)\0antialias\0density (EWA)\0points (spheres)\0")) {
+    label_field("Kernel");
+    if (ImGui::Combo("##kernel", &kernel, texts::kKernels)) {
         look.points = kernel == kPoints;
         if (!look.points) look.kernel = Footprint(kernel);
     }
@@ -89,7 +92,8 @@ void choose_up(const PanelFacts& facts, PanelActions& actions) {
     const char* present = "from cameras";
     for (const Axis& choice : kAxes)
         if (choice.axis == facts.up) present = choice.name;
-    if (!ImGui::BeginCombo("up", present)) return;
+    label_field("Up");
+    if (!ImGui::BeginCombo("##up", present)) return;
     for (const Axis& choice : kAxes)
         if (ImGui::Selectable(choice.name, choice.name == present)) actions.up = choice.axis;
     ImGui::EndCombo();
@@ -110,23 +114,28 @@ std::string comparison_text(const PanelFacts& facts, const PanelSettings& settin
 void edit_cameras(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
     const int last = int(facts.scene.dataset->frames.size()) - 1;
     int frame = facts.at_camera.value_or(0);
-    if (ImGui::SliderInt("camera", &frame, 0, last, facts.at_camera ? "%d" : "-",
+    label_field("Camera");
+    if (ImGui::SliderInt("##camera", &frame, 0, last, facts.at_camera ? "%d" : "-",
                          ImGuiSliderFlags_AlwaysClamp))
         actions.frame = frame;
     ImGui::TextDisabled("%s", facts.at_camera
                                   ? facts.scene.dataset->frames[size_t(*facts.at_camera)].name.c_str()
                                   : "between the cameras");
-    ImGui::Checkbox("show cameras", &settings.cameras);
+    ImGui::Checkbox("Show cameras", &settings.cameras);
     int comparison = int(settings.comparison);
-    if (ImGui::Combo("compare", &comparison, "none\0beside\0wipe\0difference\0"))
+    label_field("Compare");
+    if (ImGui::Combo("##compare", &comparison, texts::kComparisons))
         settings.comparison = Comparison(comparison);
-    if (settings.comparison == Comparison::wipe)
-        ImGui::SliderFloat("wipe", &settings.wipe, 0, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp);
-    else if (settings.comparison == Comparison::difference)
-        ImGui::SliderFloat("gain", &settings.gain, 1, 16, "%.0f", ImGuiSliderFlags_AlwaysClamp);
-    else
-        empty_row();
-    draw_text_box("comparison", comparison_text(facts, settings), 2);
+    if (settings.comparison == Comparison::none) return;
+    if (settings.comparison == Comparison::wipe) {
+        label_field("Wipe");
+        ImGui::SliderFloat("##wipe", &settings.wipe, 0, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp);
+    } else if (settings.comparison == Comparison::difference) {
+        label_field("Gain");
+        ImGui::SliderFloat("##gain", &settings.gain, 1, 16, "%.0f", ImGuiSliderFlags_AlwaysClamp);
+    }
+    // The rows below do not move while the slider goes from camera to camera.
+    draw_text_box("comparison", comparison_text(facts, settings), 2, 2);
 }
 
 void edit_views(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
@@ -167,9 +176,18 @@ void show_times(const PanelFacts& facts) {
     ImGui::EndTable();
 }
 
-void show_details(const PanelFacts& facts) {
-    if (ImGui::CollapsingHeader("Time") && facts.picture) show_times(facts);
-    if (ImGui::CollapsingHeader("Skipped work")) {
+void show_details(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
+    if (facts.picture) {
+        const RenderedFrame& shown = *facts.picture;
+        ImGui::TextDisabled(
+            "%s visible", core::counted(shown.splats_drawn, facts.scene.points ? "point" : "splat").c_str());
+        ImGui::TextDisabled("%d x %d px in %.1f ms%s", shown.picture.width, shown.picture.height,
+                            shown.milliseconds, facts.drawing ? "  ..." : "");
+    }
+    edit_rendering(facts, settings.look);
+    choose_up(facts, actions);
+    if (draw_section("Time", false) && facts.picture) show_times(facts);
+    if (draw_section("Skipped work", false)) {
         ImGui::PushTextWrapPos(0);
         for (const PlanLine& line : facts.scene.plan) {
             ImGui::TextUnformatted(line.what.c_str());
@@ -178,76 +196,130 @@ void show_details(const PanelFacts& facts) {
         }
         ImGui::PopTextWrapPos();
     }
-    if (ImGui::CollapsingHeader("Memory and device") && facts.picture) {
+    if (draw_section("Memory and device", false) && facts.picture) {
         ImGui::Text("%.1f MiB on the device", double(facts.picture->device_bytes) / (1 << 20));
         ImGui::TextWrapped("%s", facts.device.c_str());
     }
 }
 
-void choose_text(PanelSettings& settings) {
+void choose_window(PanelSettings& settings) {
     constexpr std::array kSizes{0.75f, 1.0f, 1.25f, 1.5f, 2.0f};
     const auto name = [](float size) { return std::to_string(int(100 * size + 0.5f)) + " %"; };
-    if (!ImGui::BeginCombo("text size", name(settings.text_scale).c_str())) return;
-    for (const float size : kSizes)
-        if (ImGui::Selectable(name(size).c_str(), size == settings.text_scale)) settings.text_scale = size;
-    ImGui::EndCombo();
+    label_field("Text size");
+    if (ImGui::BeginCombo("##text size", name(settings.text_scale).c_str())) {
+        for (const float size : kSizes)
+            if (ImGui::Selectable(name(size).c_str(), size == settings.text_scale))
+                settings.text_scale = size;
+        ImGui::EndCombo();
+    }
+    int theme = settings.light ? 1 : 0;
+    label_field("Theme");
+    if (ImGui::Combo("##theme", &theme, texts::kThemes)) settings.light = theme == 1;
 }
 
 void draw_rows(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
-    show_facts(facts);
-    ImGui::Separator();
+    show_title(facts);
     ImGui::PushItemWidth(ImGui::GetTextLineHeight() * 9.5f);
-    edit_look(facts, settings.look);
-    choose_up(facts, actions);
-    ImGui::Checkbox("turntable", &settings.turntable);
-    ImGui::SameLine();
-    ImGui::Checkbox("parallel rays", &settings.parallel);
+    if (draw_section(texts::kLook, true)) edit_look(facts, settings);
     const bool trainable = facts.scene.dataset && !facts.scene.path.empty() && facts.scene.points;
-    if ((facts.run || trainable) && ImGui::CollapsingHeader("Training", ImGuiTreeNodeFlags_DefaultOpen))
+    if ((facts.run || trainable) && draw_section(texts::kTraining, true))
         draw_training(facts, settings, actions);
-    if (facts.scene.dataset && ImGui::CollapsingHeader("Cameras", ImGuiTreeNodeFlags_DefaultOpen))
-        edit_cameras(facts, settings, actions);
-    if (ImGui::CollapsingHeader("Views and film")) edit_views(facts, settings, actions);
-    ImGui::Checkbox("measure: click two points", &settings.measure);
-    show_details(facts);
-    if (ImGui::CollapsingHeader("Window")) choose_text(settings);
+    if (facts.scene.dataset && draw_section(texts::kCameras, true)) edit_cameras(facts, settings, actions);
+    if (draw_section(texts::kSavedViews, false)) edit_views(facts, settings, actions);
+    if (draw_section(texts::kDetails, false)) show_details(facts, settings, actions);
+    if (draw_section(texts::kWindow, false)) choose_window(settings);
     ImGui::PopItemWidth();
 }
 
-/// A button of the footer. Returns whether it is clicked.
-bool button(const char* name, const char* explanation) {
-    const bool clicked = ImGui::Button(name);
+/// The tabs at the upper border. The accent marks the one that is shown.
+void draw_tabs(PanelTab& shown) {
+    ImDrawList& list = *ImGui::GetWindowDrawList();
+    const float width = ImGui::GetContentRegionAvail().x / 2, height = 1.25f * ImGui::GetFrameHeight();
+    for (const PanelTab tab : {PanelTab::view, PanelTab::edit}) {
+        const char* name = tab == PanelTab::view ? texts::kTabView : texts::kTabEdit;
+        if (tab == PanelTab::edit) ImGui::SameLine(0, 0);
+        if (ImGui::InvisibleButton(name, ImVec2(width, height))) shown = tab;
+        const ImVec2 low = ImGui::GetItemRectMin(), high = ImGui::GetItemRectMax();
+        const bool bright = tab == shown || ImGui::IsItemHovered();
+        const ImVec2 size = ImGui::CalcTextSize(name);
+        list.AddText({(low.x + high.x - size.x) / 2, (low.y + high.y - size.y) / 2},
+                     ImGui::GetColorU32(bright ? ImGuiCol_Text : ImGuiCol_TextDisabled), name);
+        const float line = (tab == shown ? 0.12f : 0.06f) * ImGui::GetTextLineHeight();
+        list.AddRectFilled({low.x, high.y - line}, high,
+                           tab == shown ? accent() : ImGui::GetColorU32(ImGuiCol_Separator));
+    }
+}
+
+/// One of two buttons of the footer that share a line. Returns whether it is clicked.
+bool footer_button(const char* name, const char* explanation) {
+    const float gap = ImGui::GetStyle().ItemSpacing.x;
+    const float width = (ImGui::GetWindowWidth() - 2 * ImGui::GetStyle().WindowPadding.x - gap) / 2;
+    const bool clicked = ImGui::Button(name, ImVec2(width, 0));
     if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", explanation);
     return clicked;
 }
 
 void draw_footer(const PanelFacts& facts, PanelActions& actions) {
-    actions.whole_scene = button("Whole scene", "F: from the front");
+    draw_text_box("note", facts.note, 0, kNoteLines);
+    actions.whole_scene = footer_button("Whole scene", "F: from the front");
     ImGui::SameLine();
-    actions.reset = button("First view", "R");
+    actions.reset = footer_button("First view", "R");
+    if (footer_button("Open", "A file or a folder")) ImGui::OpenPopup("open");
     ImGui::SameLine();
-    actions.screenshot = button("PNG", "F12: writes a screenshot");
-    ImGui::SameLine();
-    actions.exr = button("EXR", "Shift + F12: writes the render in floating point");
-    ImGui::TextDisabled("F1: keys   F2: hide this");
-    ImGui::SameLine();
-    if (ImGui::SmallButton("Open")) ImGui::OpenPopup("open");
+    if (footer_button("Save picture", "F12: a PNG. Shift + F12: an EXR")) ImGui::OpenPopup("picture");
     if (ImGui::BeginPopup("open")) {
         if (ImGui::MenuItem("A file", "Ctrl+O")) actions.open = Wanted::file;
         if (ImGui::MenuItem("A folder", "Ctrl+Shift+O")) actions.open = Wanted::folder;
         ImGui::EndPopup();
     }
-    draw_text_box("note", facts.note, kNoteLines);
+    if (ImGui::BeginPopup("picture")) {
+        actions.screenshot = ImGui::MenuItem("What you see (PNG)", "F12");
+        actions.exr = ImGui::MenuItem("The render in floating point (EXR)", "Shift+F12");
+        ImGui::EndPopup();
+    }
 }
 
-/// The height of draw_footer().
-float footer_height() {
-    return ImGui::GetFrameHeightWithSpacing() +
-           float(kNoteLines + 1) * ImGui::GetTextLineHeightWithSpacing() +
-           3 * ImGui::GetStyle().ItemSpacing.y;
+/// The height of draw_footer() and of the separator above it.
+float footer_height(const PanelFacts& facts) {
+    const float gap = ImGui::GetStyle().ItemSpacing.y;
+    const int lines = text_lines(facts.note, kNoteLines);
+    return 2 * ImGui::GetFrameHeightWithSpacing() + gap +
+           (lines > 0 ? float(lines) * ImGui::GetTextLineHeight() + gap : 0);
 }
 
 }  // namespace
+
+void label_field(const char* label) {
+    ImGui::AlignTextToFramePadding();
+    ImGui::TextUnformatted(label);
+    ImGui::SameLine(kLabelWidth * ImGui::GetTextLineHeight());
+    ImGui::SetNextItemWidth(-FLT_MIN);
+}
+
+bool draw_section(const char* name, bool open) {
+    ImGui::Separator();
+    ImGui::PushStyleColor(ImGuiCol_Header, ImU32(0));
+    const bool shown = ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : 0);
+    ImGui::PopStyleColor();
+    return shown;
+}
+
+int text_lines(const std::string& text, int most) {
+    if (text.empty()) return 0;
+    const float height =
+        ImGui::CalcTextSize(text.c_str(), nullptr, false, ImGui::GetContentRegionAvail().x).y;
+    return std::min(most, int(std::lround(height / ImGui::GetTextLineHeight())));
+}
+
+void draw_text_box(const char* name, const std::string& text, int least, int most) {
+    const int lines = std::max(least, text_lines(text, most));
+    if (lines == 0) return;
+    ImGui::BeginChild(name, ImVec2(0, float(lines) * ImGui::GetTextLineHeight()));
+    ImGui::PushTextWrapPos(0);
+    ImGui::TextUnformatted(text.c_str());
+    ImGui::PopTextWrapPos();
+    ImGui::EndChild();
+}
 
 glm::dvec3 next_up(const glm::dvec3& up) {
     for (size_t i = 0; i < kAxes.size(); ++i)
@@ -255,20 +327,30 @@ glm::dvec3 next_up(const glm::dvec3& up) {
     return kAxes[0].axis;
 }
 
-PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings) {
+PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings,
+                        const std::function<void()>& edit_rows) {
     PanelActions actions;
     const float height = ImGui::GetIO().DisplaySize.y;
     ImGui::SetNextWindowPos(ImVec2(0, 0));
     ImGui::SetNextWindowSize(ImVec2(facts.width, height));
-    ImGui::SetNextWindowBgAlpha(facts.over_picture ? 0.85f : 1.0f);
+    ImGui::SetNextWindowBgAlpha(facts.over_picture ? 0.93f : 1.0f);
     constexpr auto kFlags = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
                             ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus;
-    if (ImGui::Begin("panel", nullptr, kFlags)) {
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0);
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
+    const bool open = ImGui::Begin("panel", nullptr, kFlags);
+    ImGui::PopStyleVar(2);
+    if (open) {
+        if (edit_rows) draw_tabs(settings.tab);
+        const bool editing = edit_rows && settings.tab == PanelTab::edit;
         // In a low window the footer scrolls with the rows.
-        const float footer = footer_height();
-        const bool low = height < 2 * footer;
-        ImGui::BeginChild("rows", ImVec2(0, low ? 0 : -footer));
-        draw_rows(facts, settings, actions);
+        const float footer = footer_height(facts);
+        const bool low = height < 3 * footer;
+        ImGui::BeginChild(editing ? "edits" : "rows", ImVec2(0, low ? 0 : -footer));
+        if (editing)
+            edit_rows();
+        else
+            draw_rows(facts, settings, actions);
         if (low) draw_footer(facts, actions);
         ImGui::EndChild();
         if (!low) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The panel at the left of the window. A row that has nothing to show stays empty, so that the others do not move. The
-// functions change only their arguments.
+// The panel at the left of the window. The functions change only their arguments.
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,6 +37,9 @@ struct PanelFacts {
     bool over_picture;             // the panel lies over the picture, which shines through
 };
 
+/// The tabs of the panel.
+enum class PanelTab { view, edit };
+
 /// What the panel changes.
 struct PanelSettings {
     Look look;
@@ -49,6 +52,7 @@ struct PanelSettings {
     float film_seconds = 2;  // from one view to the next
     float text_scale = 1;    // times the size that the monitor asks for
     bool light = false;      // the light theme
+    PanelTab tab = PanelTab::view;
     /// Steps of a training that the window starts: those of a row of train::kQualities, or another number.
     int train_steps = 0;
 };
@@ -64,13 +68,21 @@ struct PanelActions {
     std::optional<Wanted> open;          // by the file dialog
 };
 
-PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings);
+/// edit_rows: draws the tab "Edit"; empty: there are no tabs.
+PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings,
+                        const std::function<void()>& edit_rows = {});
 
 /// The section of a training run, or of a dataset that one can be started on. Part of draw_panel().
 void draw_training(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions);
 
-/// Text that wraps in a fixed number of lines, and scrolls if it has more.
-void draw_text_box(const char* name, const std::string& text, int lines);
+/// Draws a label. The next item gets the rest of the line.
+void label_field(const char* label);
+/// Draws the heading of a section that folds. open: whether it is open at first. Returns whether it is open.
+bool draw_section(const char* name, bool open);
+/// The number of lines of text that wraps at the border of the window; not more than `most`.
+int text_lines(const std::string& text, int most);
+/// Draws text that wraps, in a box of `least` to `most` lines. It scrolls if it has more.
+void draw_text_box(const char* name, const std::string& text, int least, int most);
 
 /// The next of the six axes; the first one if `up` is not an axis.
 glm::dvec3 next_up(const glm::dvec3& up);

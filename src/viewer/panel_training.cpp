@@ -11,6 +11,7 @@
 #include "core/typing.h"
 #include "run/option_table.h"
 #include "viewer/editor/offers.h"
+#include "viewer/editor/theme.h"
 #include "viewer/panel.h"
 #include "viewer/training.h"
 
@@ -33,14 +34,12 @@ std::vector<float> curve(const std::vector<float>& values) {
     return means;
 }
 
-/// The name, the last value and the curve.
+/// The last value and the curve, as far as there are values.
 void plot(const char* name, const std::vector<float>& values, const char* format) {
-    if (values.empty())
-        ImGui::Text("%s: none yet", name);
-    else
-        ImGui::Text(format, double(values.back()));
-    std::vector<float> points = curve(values);
-    if (points.empty()) points.push_back(0);
+    if (values.empty()) return;
+    ImGui::Text(format, double(values.back()));
+    const std::vector<float> points = curve(values);
+    if (points.size() < 2) return;
     const auto [least, most] = std::minmax_element(points.begin(), points.end());
     const float margin = std::max(1e-6f, 0.05f * (*most - *least));
     ImGui::PushID(name);
@@ -68,18 +67,18 @@ void show_progress(const live::Update& run) {
     ImGui::ProgressBar(share, ImVec2(ImGui::GetContentRegionAvail().x, 0.4f * ImGui::GetTextLineHeight()),
                        "");
     const double left = live::seconds_left(status);
-    ImGui::TextUnformatted(std::isnan(left) ? "" : ("about " + core::duration_text(left) + " left").c_str());
+    if (!std::isnan(left)) ImGui::TextUnformatted(("about " + core::duration_text(left) + " left").c_str());
 }
 
 /// Which step the picture is of.
 void show_step(const PanelFacts& facts) {
     const live::Update& run = *facts.run;
     if (facts.scene.points)
-        ImGui::TextUnformatted("picture: points, of step 0");
+        ImGui::TextDisabled("picture: points, of step 0");
     else if (run.splats_step >= 0)
-        ImGui::Text("picture: splats of step %d", run.splats_step);
-    else
-        ImGui::TextUnformatted(facts.scene.gaussians->size() > 0 ? "picture: the last saved splats" : "");
+        ImGui::TextDisabled("picture: splats of step %d", run.splats_step);
+    else if (facts.scene.gaussians->size() > 0)
+        ImGui::TextDisabled("picture: the last saved splats");
 }
 
 void show_curves(const live::Status& status) {
@@ -95,7 +94,7 @@ void show_curves(const live::Status& status) {
 }
 
 /// What the window offers, in the order of train::kQualities.
-constexpr std::array kQualityNames{"quick look", "good", "best"};
+constexpr std::array kQualityNames{"Quick look", "Good", "Best"};
 
 /// The name with the time that such a training usually takes, if the device is known.
 std::string quality_text(const PanelFacts& facts, const char* name, int steps) {
@@ -118,10 +117,14 @@ void choose_training(const PanelFacts& facts, PanelSettings& settings, PanelActi
                 settings.train_steps = train::kQualities[i].second;
         ImGui::EndCombo();
     }
-    actions.train = ImGui::Button("Train splats");
-    ImGui::SameLine();
-    ImGui::SetNextItemWidth(ImGui::GetTextLineHeight() * 5);
-    if (ImGui::InputInt("steps", &settings.train_steps, 0))
+    ImGui::PushStyleColor(ImGuiCol_Button, accent());
+    ImGui::PushStyleColor(ImGuiCol_ButtonHovered, accent(0.9f));
+    ImGui::PushStyleColor(ImGuiCol_ButtonActive, accent(0.75f));
+    ImGui::PushStyleColor(ImGuiCol_Text, on_accent());
+    actions.train = ImGui::Button("Train splats", ImVec2(ImGui::GetContentRegionAvail().x, 0));
+    ImGui::PopStyleColor(4);
+    label_field("Steps");
+    if (ImGui::InputInt("##steps", &settings.train_steps, 0))
         settings.train_steps = std::clamp(settings.train_steps, 1, kMostSteps);
 }
 
@@ -138,20 +141,10 @@ std::string remark_of(const PanelFacts& facts) {
 
 }  // namespace
 
-void draw_text_box(const char* name, const std::string& text, int lines) {
-    ImGui::BeginChild(name, ImVec2(0, float(lines) * ImGui::GetTextLineHeightWithSpacing()));
-    ImGui::PushTextWrapPos(0);
-    ImGui::TextUnformatted(text.c_str());
-    ImGui::PopTextWrapPos();
-    ImGui::EndChild();
-}
-
 void draw_training(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
     if (!facts.run) return choose_training(facts, settings, actions);
     const live::Update& run = *facts.run;
     show_progress(run);
-    show_step(facts);
-    show_curves(run.status);
     const bool paused = run.status.state == live::State::paused;
     ImGui::BeginDisabled(run.status.state == live::State::done || !run.connected || !run.status.commands);
     if (ImGui::Button(paused ? "Resume###pause" : "Pause###pause"))
@@ -159,7 +152,9 @@ void draw_training(const PanelFacts& facts, PanelSettings& settings, PanelAction
     ImGui::SameLine();
     if (ImGui::Button("Save now")) actions.command = "save";
     ImGui::EndDisabled();
-    draw_text_box("training remark", remark_of(facts), 2);
+    show_step(facts);
+    draw_text_box("training remark", remark_of(facts), 0, 3);
+    show_curves(run.status);
 }
 
 }  // namespace ewa::viewer

@@ -297,7 +297,7 @@ TEST_F(Input, AFieldOfThePanelTakesDigitsAndLeavesFunctionKeys) {
         return screenshot(session);
     };
     const Image before = after("key F2 key 4");
-    after("mousemove 80 135");  // the slider of the splats' scale
+    after("mousemove 180 205");  // the slider of the splats' scale
     after("keydown ctrl click 1");
     EXPECT_LE(largest_difference(after("keyup ctrl key 1"), before), kRounding) << "1 has chosen a mode";
     float difference = largest_difference(after("key 0"), before);

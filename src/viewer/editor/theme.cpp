@@ -13,7 +13,7 @@ struct ThemeColor {
     unsigned dark, light;  // 0xRRGGBB
     float opacity = 1;
 };
-constexpr unsigned kAccentDark = 0xf2a93b, kAccentLight = 0xa85f00;
+constexpr unsigned kAccentDark = 0xf2a93b, kAccentLight = 0x854a00;
 constexpr unsigned kBackdropDark = 0x17181a, kBackdropLight = 0xd9dbde;
 
 /// Text has a contrast of at least 7 to what lies behind it (WCAG 2).
@@ -102,6 +102,10 @@ void set_theme(bool light) {
 
 unsigned accent(float opacity) {
     return ImGui::ColorConvertFloat4ToU32(theme_color(light_theme ? kAccentLight : kAccentDark, opacity));
+}
+
+unsigned on_accent() {
+    return ImGui::ColorConvertFloat4ToU32(theme_color(light_theme ? 0xffffff : kBackdropDark, 1));
 }
 
 unsigned backdrop() {

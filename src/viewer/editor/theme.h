@@ -9,6 +9,8 @@ void set_theme(bool light);
 
 /// The accent as ImU32, of this opacity.
 unsigned accent(float opacity = 1);
+/// Text on the accent, as ImU32.
+unsigned on_accent();
 /// The colour behind the scene where it is empty, as ImU32.
 unsigned backdrop();
 
