@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "ewa/error.h"
 #include "viewer/editor/offers.h"
@@ -115,6 +116,7 @@ void App::handle_key(const KeyPress& press) {
     if (key == GLFW_KEY_Q && press.control) return state_.window.close();
     if (key == GLFW_KEY_O && press.control)
         return session_.dialog.ask(press.shift ? Wanted::folder : Wanted::file);
+    if (key == GLFW_KEY_ESCAPE && std::exchange(state_.help, false)) return;
     if (key == GLFW_KEY_ESCAPE) session_.search.cancel();
     if (key == GLFW_KEY_F1) state_.message.hint_until = {};
     if (key == GLFW_KEY_F1) toggle(state_.help);
@@ -213,14 +215,21 @@ void App::draw_overlays() {
     const Rectangle area = state_.picture_area();
     const std::optional<Headline> words = session_.headline();
     if (words && !state_.help) draw_headline(*words, area);
-    if (session_.empty() && !state_.help)
-        if (const auto wanted = draw_open_buttons(area)) session_.dialog.ask(*wanted);
+    const bool empty = session_.empty();
+    if (empty && !state_.help) {
+        const Welcome chosen = draw_welcome(area);
+        if (chosen.wanted) session_.dialog.ask(*chosen.wanted);
+        if (chosen.file) session_.open({*chosen.file}, {});
+    }
     if (session_.search.running() && draw_search(session_.search.progress(), area)) session_.search.cancel();
     if (session_.offers_training() && !state_.help)
         if (const auto steps = draw_training_offer(scene, state_.on_cpu, area)) session_.answer_offer(*steps);
     if (const std::string text = session_.banner(); !text.empty()) draw_banner(text, area);
-    if (!words && state_.message.hinting(Clock::now()) && !state_.help)
-        draw_hint(scene.dataset != nullptr, state_.panel_shown(), area);
+    const auto now = Clock::now();
+    if (!words && !empty && state_.message.hinting(now) && !state_.help)
+        draw_hint({scene.dataset != nullptr, state_.panel_shown(), shown_.comparing(),
+                   state_.message.hint_opacity(now)},
+                  area);
 }
 
 void App::draw() {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Text over the picture that disappears after some seconds.
 #pragma once
+#include <algorithm>
 #include <chrono>
 #include <string>
 
@@ -10,6 +11,7 @@ struct Message {
     using Clock = std::chrono::steady_clock;
     std::string note;  // the last one; the panel shows it after the picture
     Clock::time_point note_until{}, hint_until{};
+    static constexpr std::chrono::seconds kFade{2};
 
     void say(const std::string& text) {
         note = text;
@@ -19,10 +21,14 @@ struct Message {
     /// Whether the note is over the picture. An empty one never is.
     bool noting(Clock::time_point now) const { return !note.empty() && now < note_until; }
     bool hinting(Clock::time_point now) const { return now < hint_until; }
+    /// The hint fades in its last seconds.
+    float hint_opacity(Clock::time_point now) const {
+        return std::clamp(std::chrono::duration<float>(hint_until - now) / kFade, 0.0f, 1.0f);
+    }
 
-    /// Hides what has been shown long enough. Returns whether something changed.
+    /// Hides what has been shown long enough. Returns whether something changes.
     bool expire(Clock::time_point now) {
-        bool expired = false;
+        bool expired = hinting(now) && hint_opacity(now) < 1;
         for (Clock::time_point* until : {&hint_until, &note_until}) {
             if (*until == Clock::time_point{} || now < *until) continue;
             *until = {};

@@ -11,22 +11,15 @@
 
 #include "core/text.h"
 #include "scene/frustum.h"
+#include "viewer/editor/theme.h"
 
 namespace ewa::viewer {
 namespace {
 
 constexpr ImU32 kCameraColor = IM_COL32(90, 200, 255, 150), kPointedColor = IM_COL32(255, 210, 60, 255);
 constexpr ImU32 kTextColor = IM_COL32(255, 255, 255, 255), kShadowColor = IM_COL32(0, 0, 0, 190);
-constexpr ImU32 kQuietColor = IM_COL32(190, 190, 190, 255);
 constexpr float kGrab = 12;      // px around a target that count as on it
 constexpr double kFar = 100000;  // px; line ends are clamped to this
-
-/// Converts framebuffer pixels to ImGui's coordinates.
-ImVec2 gui_point(double x, double y) {
-    const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
-    return {float(std::clamp(x, -kFar, kFar)) / std::max(scale.x, 1e-3f),
-            float(std::clamp(y, -kFar, kFar)) / std::max(scale.y, 1e-3f)};
-}
 
 void label(ImDrawList& list, const ImVec2& at, const char* text) {
     const ImVec2 size = ImGui::CalcTextSize(text);
@@ -75,7 +68,7 @@ void draw_message(const char* name, const std::string& text, const Rectangle& ar
     const float width = std::min({room, 40 * line, ImGui::CalcTextSize(text.c_str()).x + 2});
     ImGui::SetNextWindowPos(ImVec2((low.x + high.x) / 2, low.y + (high.y - low.y) * at - raise),
                             ImGuiCond_Always, ImVec2(0.5f, at));
-    ImGui::SetNextWindowBgAlpha(0.75f);
+    ImGui::SetNextWindowBgAlpha(0.8f * ImGui::GetStyle().Alpha);
     constexpr auto kFlags = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
                             ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_NoFocusOnAppearing |
                             ImGuiWindowFlags_NoNav | ImGuiWindowFlags_NoSavedSettings;
@@ -109,61 +102,10 @@ float centered_text(ImDrawList& list, ImFont* font, float size, ImU32 color, con
 
 }  // namespace
 
-void draw_help(bool& open) {
-    static const std::array<std::array<const char*, 2>, 29> rows{
-        {{"left drag", "orbit the scene"},
-         {"Ctrl + left drag", "look around"},
-         {"right or middle drag", "move sideways"},
-         {"wheel", "move closer or farther"},
-         {"double click", "look at this point and orbit it"},
-         {"W S  A D  Q E", "fly: forward, back; left, right; down, up"},
-         {"Shift", "fly four times as fast"},
-         {"T", "turntable"},
-         {"P", "parallel rays"},
-         {"U", "change the up axis"},
-         {"R", "return to the first view"},
-         {"F", "show the whole scene from the front"},
-         {"", ""},
-         {"1 to 7", "colour, depth, opacity, splats per pixel, ellipsoids, median depth, normals"},
-         {"- +", "make splats smaller, larger"},
-         {"C", "show cameras; a click goes to one"},
-         {"M", "measure: click two points"},
-         {"left right", "go to the previous, next camera"},
-         {"G", "go to the nearest camera"},
-         {"V", "compare with the image: beside, wipe, difference"},
-         {"", ""},
-         {"Ctrl + 1 to 9", "save this view under a number"},
-         {"Shift + 1 to 9", "go to the saved view"},
-         {"F12", "screenshot (PNG); with Shift: EXR"},
-         {"F1", "show or hide these keys"},
-         {"F2", "show or hide the panel"},
-         {"Ctrl + O", "open a file; with Shift: a folder"},
-         {"Ctrl + Q", "quit"},
-         {"drop a file", "open it; a dataset gives its cameras to splats"}}};
-    const ImVec2 size = ImGui::GetIO().DisplaySize;
-    const float line = ImGui::GetTextLineHeight();
-    ImGui::SetNextWindowPos(ImVec2(size.x / 2, size.y / 2), ImGuiCond_Always, ImVec2(0.5f, 0.5f));
-    ImGui::SetNextWindowSizeConstraints(ImVec2(0, 0), size);  // a longer list scrolls
-    ImGui::SetNextWindowBgAlpha(1);                           // other text lies behind it
-    ImGui::PushStyleVar(ImGuiStyleVar_CellPadding, ImVec2(line / 2, 1));
-    if (ImGui::Begin("Keys", &open, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse) &&
-        ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit)) {
-        // In a narrow window the second column wraps.
-        float keys = 0;
-        for (const auto& row : rows) keys = std::max(keys, ImGui::CalcTextSize(row[0]).x);
-        const float room = std::max(4 * line, size.x - keys - 5 * line);
-        for (const auto& row : rows)
-            for (const char* text : row) {
-                ImGui::TableNextColumn();
-                const float width = std::min(room, ImGui::CalcTextSize(text).x + 1);
-                ImGui::PushTextWrapPos(ImGui::GetCursorPosX() + (text == row[0] ? keys + 1 : width));
-                ImGui::TextUnformatted(text);
-                ImGui::PopTextWrapPos();
-            }
-        ImGui::EndTable();
-    }
-    ImGui::End();
-    ImGui::PopStyleVar();
+ImVec2 gui_point(double x, double y) {
+    const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
+    return {float(std::clamp(x, -kFar, kFar)) / std::max(scale.x, 1e-3f),
+            float(std::clamp(y, -kFar, kFar)) / std::max(scale.y, 1e-3f)};
 }
 
 std::optional<int> draw_cameras(const CamerasShown& cameras) {
@@ -242,14 +184,14 @@ bool over_wipe(const Rectangle& image, float wipe) {
 }
 
 void draw_note(const std::string& note, const Rectangle& area) {
-    draw_message("note", note, area, 1, 7 * ImGui::GetTextLineHeight());
+    draw_message("note", note, area, 1, 5.5f * ImGui::GetTextLineHeight());
 }
 
-void draw_hint(bool images, bool panel, const Rectangle& area) {
+void draw_hint(const Hint& hint, const Rectangle& area) {
     std::vector<std::string> keys{"drag: turn", "right drag: move", "wheel: closer", "double click: look at",
                                   "F: whole scene"};
-    keys.insert(keys.end(), {images ? "V: compare with the images" : "W A S D: fly", "F1: all keys"});
-    if (!panel) keys.push_back("F2: panel");
+    keys.insert(keys.end(), {hint.images ? "V: compare with the images" : "W A S D: fly", "F1: all keys"});
+    if (!hint.panel) keys.push_back("F2: panel");
     std::string text;
     for (const std::string& key : keys) {
         if (!text.empty()) text += "    ";
@@ -257,7 +199,9 @@ void draw_hint(bool images, bool panel, const Rectangle& area) {
             text += c == ' ' ? std::string("\u00a0") : std::string(1, c);  // it stays together
     }
     // Above the labels of the compared images.
-    draw_message("hint", text, area, 1, 3 * ImGui::GetTextLineHeight());
+    ImGui::PushStyleVar(ImGuiStyleVar_Alpha, hint.opacity);
+    draw_message("hint", text, area, 1, (hint.comparing ? 3 : 0.5f) * ImGui::GetTextLineHeight());
+    ImGui::PopStyleVar();
 }
 
 void draw_banner(const std::string& text, const Rectangle& area) {
@@ -267,22 +211,14 @@ void draw_banner(const std::string& text, const Rectangle& area) {
 void draw_headline(const Headline& headline, const Rectangle& area) {
     const ImVec2 low = gui_point(area.x, area.y), high = gui_point(area.x + area.width, area.y + area.height);
     ImDrawList& list = *ImGui::GetBackgroundDrawList();
+    list.AddRectFilled(low, high, backdrop());
+    const bool dark = (backdrop() & 255) < 128;
     ImFont* large = ImGui::GetIO().Fonts->Fonts.back();  // as Gui adds them
     const float line = ImGui::GetTextLineHeight();
-    const float below = centered_text(list, large, 2 * line, kTextColor, headline.text, low, high,
-                                      low.y + (high.y - low.y) * 0.4f);
-    centered_text(list, ImGui::GetFont(), line, kQuietColor, headline.explanation, low, high, below + line);
-}
-
-std::optional<Wanted> draw_open_buttons(const Rectangle& area) {
-    std::optional<Wanted> wanted;
-    if (begin_box("open", area, 0.65f)) {
-        if (ImGui::Button("Open a file")) wanted = Wanted::file;
-        ImGui::SameLine();
-        if (ImGui::Button("Open a folder")) wanted = Wanted::folder;
-    }
-    ImGui::End();
-    return wanted;
+    const float below = centered_text(list, large, 2 * line, dark ? kTextColor : IM_COL32_BLACK,
+                                      headline.text, low, high, low.y + (high.y - low.y) * 0.4f);
+    centered_text(list, ImGui::GetFont(), line, ImGui::GetColorU32(ImGuiCol_TextDisabled),
+                  headline.explanation, low, high, below + line);
 }
 
 bool draw_search(const CaptureProgress& progress, const Rectangle& area) {

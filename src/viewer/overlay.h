@@ -2,6 +2,7 @@
 // What Dear ImGui draws over the image: the list of keys, cameras, labels, the border of a wipe, and messages. The
 // functions change only their arguments.
 #pragma once
+#include <filesystem>
 #include <optional>
 #include <string>
 
@@ -11,8 +12,14 @@
 #include "viewer/layout.h"
 #include "viewer/measurement.h"
 
+struct ImVec2;
+
 namespace ewa::viewer {
 
+/// Converts px of the framebuffer to ImGui's coordinates.
+ImVec2 gui_point(double x, double y);
+
+/// The list of keys. A click outside closes it.
 void draw_help(bool& open);
 
 struct CamerasShown {
@@ -39,8 +46,13 @@ bool over_wipe(const Rectangle& image, float wipe);
 
 /// A message, above the hint.
 void draw_note(const std::string& note, const Rectangle& area);
-/// The first keys to know, at the lower border. images: there are images to compare with.
-void draw_hint(bool images, bool panel, const Rectangle& area);
+/// The first keys to know, at the lower border.
+struct Hint {
+    bool images, panel,
+        comparing;  // there are images to compare with; the panel is shown; images are compared
+    float opacity;
+};
+void draw_hint(const Hint& hint, const Rectangle& area);
 /// A line at the upper border that says what the picture shows.
 void draw_banner(const std::string& text, const Rectangle& area);
 /// One line in large letters in the middle of the window, and an explanation below it.
@@ -48,8 +60,13 @@ struct Headline {
     std::string text, explanation;
 };
 void draw_headline(const Headline& headline, const Rectangle& area);
-/// Draws two buttons below the headline of an empty window. Returns whether the clicked one opens a file or a folder.
-std::optional<Wanted> draw_open_buttons(const Rectangle& area);
+/// What the user chose in an empty window: a dialog, or a file.
+struct Welcome {
+    std::optional<Wanted> wanted;
+    std::optional<std::filesystem::path> file;
+};
+/// Draws the card of an empty window: what can be dropped, buttons, and the files that were opened last.
+Welcome draw_welcome(const Rectangle& area);
 /// Shows the progress of the search for cameras, and a button. Returns whether the button is clicked.
 bool draw_search(const CaptureProgress& progress, const Rectangle& area);
 

@@ -48,6 +48,8 @@ void ViewSession::adopt(OpenedScene opened, std::optional<int> frame) {
 
 void ViewSession::show_opened(OpenedScene scene) {
     search_failure_.clear();
+    if (state_.empty()) state_.message.hint();
+    state_.scene.title = scene.title;  // the area is that beside the panel
     navigation_.view.restart(start_view(scene, {}, state_.picture_area().size()));
     state_.window.set_title(window_title(scene));
     adopt(std::move(scene), {});
@@ -229,8 +231,7 @@ void ViewSession::take_saved() {
 }
 
 bool ViewSession::empty() const {
-    return state_.scene.gaussians->size() == 0 && state_.scene.title.empty() && !state_.scene.dataset &&
-           !opening_.valid() && !search.running() && !live_run.update();
+    return state_.empty() && !opening_.valid() && !search.running() && !live_run.update();
 }
 
 std::optional<Headline> ViewSession::headline() const {
@@ -245,8 +246,7 @@ std::optional<Headline> ViewSession::headline() const {
     }
     if (scene.dataset) return std::nullopt;
     if (!scene.title.empty()) return Headline{scene.title + " has no splats", "Drop another file here."};
-    return Headline{"drop a file here",
-                    "splats, photos, a video, a dataset, or the folder of a training run"};
+    return std::nullopt;
 }
 
 std::string ViewSession::banner() const {

@@ -54,6 +54,7 @@ std::filesystem::path free_name(const std::string& stem, const std::string& exte
 ViewState::ViewState(const Startup& asked)
     : startup(asked),
       window(system, window_title(asked.scene), initial_size(asked, system), !asked.picture),
+      scene(asked.scene),
       settings(asked.settings),
       device_name(asked.device.name),
       loop{.capture = asked.picture.has_value(), .times = asked.times} {}

@@ -85,7 +85,8 @@ struct ViewState {
     double text_height() const;  // px of the framebuffer
     int panel_width() const;     // px of the framebuffer, also while it is hidden
     bool panel_fits() const;     // the window has room for the panel beside the picture
-    bool panel_shown() const { return !scripted() && (panel_fits() ? panel_beside : panel_over); }
+    bool empty() const { return scene.title.empty() && !scene.dataset && scene.gaussians->size() == 0; }
+    bool panel_shown() const { return !scripted() && !empty() && (panel_fits() ? panel_beside : panel_over); }
     /// The part of the window that the panel leaves to the pictures.
     Rectangle picture_area() const;
 

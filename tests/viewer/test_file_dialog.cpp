@@ -232,7 +232,7 @@ TEST_F(OpenKeys, AndTheButtonsOpenWhatIsChosen) {
                     {{"PATH", folder_ / "bin" + ":/usr/bin:/bin"}, {"DBUS_SESSION_BUS_ADDRESS", kNoBus}});
     ASSERT_TRUE(session.found());
     EXPECT_EQ(range_of(screenshot(session)), 0);
-    session.send("mousemove 160 195 click 1");  // the button of a file
+    session.send("mousemove 136 197 click 1");  // the button of a file
     const XClient display(display_.name());
     EXPECT_TRUE(display.window_titled("splats.ply - ewa")) << "nothing was opened";
     EXPECT_GT(range_of(screenshot(session)), 0.3f);

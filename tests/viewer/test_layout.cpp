@@ -88,7 +88,7 @@ TEST(KeptSettings, DamageIsIgnored) {
          {std::string(), std::string("{"), std::string("[1]"), std::string(70000, ' ') + "{}",
           std::string(300, '['), std::string("{\"mode\": 7, \"gain\": \"x\", \"text_scale\": 1e9}"),
           std::string("{\"window_width\": -5, \"window_height\": 1e300}"),
-          std::string("{\"window_width\": 800}"), std::string("\xff\xfe")})
+          std::string("{\"window_width\": 800}"), std::string("{\"theme\": 1}"), std::string("\xff\xfe")})
         EXPECT_EQ(read(text), KeptSettings()) << text.substr(0, 60);
     const KeptSettings partly = read("{\"text_scale\": 2, \"gain\": null, \"mode\": \"depth\"}");
     EXPECT_EQ(partly.text_scale, 2);
@@ -119,6 +119,20 @@ TEST(Message, AnEmptyNoteIsNotShown) {
     EXPECT_FALSE(message.expire(now + std::chrono::seconds(9)));
     EXPECT_TRUE(message.expire(now + std::chrono::seconds(10)));
     EXPECT_FALSE(message.expire(now + std::chrono::seconds(10)));
+}
+
+TEST(Message, AHintFades) {
+    const auto now = Message::Clock::now();
+    Message message;
+    message.hint_until = now + std::chrono::seconds(15);
+    EXPECT_EQ(message.hint_opacity(now), 1);
+    EXPECT_FALSE(message.expire(now));
+    EXPECT_NEAR(message.hint_opacity(now + std::chrono::seconds(14)), 0.5, 1e-3);
+    EXPECT_TRUE(message.expire(now + std::chrono::seconds(14)));
+    EXPECT_TRUE(message.hinting(now + std::chrono::seconds(14)));
+    EXPECT_TRUE(message.expire(now + std::chrono::seconds(15)));
+    EXPECT_FALSE(message.expire(now + std::chrono::seconds(16)));
+    EXPECT_EQ(message.hint_opacity(now + std::chrono::seconds(16)), 0);
 }
 
 TEST(Font, IsAUsualOneOrNone) {

@@ -36,7 +36,7 @@ inline constexpr const char* kThemes = "Dark\0Light\0";
 
 // The empty window.
 inline constexpr const char* kDropTitle = "Drop photos, a video or splats";
-inline constexpr const char* kDropExplanation = "a dataset or the folder of a training run works too";
+inline constexpr const char* kDropExplanation = "or a dataset, or a training run";
 inline constexpr const char *kOpenAFile = "Open a file", *kOpenAFolder = "Open a folder", *kRecent = "Recent",
                             *kKeysLine = "F1: keys";
 

@@ -15,6 +15,7 @@
 #include "viewer/editor/icons.h"
 #include "viewer/editor/texts.h"
 #include "viewer/editor/theme.h"
+#include "viewer/overlay.h"
 
 namespace ewa::viewer {
 namespace {
@@ -45,11 +46,8 @@ BarArea bar_area(const Rectangle& area) {
     const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
     const float x = 1 / std::max(scale.x, 1e-3f), y = 1 / std::max(scale.y, 1e-3f);
     const BarSizes sizes = bar_sizes(double(ImGui::GetTextLineHeight()) / double(y));
-    return {{float(area.x) * x, float(area.y) * y},
-            {float(area.x + area.width) * x, float(area.y + area.height) * y},
-            float(sizes.top) * y,
-            float(sizes.left) * x,
-            float(sizes.bottom) * y};
+    return {gui_point(area.x, area.y), gui_point(area.x + area.width, area.y + area.height),
+            float(sizes.top) * y, float(sizes.left) * x, float(sizes.bottom) * y};
 }
 
 bool begin_bar(const char* name, const ImVec2& low, const ImVec2& high) {

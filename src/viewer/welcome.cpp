@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+// The first things that a user sees: the card of an empty window, and the list of keys.
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/text.h"
+#include "viewer/editor/dialogs.h"
+#include "viewer/editor/icons.h"
+#include "viewer/editor/texts.h"
+#include "viewer/editor/theme.h"
+#include "viewer/overlay.h"
+
+namespace ewa::viewer {
+namespace {
+
+constexpr size_t kMostRecent = 5;
+// In heights of the text.
+constexpr float kCardWidth = 28, kHelpColumn = 31;
+
+/// Moves the cursor so that an item of this width is in the middle of the window.
+void center_item(float width) {
+    ImGui::SetCursorPosX(std::max(ImGui::GetStyle().WindowPadding.x, (ImGui::GetWindowWidth() - width) / 2));
+}
+
+/// Text in the middle of the window. It wraps where it is too wide.
+void center_text(const char* text, bool quiet) {
+    center_item(ImGui::CalcTextSize(text).x);
+    ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetColorU32(quiet ? ImGuiCol_TextDisabled : ImGuiCol_Text));
+    ImGui::TextWrapped("%s", text);
+    ImGui::PopStyleColor();
+}
+
+/// One line that is as large as the card allows.
+void draw_title(const char* text) {
+    ImGui::PushFont(ImGui::GetIO().Fonts->Fonts.back());  // the large one of Gui
+    const float room = ImGui::GetContentRegionAvail().x, width = ImGui::CalcTextSize(text).x;
+    ImGui::SetWindowFontScale(std::min(0.7f, room / std::max(1.0f, width)));
+    center_item(ImGui::CalcTextSize(text).x);
+    ImGui::TextUnformatted(text);
+    ImGui::SetWindowFontScale(1);
+    ImGui::PopFont();
+}
+
+void draw_open_buttons(Welcome& welcome) {
+    const ImGuiStyle& style = ImGui::GetStyle();
+    const float words = ImGui::CalcTextSize(texts::kOpenAFile).x + ImGui::CalcTextSize(texts::kOpenAFolder).x;
+    const bool beside =
+        words + 4 * style.FramePadding.x + style.ItemSpacing.x <= ImGui::GetContentRegionAvail().x;
+    if (beside) center_item(words + 4 * style.FramePadding.x + style.ItemSpacing.x);
+    ImGui::PushStyleColor(ImGuiCol_Button, accent());
+    ImGui::PushStyleColor(ImGuiCol_ButtonHovered, accent(0.9f));
+    ImGui::PushStyleColor(ImGuiCol_ButtonActive, accent(0.75f));
+    ImGui::PushStyleColor(ImGuiCol_Text, on_accent());
+    if (ImGui::Button(texts::kOpenAFile)) welcome.wanted = Wanted::file;
+    ImGui::PopStyleColor(4);
+    if (beside) ImGui::SameLine();
+    if (ImGui::Button(texts::kOpenAFolder)) welcome.wanted = Wanted::folder;
+}
+
+void draw_recent(Welcome& welcome) {
+    static std::vector<std::filesystem::path> recent;  // as of the time when the card appeared
+    if (ImGui::IsWindowAppearing()) recent = recent_files();
+    if (recent.empty()) return;
+    ImGui::Spacing();
+    ImGui::TextDisabled("%s", texts::kRecent);
+    for (size_t i = 0; i < std::min(recent.size(), kMostRecent); ++i) {
+        const std::filesystem::path& file = recent[i];
+        ImGui::PushID(int(i));
+        if (ImGui::Selectable(core::one_line(file.filename().string()).c_str())) welcome.file = file;
+        if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", core::one_line(file.string()).c_str());
+        ImGui::PopID();
+    }
+}
+
+void draw_help_group(const char* name, std::span<const texts::HelpRow> rows, float keys) {
+    ImGui::TextDisabled("%s", name);
+    if (!ImGui::BeginTable(name, 2, ImGuiTableFlags_SizingFixedFit)) return;
+    ImGui::TableSetupColumn("keys", ImGuiTableColumnFlags_WidthFixed, keys);
+    ImGui::TableSetupColumn("text", ImGuiTableColumnFlags_WidthStretch);
+    for (const texts::HelpRow& row : rows) {
+        ImGui::TableNextColumn();
+        ImGui::TextUnformatted(row.keys);
+        ImGui::TableNextColumn();
+        ImGui::PushTextWrapPos(0);
+        ImGui::TextUnformatted(row.text);
+        ImGui::PopTextWrapPos();
+    }
+    ImGui::EndTable();
+    ImGui::Spacing();
+}
+
+void draw_help_groups(int columns) {
+    std::vector<texts::HelpRow> tools;
+    for (const texts::ToolText& tool : texts::kTools)
+        if (*tool.key) tools.push_back({tool.key, tool.name});
+    float keys = 0;
+    for (const auto& rows : {std::span<const texts::HelpRow>(texts::kMoveHelp),
+                             std::span<const texts::HelpRow>(texts::kLookHelp),
+                             std::span<const texts::HelpRow>(texts::kFilesHelp)})
+        for (const texts::HelpRow& row : rows) keys = std::max(keys, ImGui::CalcTextSize(row.keys).x);
+    if (!ImGui::BeginTable("columns", columns, ImGuiTableFlags_SizingStretchSame)) return;
+    ImGui::TableNextColumn();
+    draw_help_group(texts::kMoveGroup, texts::kMoveHelp, keys);
+    draw_help_group(texts::kLookGroup, texts::kLookHelp, keys);
+    ImGui::TableNextColumn();
+    draw_help_group(texts::kToolsGroup, tools, keys);
+    draw_help_group(texts::kFilesGroup, texts::kFilesHelp, keys);
+    ImGui::EndTable();
+}
+
+}  // namespace
+
+Welcome draw_welcome(const Rectangle& area) {
+    Welcome welcome;
+    const ImVec2 low = gui_point(area.x, area.y), high = gui_point(area.x + area.width, area.y + area.height);
+    ImGui::GetBackgroundDrawList()->AddRectFilled(low, high, backdrop());
+    const float line = ImGui::GetTextLineHeight(), height = high.y - low.y;
+    const float width = std::clamp(high.x - low.x - line, line, kCardWidth * line);
+    ImGui::SetNextWindowPos({(low.x + high.x) / 2, (low.y + high.y) / 2}, ImGuiCond_Always, {0.5f, 0.5f});
+    ImGui::SetNextWindowSizeConstraints({width, 0}, {width, std::max(line, height)});
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(1.5f * line, 1.5f * line));
+    const bool open = ImGui::Begin("welcome", nullptr,
+                                   ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
+                                       ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
+                                       ImGuiWindowFlags_NoFocusOnAppearing);
+    if (open) {
+        if (height > 15 * line) {  // a low window has room for the rest alone
+            const float size = 3 * line;
+            center_item(size);
+            const ImVec2 at = ImGui::GetCursorScreenPos();
+            draw_icon(Icon::drop, {at.x + size / 2, at.y + size / 2}, size, accent());
+            ImGui::Dummy({size, size});
+        }
+        draw_title(texts::kDropTitle);
+        center_text(texts::kDropExplanation, true);
+        ImGui::Dummy({0, 0.3f * line});
+        draw_open_buttons(welcome);
+        draw_recent(welcome);
+        center_text(texts::kKeysLine, true);
+    }
+    ImGui::End();
+    ImGui::PopStyleVar();
+    return welcome;
+}
+
+void draw_help(bool& open) {
+    const ImVec2 room = ImGui::GetIO().DisplaySize;
+    const float line = ImGui::GetTextLineHeight();
+    const int columns = room.x > 2 * kHelpColumn * line ? 2 : 1;
+    const float width = std::max(line, std::min(room.x - line, float(columns) * kHelpColumn * line));
+    ImGui::SetNextWindowPos({room.x / 2, room.y / 2}, ImGuiCond_Always, {0.5f, 0.5f});
+    ImGui::SetNextWindowSizeConstraints({width, 0},
+                                        {width, std::max(line, room.y - line)});  // a longer list scrolls
+    ImGui::SetNextWindowBgAlpha(1);                                               // other text lies behind it
+    ImGui::PushStyleColor(ImGuiCol_WindowBg, ImGui::GetColorU32(ImGuiCol_PopupBg));
+    if (ImGui::Begin("Keys", &open,
+                     ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse |
+                         ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings)) {
+        draw_help_groups(columns);
+        // A click on a button elsewhere is that button's.
+        if (ImGui::IsMouseClicked(ImGuiMouseButton_Left) &&
+            !ImGui::IsWindowHovered(ImGuiHoveredFlags_ChildWindows) && !ImGui::IsAnyItemHovered())
+            open = false;
+    }
+    ImGui::End();
+    ImGui::PopStyleColor();
+}
+
+}  // namespace ewa::viewer
