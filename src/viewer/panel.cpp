@@ -24,7 +24,7 @@ struct Axis {
     glm::dvec3 axis;
 };
 constexpr int kNoteLines = 3;
-constexpr float kLabelWidth = 6.2f;  // in heights of the text
+constexpr float kLabelColumn = 6.2f;  // in heights of the text
 
 const std::array kAxes{Axis{"-y", {0, -1, 0}}, Axis{"+y", {0, 1, 0}}, Axis{"+z", {0, 0, 1}},
                        Axis{"-z", {0, 0, -1}}, Axis{"+x", {1, 0, 0}}, Axis{"-x", {-1, 0, 0}}};
@@ -44,12 +44,14 @@ void edit_background(const PanelFacts& facts, Look& look) {
     const bool shown = facts.picture && facts.picture->request.look.mode == look.mode;
     const bool color = look.mode == Mode::color || look.mode == Mode::ellipsoids;
     const bool depth = look.mode == Mode::depth || look.mode == Mode::median_depth;
-    if (!color && !(shown && (depth || look.mode == Mode::count))) return;
+    if (!color && !depth && look.mode != Mode::count) return;
     label_field(color ? "Background" : "Scale");
     if (color && look.sky)
         ImGui::TextUnformatted("the run's sky");
     else if (color)
         ImGui::ColorEdit3("##background", look.background.data(), ImGuiColorEditFlags_NoInputs);
+    else if (!shown)
+        ImGui::TextUnformatted("...");  // it is being rendered
     else if (depth)
         ImGui::Text("%.4g to %.4g", double(facts.picture->picture.dark),
                     double(facts.picture->picture.white));
@@ -292,7 +294,7 @@ float footer_height(const PanelFacts& facts) {
 void label_field(const char* label) {
     ImGui::AlignTextToFramePadding();
     ImGui::TextUnformatted(label);
-    ImGui::SameLine(kLabelWidth * ImGui::GetTextLineHeight());
+    ImGui::SameLine(kLabelColumn * ImGui::GetTextLineHeight());
     ImGui::SetNextItemWidth(-FLT_MIN);
 }
 

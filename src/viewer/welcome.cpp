@@ -18,7 +18,7 @@
 namespace ewa::viewer {
 namespace {
 
-constexpr size_t kMostRecent = 5;
+constexpr size_t kCardFiles = 5;
 // In heights of the text.
 constexpr float kCardWidth = 28, kHelpColumn = 31;
 
@@ -46,19 +46,26 @@ void draw_title(const char* text) {
     ImGui::PopFont();
 }
 
+/// The two buttons, beside each other where there is room.
 void draw_open_buttons(Welcome& welcome) {
     const ImGuiStyle& style = ImGui::GetStyle();
-    const float words = ImGui::CalcTextSize(texts::kOpenAFile).x + ImGui::CalcTextSize(texts::kOpenAFolder).x;
-    const bool beside =
-        words + 4 * style.FramePadding.x + style.ItemSpacing.x <= ImGui::GetContentRegionAvail().x;
-    if (beside) center_item(words + 4 * style.FramePadding.x + style.ItemSpacing.x);
+    const auto width = [&](const char* name) {
+        return ImGui::CalcTextSize(name).x + 2 * style.FramePadding.x;
+    };
+    const float file = width(texts::kOpenAFile), folder = width(texts::kOpenAFolder);
+    const float both = file + style.ItemSpacing.x + folder;
+    const bool beside = both <= ImGui::GetContentRegionAvail().x;
+    center_item(beside ? both : file);
     ImGui::PushStyleColor(ImGuiCol_Button, accent());
     ImGui::PushStyleColor(ImGuiCol_ButtonHovered, accent(0.9f));
     ImGui::PushStyleColor(ImGuiCol_ButtonActive, accent(0.75f));
     ImGui::PushStyleColor(ImGuiCol_Text, on_accent());
     if (ImGui::Button(texts::kOpenAFile)) welcome.wanted = Wanted::file;
     ImGui::PopStyleColor(4);
-    if (beside) ImGui::SameLine();
+    if (beside)
+        ImGui::SameLine();
+    else
+        center_item(folder);
     if (ImGui::Button(texts::kOpenAFolder)) welcome.wanted = Wanted::folder;
 }
 
@@ -68,7 +75,7 @@ void draw_recent(Welcome& welcome) {
     if (recent.empty()) return;
     ImGui::Spacing();
     ImGui::TextDisabled("%s", texts::kRecent);
-    for (size_t i = 0; i < std::min(recent.size(), kMostRecent); ++i) {
+    for (size_t i = 0; i < std::min(recent.size(), kCardFiles); ++i) {
         const std::filesystem::path& file = recent[i];
         ImGui::PushID(int(i));
         if (ImGui::Selectable(core::one_line(file.filename().string()).c_str())) welcome.file = file;
@@ -83,12 +90,12 @@ void draw_help_group(const char* name, std::span<const texts::HelpRow> rows, flo
     ImGui::TableSetupColumn("keys", ImGuiTableColumnFlags_WidthFixed, keys);
     ImGui::TableSetupColumn("text", ImGuiTableColumnFlags_WidthStretch);
     for (const texts::HelpRow& row : rows) {
-        ImGui::TableNextColumn();
-        ImGui::TextUnformatted(row.keys);
-        ImGui::TableNextColumn();
-        ImGui::PushTextWrapPos(0);
-        ImGui::TextUnformatted(row.text);
-        ImGui::PopTextWrapPos();
+        for (const char* text : {row.keys, row.text}) {
+            ImGui::TableNextColumn();
+            ImGui::PushTextWrapPos(0);
+            ImGui::TextUnformatted(text);
+            ImGui::PopTextWrapPos();
+        }
     }
     ImGui::EndTable();
     ImGui::Spacing();
@@ -103,6 +110,7 @@ void draw_help_groups(int columns) {
                              std::span<const texts::HelpRow>(texts::kLookHelp),
                              std::span<const texts::HelpRow>(texts::kFilesHelp)})
         for (const texts::HelpRow& row : rows) keys = std::max(keys, ImGui::CalcTextSize(row.keys).x);
+    keys = std::min(keys + 1, 0.4f * ImGui::GetContentRegionAvail().x / float(columns));  // longer ones wrap
     if (!ImGui::BeginTable("columns", columns, ImGuiTableFlags_SizingStretchSame)) return;
     ImGui::TableNextColumn();
     draw_help_group(texts::kMoveGroup, texts::kMoveHelp, keys);
@@ -123,7 +131,8 @@ Welcome draw_welcome(const Rectangle& area) {
     const float width = std::clamp(high.x - low.x - line, line, kCardWidth * line);
     ImGui::SetNextWindowPos({(low.x + high.x) / 2, (low.y + high.y) / 2}, ImGuiCond_Always, {0.5f, 0.5f});
     ImGui::SetNextWindowSizeConstraints({width, 0}, {width, std::max(line, height)});
-    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(1.5f * line, 1.5f * line));
+    const float margin = std::min(1.5f * line, 0.08f * height);
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(margin, margin));
     const bool open = ImGui::Begin("welcome", nullptr,
                                    ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
                                        ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |

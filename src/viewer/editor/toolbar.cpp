@@ -73,18 +73,20 @@ float bar_length(const BarButtons& buttons, size_t count, float side) {
     return length;
 }
 
-/// The side of the buttons, and how many of them fit. The others go behind one more button.
+/// The side of the buttons, and how many of them fit. The others are behind one more button.
 struct BarFit {
     float side;
     size_t shown;
+    float length;  // of all that is drawn
 };
 BarFit fit_bar(const BarButtons& buttons, float room) {
-    const float side = kButtonSide * ImGui::GetTextLineHeight();
-    for (const float share : {1.0f, kSmall})
-        if (bar_length(buttons, buttons.size(), share * side) <= room) return {share * side, buttons.size()};
+    const float usual = kButtonSide * ImGui::GetTextLineHeight(), small = kSmall * usual;
+    for (const float side : {usual, small})
+        if (const float length = bar_length(buttons, buttons.size(), side); length <= room)
+            return {side, buttons.size(), length};
     size_t shown = buttons.size();
-    while (shown > 0 && bar_length(buttons, shown, kSmall * side) + kSmall * side > room) --shown;
-    return {kSmall * side, shown};
+    while (shown > 0 && bar_length(buttons, shown, small) + small > room) --shown;
+    return {small, shown, bar_length(buttons, shown, small) + small};
 }
 
 std::string bar_tooltip(const texts::ButtonText& text) {
@@ -112,6 +114,7 @@ void draw_buttons(const BarButtons& buttons, const BarFit& fit, ImVec2 at, bool 
     const float side = fit.side, inset = (breadth - side) / 2;
     float& along = down ? at.y : at.x;
     (down ? at.x : at.y) += inset;
+    ImGui::PushID(buttons.front().text.name);
     for (size_t i = 0; i < fit.shown; ++i) {
         if (buttons[i].apart) {
             const float middle = along + side * (kGroupGap - kButtonGap) / 2, cut = 0.15f * side;
@@ -127,9 +130,9 @@ void draw_buttons(const BarButtons& buttons, const BarFit& fit, ImVec2 at, bool 
         if (button.menu) button.menu();
         along += side * (1 + kButtonGap);
     }
-    if (fit.shown == buttons.size()) return;
     ImGui::SetCursorScreenPos(at);
-    draw_more(buttons, fit.shown, side);
+    if (fit.shown < buttons.size()) draw_more(buttons, fit.shown, side);
+    ImGui::PopID();
 }
 
 std::function<void()> setter(bool& wanted) {
@@ -175,12 +178,10 @@ void draw_top(Editor& editor, const BarFacts& facts, const BarArea& area, BarAct
         const BarButtons left = top_buttons(editor, facts, actions);
         const float margin = (area.left - kButtonSide * ImGui::GetTextLineHeight()) / 2;
         const float room = high.x - area.low.x - 2 * margin;
-        const BarFit right_fit = fit_bar(right, 0.4f * room);
-        const float right_length = bar_length(right, right.size(), right_fit.side);
-        const BarFit left_fit = fit_bar(left, room - right_length);
+        const BarFit right_fit = fit_bar(right, 0.4f * room),
+                     left_fit = fit_bar(left, room - right_fit.length);
         draw_buttons(left, left_fit, {area.low.x + margin, area.low.y}, false, area.top);
-        if (left_fit.shown == left.size() || right_fit.shown == right.size())
-            draw_buttons(right, right_fit, {high.x - margin - right_length, area.low.y}, false, area.top);
+        draw_buttons(right, right_fit, {high.x - margin - right_fit.length, area.low.y}, false, area.top);
         if (editor.busy() || editor.saving()) draw_busy(area.low, high);
     }
     ImGui::End();
