@@ -36,17 +36,13 @@ double opacity_of(const Gaussians& g, size_t i) {
     return 1 / (1 + std::exp(-double(g.opacity_logits[i])));
 }
 
-struct Column {
-    const char* name;
-    double (*value)(const Gaussians&, size_t);
-};
 constexpr Column kColumns[] = {
     {"x", [](const Gaussians& g, size_t i) { return g.world_mean(i).x; }},
     {"y", [](const Gaussians& g, size_t i) { return g.world_mean(i).y; }},
     {"z", [](const Gaussians& g, size_t i) { return g.world_mean(i).z; }},
     {"opacity", opacity_of},
-    {"scale", [](const Gaussians& g, size_t i) { return scale_of(g, i, true); }},
-    {"thickness", [](const Gaussians& g, size_t i) { return scale_of(g, i, false); }},
+    {"scale", [](const Gaussians& g, size_t i) { return scale_of(g, i, true); }, true},
+    {"thickness", [](const Gaussians& g, size_t i) { return scale_of(g, i, false); }, true},
     {"red", [](const Gaussians& g, size_t i) { return color_of(g, i, 0); }},
     {"green", [](const Gaussians& g, size_t i) { return color_of(g, i, 1); }},
     {"blue", [](const Gaussians& g, size_t i) { return color_of(g, i, 2); }},
@@ -110,8 +106,6 @@ Filter parse_box(const std::string& text, const std::string& what) {
     };
 }
 
-constexpr const char* kViews = "views";
-
 Filter filter_of(const Column& column, const Range& range) {
     return [=](const Gaussians& g, const Cameras&) {
         return splats_with(g, [&](size_t i) { return range.has(column.value(g, i)); });
@@ -131,6 +125,10 @@ Filter filter_of_views(const Range& range, const std::string& what) {
 }
 
 }  // namespace
+
+std::span<const Column> columns() {
+    return kColumns;
+}
 
 Filter parse_filter(const std::string& text, const std::string& what) {
     const size_t equals = std::min(text.find('='), text.size());

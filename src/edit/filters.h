@@ -2,6 +2,7 @@
 // Filters, which decide for each splat of a scene whether it stays.
 #pragma once
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,17 @@ using Cameras = std::function<std::vector<Camera>()>;
 
 /// Returns for each splat whether it stays.
 using Filter = std::function<std::vector<bool>(const Gaussians&, const Cameras&)>;
+
+/// What a filter COLUMN=LOW..HIGH compares.
+struct Column {
+    const char* name;
+    double (*value)(const Gaussians&, size_t);  // of a splat
+    bool decades = false;                       // the values spread over powers of ten
+};
+/// All columns but kViews.
+std::span<const Column> columns();
+/// The column whose values depend on cameras: scene::views_of_splats.
+inline constexpr const char* kViews = "views";
 
 /// Parses a filter of --where. Throws InputError that begins with `what`.
 ///   COLUMN=LOW..HIGH   a range of x, y, z, opacity, scale (the largest), thickness (the smallest), red, green, blue, or of the number of
