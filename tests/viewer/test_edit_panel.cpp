@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the panel of edits computes: bins of histograms, and the words of edits.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numeric>
+#include <sstream>
+
+#include "edit/steps.h"
+#include "ewa/error.h"
+#include "viewer/editor/edit_words.h"
+#include "viewer/editor/histogram.h"
+
+namespace ewa::viewer {
+namespace {
+
+using edit::Adjustment;
+
+/// 0, 1, ..., n - 1.
+std::vector<double> counting(size_t n) {
+    std::vector<double> values(n);
+    std::iota(values.begin(), values.end(), 0.0);
+    return values;
+}
+
+uint32_t total(const std::vector<uint32_t>& counts) {
+    return std::accumulate(counts.begin(), counts.end(), 0u);
+}
+
+TEST(Histogram, CountsWhatIsLeftAndWhatIsSelected) {
+    std::vector<double> values = counting(512);
+    values.push_back(std::numeric_limits<double>::quiet_NaN());
+    std::vector<uint8_t> states(values.size(), 0);
+    states[0] = edit::kDeleted | edit::kSelected;
+    states[1] = edit::kSelected;
+    states[511] = edit::kSelected | edit::kHidden;
+    const Histogram bins = histogram({"x"}, values, states);
+    ASSERT_EQ(bins.bins(), kMostBins);
+    EXPECT_EQ(bins.low, 1);
+    EXPECT_EQ(bins.high, 511);
+    EXPECT_EQ(total(bins.left), 511u);
+    EXPECT_EQ(total(bins.selected), 2u);
+    EXPECT_EQ(bins.selected.front(), 1u);
+    EXPECT_EQ(bins.selected.back(), 1u);
+    for (const uint32_t count : bins.left) EXPECT_LE(count, 3u);
+}
+
+TEST(Histogram, FarValuesAreInTheOutermostBins) {
+    std::vector<double> values = counting(10'000);
+    values[5] = -1e9;
+    values[6] = 1e9;
+    values[7] = std::numeric_limits<double>::infinity();
+    const Histogram bins = histogram({"x"}, values, std::vector<uint8_t>(values.size(), 0));
+    EXPECT_GT(bins.low, -100);
+    EXPECT_LT(bins.high, 10'100);
+    EXPECT_EQ(total(bins.left), 10'000u);
+    EXPECT_EQ(range_of_bins(bins, 0, kMostBins - 1), "x=-inf..inf");
+    EXPECT_TRUE(range_of_bins(bins, 0, 10).starts_with("x=.."));
+    EXPECT_TRUE(range_of_bins(bins, 10, kMostBins - 1).ends_with(".."));
+}
+
+TEST(Histogram, TheRangeOfBinsTakesTheirSplats) {
+    Gaussians splats;
+    splats.resize(1000);
+    for (size_t i = 0; i < splats.size(); ++i) splats.means[3 * i] = float(0.37 * double(i * i % 1000));
+    const Histogram bins = histogram({"x"}, column_values("x", splats, {}), {});
+    for (const auto& [first, last] : {std::pair<size_t, size_t>{0, 9}, {17, 17}, {30, 200}, {250, 255}}) {
+        const auto taken = edit::parse_filter(range_of_bins(bins, first, last), "range")(splats, {});
+        uint32_t expected = 0;
+        for (size_t bin = first; bin <= last; ++bin) expected += bins.left[bin];
+        EXPECT_EQ(std::count(taken.begin(), taken.end(), true), expected) << first << " to " << last;
+    }
+}
+
+TEST(Histogram, DecadesHaveEqualWidths) {
+    const Histogram bins = histogram({.name = "scale", .decades = true}, {0, 0.01, 0.1, 1, 10, 100}, {});
+    EXPECT_NEAR(bins.border(0), 0.01, 1e-12);
+    EXPECT_NEAR(bins.border(kMostBins / 2), 1, 1e-12);
+    EXPECT_NEAR(bins.border(kMostBins), 100, 1e-9);
+    EXPECT_EQ(bins.left.front(), 2u) << "a flat splat counts as a small one";
+}
+
+TEST(Histogram, WholeNumbersHaveABinEach) {
+    const Histogram bins = histogram({.name = "views", .whole = true}, {2, 3, 3, 7}, {});
+    EXPECT_EQ(bins.left, (std::vector<uint32_t>{1, 2, 0, 0, 0, 1}));
+    EXPECT_EQ(range_of_bins(bins, 1, 2), "views=3..4");
+    EXPECT_EQ(range_of_bins(bins, 0, 1), "views=..3");
+}
+
+TEST(Histogram, NoValuesAndEqualValuesHaveBinsToo) {
+    EXPECT_EQ(total(histogram({"x"}, {}, {}).left), 0u);
+    const Histogram same = histogram({"x"}, {5, 5, 5}, {});
+    EXPECT_LT(same.low, 5);
+    EXPECT_GT(same.high, 5);
+    EXPECT_EQ(total(same.left), 3u);
+}
+
+TEST(Histogram, ColumnsAreThoseOfFilters) {
+    Gaussians splats;
+    splats.resize(1);
+    splats.quaternions[0] = 1;
+    for (const HistogramColumn& column : histogram_columns(false)) {
+        EXPECT_EQ(column_values(column.name, splats, {}).size(), 1u) << column.name;
+        EXPECT_NO_THROW(edit::parse_filter(column.name + "=0..", "")) << column.name;
+    }
+    EXPECT_EQ(histogram_columns(true).back().name, edit::kViews);
+    EXPECT_THROW(column_values(edit::kViews, splats, {}), InputError);
+    EXPECT_THROW(column_values("width", splats, {}), InputError);
+}
+
+/// A colour after an adjustment, from its formula.
+std::array<double, 4> adjusted(const Adjustment& a, std::array<double, 4> color) {
+    for (size_t c = 0; c < 3; ++c) {
+        color[c] = color[c] * double(a.tint[c]) + double(a.brightness);
+        color[c] = ((color[c] - 0.5) * double(a.contrast) + 0.5) / double(a.white);
+    }
+    color[3] *= double(a.opacity);
+    return color;
+}
+
+/// The adjustment of a text that adjustment_text() has written.
+Adjustment read(const std::string& text) {
+    Adjustment result;
+    std::istringstream parts(text);
+    for (std::string part; std::getline(parts, part, ';');) {
+        const size_t equals = part.find('=');
+        const std::string name = part.substr(0, equals);
+        std::istringstream numbers(part.substr(equals + 1));
+        char comma = 0;
+        auto& [red, green, blue] = result.tint;
+        if (name == "tint") numbers >> red >> comma >> green >> comma >> blue;
+        if (name == "brightness") numbers >> result.brightness;
+        if (name == "contrast") numbers >> result.contrast;
+        if (name == "white") numbers >> result.white;
+        if (name == "opacity") numbers >> result.opacity;
+    }
+    return result;
+}
+
+TEST(AdjustmentEdits, LeadFromOneAdjustmentToTheOther) {
+    const std::array<Adjustment, 6> all{Adjustment{},
+                                        {.tint = {0.5f, 1, 0.25f}},
+                                        {.brightness = -0.2f, .opacity = 0.5f},
+                                        {.contrast = 1.5f, .white = 0.8f},
+                                        {.tint = {1, 0.7f, 0.9f}, .brightness = 0.1f, .contrast = 0.6f},
+                                        {.tint = {0.9f, 0.9f, 0.9f}, .white = 2, .opacity = 0.1f}};
+    for (const Adjustment& from : all)
+        for (const Adjustment& to : all) {
+            const std::array<double, 4> color{0.9, 0.4, -0.1, 0.3};
+            std::array<double, 4> now = adjusted(from, color);
+            const auto edits = adjustment_edits(from, to);
+            EXPECT_LE(edits.size(), 2u);
+            EXPECT_EQ(edits.empty(), from == to);
+            for (const edit::Words& words : edits) {
+                EXPECT_EQ(words.name, "adjust");
+                now = adjusted(read(words.value), now);
+            }
+            for (size_t c = 0; c < 4; ++c) EXPECT_NEAR(now[c], adjusted(to, color)[c], 1e-6);
+        }
+}
+
+TEST(AdjustmentEdits, SpeakOfWhatChangesAlone) {
+    EXPECT_EQ(adjustment_text({}), "");
+    EXPECT_EQ(adjustment_text({.tint = {1, 0.5f, 0.25f}, .opacity = 0.5f}), "tint=1,0.5,0.25;opacity=0.5");
+    const Adjustment bright{.brightness = 0.25f};
+    EXPECT_EQ(adjustment_edits({}, bright), (std::vector<edit::Words>{{"adjust", "brightness=0.25"}}));
+    EXPECT_EQ(adjustment_edits(bright, {}), (std::vector<edit::Words>{{"adjust", "brightness=-0.25"}}));
+    EXPECT_EQ(adjustment_edits(bright, {.brightness = 0.25f, .opacity = 0.5f}),
+              (std::vector<edit::Words>{{"adjust", "opacity=0.5"}}));
+}
+
+TEST(PlacementText, MovesTurnsAndScalesAboutThePoint) {
+    const glm::dvec3 about(3, -2, 7);
+    EXPECT_EQ(placement_text(about, {.position = about}), "");
+    EXPECT_EQ(placement_text(about, {.position = {4, -2, 6.5}}), "move=1,0,-0.5");
+    const Placement placement{.position = {1, 2, 3}, .degrees = {90, 0, 90}, .scale = 2};
+    const glm::dmat4 matrix = edit::parse_transform({placement_text(about, placement)});
+    EXPECT_NEAR(glm::length(glm::dvec3(matrix * glm::dvec4(about, 1)) - placement.position), 0, 1e-9);
+    // About x, y becomes z, which the turn about z leaves; about z, x becomes y.
+    EXPECT_NEAR(glm::length(glm::dvec3(matrix[1]) - glm::dvec3(0, 0, 2)), 0, 1e-9);
+    EXPECT_NEAR(glm::length(glm::dvec3(matrix[0]) - glm::dvec3(0, 2, 0)), 0, 1e-9);
+}
+
+TEST(PasteShape, TakesABoxOrASphere) {
+    EditSettings settings;
+    EXPECT_TRUE(paste_shape(" box = -1,-2,-3,4,5,6\n", settings));
+    EXPECT_EQ(settings.box_low, glm::dvec3(-1, -2, -3));
+    EXPECT_EQ(settings.box_high, glm::dvec3(4, 5, 6));
+    EXPECT_TRUE(paste_shape("sphere=1,2,3,0.5", settings));
+    EXPECT_EQ(settings.sphere_center, glm::dvec3(1, 2, 3));
+    EXPECT_EQ(settings.sphere_radius, 0.5);
+    const EditSettings before = settings;
+    for (const char* text :
+         {"", "box", "box=1,2,3", "box=4,0,0,1,1,1", "sphere=1,2,3,0", "sphere=1,2,nan,1", "opacity=0..1"})
+        EXPECT_FALSE(paste_shape(text, settings)) << text;
+    EXPECT_EQ(settings.box_low, before.box_low);
+    EXPECT_EQ(settings.sphere_radius, before.sphere_radius);
+}
+
+}  // namespace
+}  // namespace ewa::viewer
