@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/mat3x3.hpp>
+#include <initializer_list>
+#include <utility>
 
 #include "core/typing.h"
 #include "edit/steps.h"
@@ -23,8 +25,13 @@ Tone tone_of(const edit::Adjustment& a) {
     return {contrast / white, ((double(a.brightness) - 0.5) * contrast + 0.5) / white};
 }
 
-edit::Words adjust(const edit::Adjustment& adjustment) {
-    return {"adjust", adjustment_text(adjustment)};
+/// The edits of adjustments that have an effect.
+std::vector<edit::Words> adjust(std::initializer_list<edit::Adjustment> adjustments) {
+    std::vector<edit::Words> edits;
+    for (const edit::Adjustment& adjustment : adjustments)
+        if (std::string text = adjustment_text(adjustment); !text.empty())
+            edits.push_back({"adjust", std::move(text)});
+    return edits;
 }
 
 }  // namespace
@@ -52,14 +59,14 @@ std::vector<edit::Words> adjustment_edits(const edit::Adjustment& from, const ed
         change.brightness = to.brightness;
         change.contrast = to.contrast;
         change.white = to.white;
-        return {adjust(change)};
+        return adjust({change});
     }
     const auto& [red, green, blue] = change.tint;
     if (red == green && green == blue) {
         const double factor = double(red) * after.factor / before.factor;
         change.tint.fill(float(factor));
         change.brightness = float(after.offset - factor * before.offset);
-        return {adjust(change)};
+        return adjust({change});
     }
     // Offsets would differ between the channels: back to no tone, then to the new one.
     edit::Adjustment back;
@@ -68,7 +75,7 @@ std::vector<edit::Words> adjustment_edits(const edit::Adjustment& from, const ed
     change.brightness = to.brightness;
     change.contrast = to.contrast;
     change.white = to.white;
-    return {adjust(back), adjust(change)};
+    return adjust({back, change});
 }
 
 std::string placement_text(const glm::dvec3& about, const Placement& placement) {

@@ -103,4 +103,102 @@ inline constexpr ToolText kTools[] = {
     {Tool::origin, "Origin", "", "Click the point that becomes 0, 0, 0"},
 };
 
+// The panel.
+namespace edit_panel {
+
+/// A control: its name, and its tooltip.
+struct Item {
+    const char* name;
+    const char* hint = "";
+};
+inline constexpr Item kSelection{"Selection", "Which splats the edits below change"},
+    kMove{"Move", "Numbers for the selection, or for everything if nothing is selected"},
+    kColours{"Colours", "Of the selection, or of everything if nothing is selected"},
+    kClean{"Clean", "Finds splats that no scene needs"}, kHistogram{"Histogram", "Select splats by a value"},
+    kScenes{"Scenes", "The files that are open together"},
+    kHistory{"History", "All edits; a click goes there"};
+inline constexpr const char *kNoScene = "Open splats to edit them.",
+                            *kLive = "Edits go to the training: pause it, edit, go on.";
+
+// Selection.
+inline constexpr Item kAll{"All", "Select all splats (Ctrl+A)"},
+    kNone{"None", "Select nothing (Ctrl+Shift+A)"}, kInvert{"Invert", "Select the others (Ctrl+I)"};
+inline constexpr Item kOperations[] = {{"Set", "A new shape replaces the selection"},
+                                       {"Add", "A new shape joins the selection (Shift)"},
+                                       {"Remove", "A new shape leaves the selection (Ctrl)"},
+                                       {"Intersect", "Only what is also in a new shape stays (Shift+Ctrl)"}};
+inline constexpr Item kFront{"Front only", "Only splats that others do not cover"},
+    kExtent{"By extent", "A splat counts if any part of it is in the shape, not its centre alone"},
+    kBrush{"Brush", "Radius of the brush ([ and ])"},
+    kTolerance{"Tolerance", "How far colours may differ, for Flood and Eyedropper"},
+    kDistance{"Distance", "By how much to grow or shrink, world units"},
+    kGrow{"Grow", "Also select what is within the distance"},
+    kShrink{"Shrink", "Deselect what is within the distance of other splats"};
+inline constexpr Item kLock{"Lock", "The selection is drawn, and no edit changes it"},
+    kUnlock{"Unlock all", "Edits change locked splats again"},
+    kHide{"Hide", "The selection is not drawn (H)"}, kShow{"Show all", "Draw hidden splats again (Shift+H)"},
+    kDelete{"Delete", "Remove the selection (Del). Undo brings it back"},
+    kDuplicate{"Duplicate", "Copy the selection, and select the copy (Ctrl+D)"},
+    kSeparate{"Separate", "Make the selection a scene of its own"},
+    kReset{"Reset", "Give the selection the values of the file back"},
+    kFreeze{"Freeze", "The training changes the selection no more"};
+// Braces are numbers, as in {fmt}.
+inline constexpr const char *kSelectedOf = "{} of {} splats selected", *kLockedToo = ", {} locked",
+                            *kHiddenToo = ", {} hidden";
+inline constexpr const char *kSelectAll = "Select all", *kSelectNone = "Select none",
+                            *kSelectOthers = "Invert the selection", *kGrowTitle = "Grow the selection",
+                            *kShrinkTitle = "Shrink the selection";
+inline constexpr Item kBoxLow{"Low corner of the box", "World units"},
+    kBoxHigh{"High corner of the box", "World units"}, kCentre{"Centre of the sphere", "World units"},
+    kRadius{"Radius", "World units"}, kCopy{"Copy", "Copy the numbers as text"},
+    kPaste{"Paste", "Take the numbers of a text: box=... or sphere=..."},
+    kWholeScene{"Whole scene", "Around all splats"}, kAroundSelection{"Selection", "Around the selection"},
+    kSelect{"Select", "Select what is inside (Enter)"}, kCrop{"Crop", "Delete all that is outside"};
+
+// Move and colours.
+inline constexpr Item kPosition{"Position of the middle", "World units. Enter applies"},
+    kTurn{"Turn about x, y, z", "Degrees, about the middle. Enter applies"},
+    kScale{"Scale", "Factor, about the middle. Enter applies"}, kApply{"Apply", "Make these changes (Enter)"};
+inline constexpr Item kAxes[] = {{"World", "Arrows and rings follow the world's axes"},
+                                 {"Local", "Arrows and rings follow the selection's axes"}};
+inline constexpr const char* kWholeSceneTools = "The whole scene: level it, set its unit, choose its origin";
+inline constexpr Item kTint{"Tint", "Factor of each channel"},
+    kBrightness{"Brightness", "Added to all channels"}, kContrast{"Contrast", "Factor about the middle grey"},
+    kWhite{"White point", "The value that becomes white"}, kOpacity{"Opacity", "Factor of the opacity"},
+    kNeutral{"Reset colours", "Take back what these controls have changed"};
+
+// Clean.
+inline constexpr Item kCleanUp{"Clean up", "Shows floaters in red first, then removes them"},
+    kPreview{"Preview", "Show in red what would be removed"}, kRemove{"Remove", "Delete these splats"},
+    kCancel{"Cancel", "Keep them"};
+inline constexpr Item kFloaters{"Floaters", "Groups of fewer than 10 splats that touch nothing else"},
+    kFar{"Far clusters", "All but the largest group of splats that touch"},
+    kFewViews{"Seen by fewer than", "Splats that fewer photos than this see"},
+    kFaint{"Almost transparent", "Splats with an opacity below this"},
+    kLarge{"Too large", "Splats with a larger standard deviation than this, world units"};
+inline constexpr const char *kWouldRemove = "would remove", *kPart = "{} splats ({:.2g} %)",
+                            *kFinding = "looking ...", *kNothingFound = "nothing to remove";
+
+inline constexpr const char *kRemoveFloaters = "Remove floaters", *kRemoveFar = "Remove far clusters",
+                            *kRemoveFewViews = "Remove rarely seen splats",
+                            *kRemoveFaint = "Remove almost transparent splats",
+                            *kRemoveLarge = "Remove large splats";
+
+// Histogram.
+inline constexpr Item kColumn{"Values", "What is counted"};
+inline constexpr Item kCounts[] = {{"Linear", "Heights are counts"},
+                                   {"Log", "Heights are logarithms of counts"}};
+inline constexpr const char *kDragRange = "drag a range to select it", *kCounting = "counting ...",
+                            *kBin = "{:.4g} to {:.4g}: {} splats, {} selected";
+
+// Scenes and history.
+inline constexpr const char *kShowScene = "Show or hide", *kUnsaved = "has edits that are not saved",
+                            *kCloseScene = "Close", *kCloseQuestion = "Close without saving its edits?",
+                            *kBeginning = "Opened", *kMemory = "{:.1f} MiB, last edit {:.0f} ms";
+inline constexpr Item kDiscard{"Discard edits", "Close the scene; its edits are lost"};
+inline constexpr Item kCopyCommand{"Copy as command",
+                                   "The line of ewa convert that does the same to the file"};
+
+}  // namespace edit_panel
+
 }  // namespace ewa::viewer::texts

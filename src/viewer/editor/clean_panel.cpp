@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <imgui.h>
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cfloat>
+#include <cmath>
+#include <utility>
+
+#include "core/text.h"
+#include "viewer/editor/panel_controls.h"
+#include "viewer/editor/panel_sections.h"
+
+namespace ewa::viewer {
+namespace {
+
+constexpr const char* kFloatersShape = "floaters";
+constexpr double kLargeFactor = 20;  // of the median: the first limit of large splats
+constexpr size_t kScaleSamples = 10'000;
+
+/// A scale that few splats exceed.
+float large_scale(const Gaussians& splats) {
+    std::vector<float> scales;
+    for (size_t i = 0; i < splats.size(); i += 1 + splats.size() / kScaleSamples)
+        scales.push_back(
+            std::max({splats.log_scales[3 * i], splats.log_scales[3 * i + 1], splats.log_scales[3 * i + 2]}));
+    std::erase_if(scales, [](float scale) { return !std::isfinite(scale); });
+    if (scales.empty()) return 1;
+    const auto middle = scales.begin() + std::ptrdiff_t(scales.size() / 2);
+    std::nth_element(scales.begin(), middle, scales.end());
+    return float(kLargeFactor * std::exp(double(*middle)));
+}
+
+/// "1,234 splats (0.12 %)".
+std::string part_text(size_t count, size_t of) {
+    return fmt::format(say::kPart, core::grouped(count), of > 0 ? 100.0 * double(count) / double(of) : 0.0);
+}
+
+}  // namespace
+
+void CleanSection::end(Editor& editor) {
+    if (previewed_.empty()) return;
+    previewed_.clear();
+    rule_ = {};
+    editor.preview("");
+}
+
+void CleanSection::preview(Editor& editor, const std::string& shape) {
+    previewed_ = shape;
+    editor.preview(shape);
+}
+
+void CleanSection::remove(Editor& editor, const char* title, const std::string& shape) {
+    end(editor);
+    editor.perform({title, {{"select", shape}, {"delete", ""}}});
+}
+
+/// One button: shows the floaters, then removes them.
+void CleanSection::draw_main(Editor& editor) {
+    ImGui::PushID("main");
+    const auto count = editor.preview_count();
+    if (rule_ != say::kCleanUp.name) {
+        if (ui::button_line({{say::kCleanUp, true, ui::ButtonLook::chosen}}) == 0) {
+            rule_ = say::kCleanUp.name;
+            preview(editor, kFloatersShape);
+        }
+    } else {
+        const std::string text = !count        ? say::kFinding
+                                 : *count == 0 ? say::kNothingFound
+                                               : fmt::format("{} {}", say::kRemove.name,
+                                                             part_text(*count, editor.snapshot().left));
+        const bool found = count.value_or(0) > 0;
+        switch (
+            ui::button_line({{{text.c_str()}, found, found ? ui::ButtonLook::danger : ui::ButtonLook::plain},
+                             {say::kCancel}})) {
+            case 0:
+                remove(editor, say::kRemoveFloaters, kFloatersShape);
+                break;
+            case 1:
+                end(editor);
+                break;
+        }
+    }
+    ImGui::PopID();
+}
+
+void CleanSection::draw_rule(Editor& editor, const ui::Text& text, const char* title,
+                             const std::string& shape) {
+    const bool shown = rule_ == text.name;
+    ImGui::PushID(text.name);
+    switch (ui::button_line({{say::kPreview, true, shown ? ui::ButtonLook::chosen : ui::ButtonLook::plain},
+                             {say::kRemove, true, ui::ButtonLook::danger}})) {
+        case 0:
+            end(editor);
+            if (shown) break;
+            rule_ = text.name;
+            preview(editor, shape);
+            break;
+        case 1:
+            remove(editor, title, shape);
+            break;
+    }
+    if (shown && rule_ == text.name) {
+        // A number is dragged: the preview follows when it rests.
+        if (shape != previewed_ && !ImGui::IsAnyItemActive()) preview(editor, shape);
+        if (const auto count = editor.preview_count())
+            ImGui::TextWrapped("%s %s", say::kWouldRemove, part_text(*count, editor.snapshot().left).c_str());
+        else
+            ImGui::TextDisabled("%s", say::kFinding);
+    }
+    ImGui::PopID();
+}
+
+void CleanSection::draw(Editor& editor) {
+    const EditSnapshot& now = editor.snapshot();
+    if (version_ != now.version || scene_ != editor.active()) end(editor);
+    if (scene_ != editor.active()) scale_ = 0;
+    version_ = now.version;
+    scene_ = editor.active();
+    if (scale_ == 0) scale_ = large_scale(*now.splats);
+    ImGui::PushID("clean");
+    draw_main(editor);
+    ui::caption(say::kFloaters);
+    draw_rule(editor, say::kFloaters, say::kRemoveFloaters, kFloatersShape);
+    ui::caption(say::kFar);
+    draw_rule(editor, say::kFar, say::kRemoveFar, "far");
+    if (cameras_of(editor)) {
+        ui::label_left(say::kFewViews);
+        ImGui::SliderInt("##views", &views_, 1, 20, "%d", ImGuiSliderFlags_AlwaysClamp);
+        draw_rule(editor, say::kFewViews, say::kRemoveFewViews,
+                  fmt::format("{}=..{}", edit::kViews, views_ - 1));
+    }
+    ui::slider(say::kFaint, opacity_, 0.001f, 1, "%.3f", true);
+    draw_rule(editor, say::kFaint, say::kRemoveFaint, fmt::format("opacity=..{}", opacity_));
+    ui::label_left(say::kLarge);
+    ImGui::InputFloat("##scale", &scale_, 0, 0, "%.4g");
+    if (!(scale_ > 0)) scale_ = FLT_MIN;
+    draw_rule(editor, say::kLarge, say::kRemoveLarge, fmt::format("scale={}..", scale_));
+    ImGui::PopID();
+}
+
+}  // namespace ewa::viewer

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "viewer/editor/panel_controls.h"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <cfloat>
+#include <string>
+#include <vector>
+
+#include "viewer/editor/theme.h"
+
+namespace ewa::viewer::ui {
+namespace {
+
+constexpr float kLabelWidth = 5.5f, kHintWidth = 18;  // heights of the text
+constexpr float kChosenOpacity = 0.35f;               // of the accent behind a chosen button
+
+/// A colour of the style in red, as light as it was.
+ImVec4 reddish(ImGuiCol color) {
+    const ImVec4& plain = ImGui::GetStyleColorVec4(color);
+    float hue = 0, saturation = 0, value = 0;
+    ImGui::ColorConvertRGBtoHSV(plain.x, plain.y, plain.z, hue, saturation, value);
+    ImVec4 red(0, 0, 0, plain.w);
+    ImGui::ColorConvertHSVtoRGB(0, 0.45f, std::max(0.35f, value), red.x, red.y, red.z);
+    return red;
+}
+
+void push_look(ButtonLook look) {
+    for (const ImGuiCol color : {ImGuiCol_Button, ImGuiCol_ButtonHovered, ImGuiCol_ButtonActive}) {
+        if (look == ButtonLook::danger)
+            ImGui::PushStyleColor(color, reddish(color));
+        else if (look == ButtonLook::chosen)
+            ImGui::PushStyleColor(color, ImU32(accent(kChosenOpacity)));
+        else
+            ImGui::PushStyleColor(color, ImGui::GetStyleColorVec4(color));
+    }
+}
+
+}  // namespace
+
+void show_hint(const char* hint) {
+    if (!*hint || !ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) return;
+    ImGui::BeginTooltip();
+    ImGui::PushTextWrapPos(kHintWidth * ImGui::GetTextLineHeight());
+    ImGui::TextUnformatted(hint);
+    ImGui::PopTextWrapPos();
+    ImGui::EndTooltip();
+}
+
+bool section(const Text& text, bool open_at_first, bool open_now) {
+    ImGui::Dummy(ImVec2(0, 0.15f * ImGui::GetTextLineHeight()));
+    if (open_now) ImGui::SetNextItemOpen(true);
+    const bool open = ImGui::CollapsingHeader(text.name, open_at_first ? ImGuiTreeNodeFlags_DefaultOpen : 0);
+    show_hint(text.hint);
+    return open;
+}
+
+void caption(const Text& text) {
+    ImGui::AlignTextToFramePadding();
+    ImGui::TextUnformatted(text.name);
+    show_hint(text.hint);
+}
+
+void label_left(const Text& text) {
+    caption(text);
+    const float usual = kLabelWidth * ImGui::GetTextLineHeight();
+    const float needed = ImGui::CalcTextSize(text.name).x + ImGui::GetStyle().ItemInnerSpacing.x;
+    ImGui::SameLine(ImGui::GetCursorPosX() + std::max(usual, needed));
+    ImGui::SetNextItemWidth(-FLT_MIN);
+}
+
+void label_above(const Text& text) {
+    ImGui::TextDisabled("%s", text.name);
+    show_hint(text.hint);
+    ImGui::SetNextItemWidth(-FLT_MIN);
+}
+
+int button_line(std::span<const Button> buttons, float gap) {
+    if (gap < 0) gap = ImGui::GetStyle().ItemSpacing.x;
+    float rest = ImGui::GetContentRegionAvail().x - gap * float(buttons.size() - 1);
+    for (const Button& button : buttons) rest -= ImGui::CalcTextSize(button.text.name).x;
+    const float around = std::max(0.0f, rest / float(buttons.size()));
+    int clicked = -1;
+    for (size_t i = 0; i < buttons.size(); ++i) {
+        const Button& button = buttons[i];
+        if (i > 0) ImGui::SameLine(0, gap);
+        ImGui::BeginDisabled(!button.enabled);
+        push_look(button.look);
+        const float width = ImGui::CalcTextSize(button.text.name).x + around;
+        if (ImGui::Button(button.text.name, ImVec2(width, 0))) clicked = int(i);
+        ImGui::PopStyleColor(3);
+        ImGui::EndDisabled();
+        show_hint(button.text.hint);
+    }
+    return clicked;
+}
+
+int button_line(std::initializer_list<Button> buttons) {
+    return button_line(std::span(buttons.begin(), buttons.size()));
+}
+
+bool segments(std::span<const Text> names, int& chosen) {
+    std::vector<Button> buttons;
+    for (size_t i = 0; i < names.size(); ++i)
+        buttons.push_back({names[i], true, int(i) == chosen ? ButtonLook::chosen : ButtonLook::plain});
+    const int clicked = button_line(buttons, 1);
+    if (clicked < 0 || clicked == chosen) return false;
+    chosen = clicked;
+    return true;
+}
+
+bool checkbox(const Text& text, bool& value) {
+    const bool changed = ImGui::Checkbox(text.name, &value);
+    show_hint(text.hint);
+    return changed;
+}
+
+bool slider(const Text& text, float& value, float low, float high, const char* format, bool logarithmic) {
+    label_left(text);
+    ImGui::PushID(text.name);
+    const ImGuiSliderFlags flags =
+        ImGuiSliderFlags_AlwaysClamp | (logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
+    const bool changed = ImGui::SliderFloat("##slider", &value, low, high, format, flags);
+    ImGui::PopID();
+    show_hint(text.hint);
+    return changed;
+}
+
+bool numbers(const Text& text, glm::dvec3& values) {
+    label_above(text);
+    ImGui::PushID(text.name);
+    const bool changed =
+        ImGui::InputScalarN("##numbers", ImGuiDataType_Double, &values[0], 3, nullptr, nullptr, "%.6g");
+    ImGui::PopID();
+    return changed;
+}
+
+bool number(const Text& text, double& value) {
+    label_left(text);
+    ImGui::PushID(text.name);
+    const bool changed =
+        ImGui::InputScalar("##number", ImGuiDataType_Double, &value, nullptr, nullptr, "%.6g");
+    ImGui::PopID();
+    return changed;
+}
+
+bool entered() {
+    if (!ImGui::IsItemDeactivatedAfterEdit()) return false;
+#if IMGUI_VERSION_NUM < 18700
+    return ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Enter), false);
+#else
+    return ImGui::IsKeyPressed(ImGuiKey_Enter, false);
+#endif
+}
+
+}  // namespace ewa::viewer::ui

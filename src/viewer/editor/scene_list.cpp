@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+// The lists of the panel of edits: scenes and history.
+#include <imgui.h>
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+
+#include "core/text.h"
+#include "viewer/editor/panel_controls.h"
+#include "viewer/editor/panel_sections.h"
+#include "viewer/editor/theme.h"
+
+namespace ewa::viewer {
+namespace {
+
+constexpr size_t kMostRows = 10;          // of the history, without scrolling
+constexpr size_t kMostHintLetters = 300;  // of a step's words
+
+/// A button with an eye, crossed out for a scene that is not shown.
+bool eye_button(bool open) {
+    const float side = ImGui::GetFrameHeight();
+    const bool clicked = ImGui::InvisibleButton("eye", ImVec2(side, side));
+    const ImVec2 low = ImGui::GetItemRectMin();
+    const ImVec2 middle(low.x + 0.5f * side, low.y + 0.5f * side);
+    const ImU32 color = ImGui::GetColorU32(open ? ImGuiCol_Text : ImGuiCol_TextDisabled);
+    const float line = std::max(1.0f, 0.07f * side);
+    ImDrawList& list = *ImGui::GetWindowDrawList();
+    for (const float lid : {-0.42f, 0.42f})
+        list.AddBezierQuadratic(ImVec2(middle.x - 0.38f * side, middle.y),
+                                ImVec2(middle.x, middle.y + lid * side),
+                                ImVec2(middle.x + 0.38f * side, middle.y), color, line);
+    if (open)
+        list.AddCircleFilled(middle, 0.1f * side, color);
+    else
+        list.AddLine(ImVec2(middle.x - 0.25f * side, middle.y + 0.25f * side),
+                     ImVec2(middle.x + 0.25f * side, middle.y - 0.25f * side), color, line);
+    ui::show_hint(say::kShowScene);
+    return clicked;
+}
+
+/// Returns whether the scene is to be closed.
+bool close_button(bool unsaved) {
+    bool close = false;
+    if (ImGui::Button("x", ImVec2(ImGui::GetFrameHeight(), 0))) {
+        close = !unsaved;
+        if (unsaved) ImGui::OpenPopup("question");
+    }
+    ui::show_hint(say::kCloseScene);
+    if (ImGui::BeginPopup("question")) {
+        ImGui::TextUnformatted(say::kCloseQuestion);
+        const int clicked =
+            ui::button_line({{say::kDiscard, true, ui::ButtonLook::danger}, {{say::kCancel.name}}});
+        close = clicked == 0;
+        if (clicked >= 0) ImGui::CloseCurrentPopup();
+        ImGui::EndPopup();
+    }
+    return close;
+}
+
+std::string words_of(const edit::Step& step) {
+    std::string text;
+    for (const edit::Words& words : step.edits) {
+        text += (text.empty() ? "--" : " --") + words.name;
+        if (!words.value.empty()) text += " " + words.value;
+        if (text.size() > kMostHintLetters) return core::one_line(text.substr(0, kMostHintLetters)) + " ...";
+    }
+    return core::one_line(text);
+}
+
+/// The row after `done` steps.
+void history_row(Editor& editor, size_t done) {
+    const EditSnapshot& now = editor.snapshot();
+    const bool undone = done > now.done;
+    ImGui::PushID(int(done));
+    ImGui::PushStyleColor(ImGuiCol_Text,
+                          ImGui::GetStyleColorVec4(undone ? ImGuiCol_TextDisabled : ImGuiCol_Text));
+    const std::string title = done == 0 ? say::kBeginning : core::one_line(now.steps[done - 1].title);
+    const bool clicked = ImGui::Selectable("##step", done == now.done);
+    if (done > 0 && ImGui::IsItemHovered()) ui::show_hint(words_of(now.steps[done - 1]).c_str());
+    ImGui::SameLine();
+    ImGui::TextUnformatted(title.c_str());
+    ImGui::PopStyleColor();
+    ImGui::PopID();
+    if (!clicked) return;
+    const size_t from = now.done;
+    for (size_t i = done; i < from; ++i) editor.undo();
+    for (size_t i = from; i < done; ++i) editor.redo();
+}
+
+}  // namespace
+
+void draw_scenes(Editor& editor) {
+    ImGui::PushID("scenes");
+    std::optional<size_t> closed;
+    for (size_t i = 0; i < editor.scenes(); ++i) {
+        const EditedScene& scene = editor.scene(i);
+        const float side = ImGui::GetFrameHeight(), gap = ImGui::GetStyle().ItemSpacing.x;
+        ImGui::PushID(int(i));
+        if (eye_button(scene.shown)) editor.show(i, !scene.shown);
+        ImGui::SameLine();
+        ImGui::PushStyleVar(ImGuiStyleVar_SelectableTextAlign, ImVec2(0, 0.5f));
+        const float width = std::max(side, ImGui::GetContentRegionAvail().x - 2 * (side + gap));
+        const std::string label = core::one_line(scene.name) + "###name";
+        if (ImGui::Selectable(label.c_str(), i == editor.active(), 0, ImVec2(width, side)))
+            editor.activate(i);
+        ImGui::PopStyleVar();
+        ImGui::SameLine();
+        ImGui::Dummy(ImVec2(side, side));
+        const ImVec2 dot = ImGui::GetItemRectMin();
+        if (scene.unsaved) {
+            ImGui::GetWindowDrawList()->AddCircleFilled(ImVec2(dot.x + 0.5f * side, dot.y + 0.5f * side),
+                                                        0.16f * side, ImU32(accent()));
+            ui::show_hint(say::kUnsaved);
+        }
+        ImGui::SameLine();
+        if (close_button(scene.unsaved)) closed = i;
+        ImGui::PopID();
+    }
+    ImGui::PopID();
+    if (closed) editor.close(*closed);
+}
+
+void draw_history(Editor& editor) {
+    const EditSnapshot& now = editor.snapshot();
+    ImGui::PushID("history");
+    const size_t rows = now.steps.size() + 1;
+    const float height = float(std::min(rows, kMostRows)) * ImGui::GetTextLineHeightWithSpacing();
+    if (ImGui::BeginChild("steps", ImVec2(0, height))) {
+        ImGuiListClipper clipper;
+        clipper.Begin(int(rows));  // the newest step first
+        while (clipper.Step())
+            for (int row = clipper.DisplayStart; row < clipper.DisplayEnd; ++row)
+                history_row(editor, rows - 1 - size_t(row));
+    }
+    ImGui::EndChild();
+    if (ui::button_line({{say::kCopyCommand, now.done > 0}}) == 0)
+        ImGui::SetClipboardText(editor.command().c_str());
+    ImGui::TextDisabled(
+        "%s", fmt::format(say::kMemory, double(now.history_bytes) / (1 << 20), now.milliseconds).c_str());
+    ImGui::PopID();
+}
+
+}  // namespace ewa::viewer

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <imgui.h>
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "core/text.h"
+#include "viewer/editor/panel_controls.h"
+#include "viewer/editor/panel_sections.h"
+
+namespace ewa::viewer {
+namespace {
+
+constexpr float kThinnestBrush = 2, kThickestBrush = 500;  // px
+constexpr double kFirstDistance = 0.01;                    // of the selection's diagonal
+
+std::string count_text(const EditSnapshot& now) {
+    std::string text = fmt::format(say::kSelectedOf, core::grouped(now.selected), core::grouped(now.left));
+    if (now.locked > 0) text += fmt::format(say::kLockedToo, core::grouped(now.locked));
+    if (now.hidden > 0) text += fmt::format(say::kHiddenToo, core::grouped(now.hidden));
+    return text;
+}
+
+/// The lowest and the highest corner of the splats that are not deleted.
+std::array<glm::dvec3, 2> bounds_of(const Gaussians& splats, const std::vector<uint8_t>* states) {
+    constexpr float kLargest = std::numeric_limits<float>::max();
+    glm::vec3 low(kLargest), high(-kLargest);
+    for (size_t i = 0; i < splats.size(); ++i) {
+        if (states && i < states->size() && ((*states)[i] & edit::kDeleted) != 0) continue;
+        const glm::vec3 at(splats.means[3 * i], splats.means[3 * i + 1], splats.means[3 * i + 2]);
+        if (!std::isfinite(at.x + at.y + at.z)) continue;
+        low = glm::min(low, at);
+        high = glm::max(high, at);
+    }
+    if (low.x > high.x) low = high = glm::vec3(0);
+    return {splats.origin + glm::dvec3(low), splats.origin + glm::dvec3(high)};
+}
+
+void enclose(EditSettings& settings, const std::array<glm::dvec3, 2>& bounds) {
+    settings.box_low = bounds[0];
+    settings.box_high = bounds[1];
+    settings.sphere_center = 0.5 * (bounds[0] + bounds[1]);
+    settings.sphere_radius = std::max(1e-9, 0.5 * glm::distance(bounds[0], bounds[1]));
+}
+
+void change_states(Editor& editor, bool live) {
+    const EditSnapshot& now = editor.snapshot();
+    const bool any = now.selected > 0;
+    if (live) {
+        const int clicked =
+            ui::button_line({{say::kDelete, any, ui::ButtonLook::danger}, {say::kFreeze, any}});
+        if (clicked == 0) editor.perform({say::kDelete.name, {{"delete", ""}}});
+        if (clicked == 1) editor.perform({say::kFreeze.name, {{"freeze", ""}}});
+        return;
+    }
+    switch (ui::button_line({{say::kLock, any}, {say::kUnlock, now.locked > 0}})) {
+        case 0:
+            editor.perform({say::kLock.name, {{"lock", ""}}});
+            break;
+        case 1:
+            editor.perform({say::kUnlock.name, {{"unlock", ""}}});
+            break;
+    }
+    switch (ui::button_line({{say::kHide, any}, {say::kShow, now.hidden > 0}})) {
+        case 0:
+            editor.perform({say::kHide.name, {{"hide", ""}}});
+            break;
+        case 1:
+            editor.perform({say::kShow.name, {{"show", ""}}});
+            break;
+    }
+    switch (ui::button_line({{say::kDelete, any, ui::ButtonLook::danger}, {say::kDuplicate, any}})) {
+        case 0:
+            editor.perform({say::kDelete.name, {{"delete", ""}}});
+            break;
+        case 1:
+            editor.perform({say::kDuplicate.name, {{"duplicate", ""}}});
+            break;
+    }
+    switch (ui::button_line({{say::kSeparate, any}, {say::kReset, any}})) {
+        case 0:
+            editor.separate();
+            break;
+        case 1:
+            editor.perform({say::kReset.name, {{"reset", ""}}});
+            break;
+    }
+}
+
+}  // namespace
+
+void SelectionSection::draw(Editor& editor, bool live) {
+    EditSettings& settings = editor.settings;
+    ImGui::PushID("selection");
+    ImGui::TextWrapped("%s", count_text(editor.snapshot()).c_str());
+    switch (ui::button_line({{say::kAll}, {say::kNone, editor.snapshot().selected > 0}, {say::kInvert}})) {
+        case 0:
+            editor.perform({say::kSelectAll, {{"select", "all"}}});
+            break;
+        case 1:
+            editor.perform({say::kSelectNone, {{"select", "none"}}});
+            break;
+        case 2:
+            editor.perform({say::kSelectOthers, {{"select", "invert"}}});
+            break;
+    }
+    int operation = int(settings.operation);
+    if (ui::segments(say::kOperations, operation)) settings.operation = edit::Operation(operation);
+    ui::checkbox(say::kFront, settings.front);
+    ImGui::SameLine();
+    ui::checkbox(say::kExtent, settings.extent);
+    ui::slider(say::kBrush, settings.brush, kThinnestBrush, kThickestBrush, "%.0f px", true);
+    ui::slider(say::kTolerance, settings.tolerance, 0, 1, "%.2f");
+    draw_shape(editor);
+    draw_growth(editor);
+    change_states(editor, live);
+    ImGui::PopID();
+}
+
+/// The numbers of the box or the sphere, while its tool is active.
+void SelectionSection::draw_shape(Editor& editor) {
+    EditSettings& settings = editor.settings;
+    const EditSnapshot& now = editor.snapshot();
+    if (finished(whole_)) enclose(settings, whole_.get());
+    const bool box = settings.tool == Tool::box;
+    if (!box && settings.tool != Tool::sphere) return;
+    if (box) {
+        ui::numbers(say::kBoxLow, settings.box_low);
+        if (ImGui::IsItemDeactivatedAfterEdit())
+            settings.box_high = glm::max(settings.box_low, settings.box_high);
+        ui::numbers(say::kBoxHigh, settings.box_high);
+        if (ImGui::IsItemDeactivatedAfterEdit())
+            settings.box_low = glm::min(settings.box_low, settings.box_high);
+    } else {
+        ui::numbers(say::kCentre, settings.sphere_center);
+        double radius = settings.sphere_radius;
+        if (ui::number(say::kRadius, radius) && radius > 0) settings.sphere_radius = radius;
+    }
+    const auto shape = [&] {
+        return box ? edit::box_shape(settings.box_low, settings.box_high)
+                   : edit::sphere_shape(settings.sphere_center, settings.sphere_radius);
+    };
+    ImGui::PushID("shape");
+    switch (ui::button_line(
+        {{say::kWholeScene, !whole_.valid()}, {say::kAroundSelection, now.bounds.has_value()}})) {
+        case 0:
+            whole_ = std::async(std::launch::async, [splats = now.splats, states = now.states] {
+                return bounds_of(*splats, states.get());
+            });
+            break;
+        case 1:
+            enclose(settings, *now.bounds);
+            break;
+    }
+    switch (ui::button_line(
+        {{say::kCopy}, {say::kPaste}, {say::kSelect}, {say::kCrop, true, ui::ButtonLook::danger}})) {
+        case 0:
+            ImGui::SetClipboardText(shape().c_str());
+            break;
+        case 1:
+            if (const char* text = ImGui::GetClipboardText()) paste_shape(text, settings);
+            break;
+        case 2:
+            editor.select(shape());
+            break;
+        case 3:
+            editor.perform({say::kCrop.name, {{"select", shape()}, {"select", "invert"}, {"delete", ""}}});
+            break;
+    }
+    ImGui::PopID();
+}
+
+void SelectionSection::draw_growth(Editor& editor) {
+    const EditSnapshot& now = editor.snapshot();
+    if (distance_ == 0 && now.bounds) {
+        const double size = kFirstDistance * glm::distance((*now.bounds)[0], (*now.bounds)[1]);
+        if (size > 0) distance_ = std::pow(10.0, std::round(std::log10(size)));
+    }
+    ui::number(say::kDistance, distance_);
+    const bool possible = now.selected > 0 && distance_ > 0 && std::isfinite(distance_);
+    const std::string value = fmt::format("{:.9g}", distance_);
+    switch (ui::button_line({{say::kGrow, possible}, {say::kShrink, possible}})) {
+        case 0:
+            editor.perform({say::kGrowTitle, {{"select", "grow=" + value}}});
+            break;
+        case 1:
+            editor.perform({say::kShrinkTitle, {{"select", "shrink=" + value}}});
+            break;
+    }
+}
+
+}  // namespace ewa::viewer
