@@ -159,7 +159,7 @@ std::shared_ptr<const RenderedFrame> RenderThread::Scene::draw(const RenderReque
 std::optional<glm::dvec3> RenderThread::Scene::point_at(const Probe& probe) {
     const Camera& full = probe.camera;
     const int divisor =
-        probe.use == PointUse::measure ? 1 : std::max(1, std::min(full.width, full.height) / kProbeSide);
+        probe.use == PointUse::look_at ? std::max(1, std::min(full.width, full.height) / kProbeSide) : 1;
     const Camera camera = downscale(full, divisor);
     DrawOptions options{{}, Drawing::median_depth, 1};
     if (densities_are_up_) options.render.kernel = Footprint::density;

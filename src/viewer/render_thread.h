@@ -38,8 +38,8 @@ struct RenderRequest {
     std::filesystem::path file;  // written as by `ewa render` with this extension; empty: no file
 };
 
-/// The use of a point under a pixel.
-enum class PointUse { look_at, measure };
+/// The use of a point under a pixel. edit: by a tool of the editor.
+enum class PointUse { look_at, measure, edit };
 
 /// The point on the surface under a pixel.
 struct SurfacePoint {
@@ -81,7 +81,8 @@ class RenderThread {
     /// Replaces a waiting request that has no file. The frame that is being rendered is finished first.
     void ask(const RenderRequest& request);
     /// Requests the surface point at a pixel, by its median depth. News::points has it with the returned number. Each request with
-    /// PointUse::measure renders at full resolution, and is answered. One with PointUse::look_at replaces a waiting one.
+    /// PointUse::measure or PointUse::edit renders at full resolution, and is answered. One with PointUse::look_at replaces a waiting
+    /// one.
     uint64_t ask_point(const Camera& camera, const glm::dvec2& pixel, PointUse use);
 
     /// Drops waiting requests for points. The one in progress is still answered.

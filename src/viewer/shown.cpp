@@ -64,6 +64,10 @@ void Shown::set_measuring(bool on) {
 
 void Shown::take_point(const SurfacePoint& point) {
     state_.redraw(Loop::kRedraws);
+    if (point.use == PointUse::edit) {
+        if (take_edit_point) take_edit_point(point);
+        return;
+    }
     const bool measured = point.use == PointUse::measure;
     if (!point.place) {
         state_.say(measured ? "no splat is opaque enough here to measure"

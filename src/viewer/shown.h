@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The picture on the screen, and how it compares with the image of its camera.
 #pragma once
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -26,7 +27,7 @@ class Shown {
     void take_comparison(Presenter& presenter);
     /// Asks for a render of the view, unless the window is minimised, or a film sets the cameras.
     void ask();
-    /// Requests the surface point at a pixel, to turn the view to it or to add it to `measurement`.
+    /// Requests the surface point at a pixel, to turn the view to it, to add it to `measurement`, or for `take_edit_point`.
     void ask_point(const glm::dvec2& pixel, PointUse use);
     /// Turns measuring on or off. Off: drops the points, and requests that still wait.
     void set_measuring(bool on);
@@ -60,6 +61,7 @@ class Shown {
 
     Renders renders;
     Measurement measurement;
+    std::function<void(const SurfacePoint&)> take_edit_point;  // gets the answers to PointUse::edit
 
   private:
     void take_point(const SurfacePoint& point);

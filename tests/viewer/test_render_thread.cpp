@@ -83,14 +83,15 @@ TEST(RenderThread, DrawsTheSceneItWasGivenLast) {
     Camera large = request(0).camera;
     for (int* side : {&large.width, &large.height}) *side *= 30;
     for (double* length : {&large.fx, &large.fy, &large.cx, &large.cy}) *length *= 30;
-    double x[2];
-    for (const PointUse use : {PointUse::look_at, PointUse::measure}) {
+    double x[3];
+    for (const PointUse use : {PointUse::look_at, PointUse::measure, PointUse::edit}) {
         points = points_of(thread, thread.ask_point(large, {600.2, 450.2}, use));
         ASSERT_TRUE(points.size() == 1 && points[0].place);
         EXPECT_EQ(points[0].use, use);
         x[int(use)] = points[0].place->x;
     }
     EXPECT_NEAR(x[1], 4 * 0.5 / 1200, 1e-6);
+    EXPECT_EQ(x[2], x[1]);
     EXPECT_GT(x[0], 2 * x[1]);
 }
 
