@@ -200,5 +200,14 @@ inline constexpr Item kCopyCommand{"Copy as command",
                                    "The line of ewa convert that does the same to the file"};
 
 }  // namespace edit_panel
+// What the tools say over the picture.
+inline constexpr const char *kNeedsPinhole =
+                                "this tool needs a view without distortion; the view has changed to one",
+                            *kPolygonViewChanged = "the view has moved; click the corners again",
+                            *kNoSurface = "no splat is opaque enough here",
+                            *kNeedsColours = "the eyedropper needs a picture of colours",
+                            *kNoLevel = "the three points are nearly on a line; click three others",
+                            *kShapeSelect = "Select", *kShapeAdd = "Add", *kShapeRemove = "Remove",
+                            *kTrueLength = "true length";
 
 }  // namespace ewa::viewer::texts
