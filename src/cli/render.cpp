@@ -12,7 +12,6 @@
 
 #include "cli/arguments.h"
 #include "cli/command.h"
-#include "cli/film.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "cli/render_output.h"
@@ -25,6 +24,7 @@
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
+#include "image/film_file.h"
 #include "io/datasets/dataset_folders.h"
 #include "io/datasets/refined_cameras.h"
 #include "report/pictures.h"
@@ -200,7 +200,7 @@ int write_film(const RenderArguments& arguments, const DrawnScene& scene, Render
                Progress& progress) {
     const std::vector<Camera>& cameras = views.cameras;
     make_folder(arguments.output.parent_path());
-    Film film(arguments.output, cameras[0].width, cameras[0].height, encoder, views.rate);
+    image::FilmFile film(arguments.output, cameras[0].width, cameras[0].height, encoder, views.rate);
     PictureTaker taker(arguments.picture, renderer, Drawing::color, scene.options.kernel, views);
     EmptyViews empty(arguments.mode);
     for (size_t i = 0; i < cameras.size(); ++i) {
@@ -228,8 +228,8 @@ int write_film(const RenderArguments& arguments, const DrawnScene& scene, Render
 std::string encoder_of(const RenderArguments& arguments) {
     if (views_output(arguments.output) != ViewsOutput::film) return {};
     if (arguments.mode != "color") throw InputError("a film has --mode color; a folder can have any mode");
-    std::string encoder = find_encoder(arguments.codec, arguments.output);
-    find_ffmpeg();
+    std::string encoder = image::find_encoder(arguments.codec, arguments.output);
+    image::find_ffmpeg();
     return encoder;
 }
 

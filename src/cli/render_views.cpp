@@ -10,7 +10,6 @@
 #include <numbers>
 
 #include "cli/arguments.h"
-#include "cli/film.h"
 #include "core/pixel_size.h"
 #include "core/text.h"
 #include "core/typing.h"
@@ -26,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr core::PixelSize kUsualSize{1280, 720}, kPanoramaSize{2048, 1024};
-constexpr int kOrbitFrames = 8 * kFilmRate;
+constexpr int kOrbitFrames = 8 * image::kFilmRate;
 constexpr double kSecondsBetweenViews = 2;  // of a film, from one saved view to the next
 constexpr int kMostFrames = 100000;
 
@@ -52,7 +51,7 @@ ViewPath moments_of(std::function<Camera(double)> at, int count) {
 }
 
 ViewPath along_views(const std::vector<Camera>& keys, double seconds) {
-    const double frames = double(keys.size() - 1) * kFilmRate * seconds + 1;
+    const double frames = double(keys.size() - 1) * image::kFilmRate * seconds + 1;
     if (frames > kMostFrames)
         throw InputError(fmt::format("--film-seconds: a film of more than {} frames", kMostFrames));
     const int count = std::max(1, int(std::lround(frames)));
@@ -148,7 +147,7 @@ ViewsOutput views_output(const fs::path& path) {
                              ": an image is .png, .jpg or .exr, a film .mp4, .mov, .mkv or .webm, and a "
                              "folder has another "
                              "name");
-    if (is_film_name(path)) return ViewsOutput::film;
+    if (image::is_film_name(path)) return ViewsOutput::film;
     if (fs::exists(path, error))
         throw InputError("--output " + core::one_line(path.string()) +
                          ": is no folder; an image is .png, .jpg or .exr, a film .mp4, .mov, .mkv or .webm");

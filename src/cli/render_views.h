@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "cli/film.h"
 #include "cli/lens_argument.h"
 #include "ewa/camera.h"
 #include "ewa/dataset.h"
 #include "ewa/gaussians.h"
+#include "image/film_file.h"
 #include "scene/framing.h"
 
 namespace ewa::cli {
@@ -51,7 +51,7 @@ struct ViewPath {
     std::vector<Camera> cameras;
     /// The camera at any time from 0 to cameras.size(); at(i) is cameras[i]. Empty unless the cameras are moments of one motion.
     std::function<Camera(double)> at = {};
-    double rate = kFilmRate;  // frames per second of a film
+    double rate = image::kFilmRate;  // frames per second of a film
 };
 
 /// The cameras of these frames of a dataset, in order. Throws InputError if the dataset's frame rate cannot be that of a film.

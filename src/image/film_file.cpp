@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "cli/film.h"
+#include "image/film_file.h"
 
 #include <fcntl.h>
 #include <signal.h>
@@ -20,13 +20,13 @@
 #include "core/text.h"
 #include "ewa/error.h"
 
-namespace ewa::cli {
+namespace ewa::image {
 namespace {
 
 namespace fs = std::filesystem;
 
 /// The last line that is not empty: ffmpeg's own reason.
-std::string last_line(const fs::path& log) {
+std::string last_line_of(const fs::path& log) {
     std::ifstream file(log);
     std::string last;
     for (std::string line; std::getline(file, line);)
@@ -133,7 +133,7 @@ std::string find_encoder(const std::string& codec, const fs::path& file) {
     throw RunError("--codec " + codec + ": this ffmpeg has no encoder for it, such as " + wanted);
 }
 
-Film::Film(const fs::path& file, int width, int height, const std::string& encoder, double rate)
+FilmFile::FilmFile(const fs::path& file, int width, int height, const std::string& encoder, double rate)
     : file_(file), folder_("ewa-film-"), made_(folder_.path() / ("film" + file.extension().string())) {
     if (width < 2 || height < 2) throw InputError("a film needs at least 2x2 pixels");
     const fs::path program = find_ffmpeg();
@@ -154,14 +154,14 @@ Film::Film(const fs::path& file, int width, int height, const std::string& encod
     close(log);
 }
 
-Film::~Film() {
+FilmFile::~FilmFile() {
     if (input_ >= 0) close(input_);
     if (process_ < 0) return;
     kill(process_, SIGKILL);
     wait();
 }
 
-int Film::wait() {
+int FilmFile::wait() {
     int status = 0;
     while (waitpid(process_, &status, 0) < 0 && errno == EINTR) {
     }
@@ -169,21 +169,21 @@ int Film::wait() {
     return status;
 }
 
-void Film::fail(int status) {
-    std::string reason = last_line(folder_.path() / "log");
+void FilmFile::fail(int status) {
+    std::string reason = last_line_of(folder_.path() / "log");
     if (reason.empty())
         reason = WIFSIGNALED(status) ? fmt::format("it ended by signal {}", WTERMSIG(status))
                                      : fmt::format("exit status {}, no film", WEXITSTATUS(status));
     throw RunError(core::one_line(file_.string()) + ": ffmpeg failed: " + reason);
 }
 
-int Film::end() {
+int FilmFile::end() {
     close(input_);
     input_ = -1;
     return wait();
 }
 
-void Film::add(const std::vector<uint8_t>& rgba) {
+void FilmFile::add(const std::vector<uint8_t>& rgba) {
     for (size_t done = 0; done < rgba.size();) {
         const ssize_t sent = send(input_, rgba.data() + done, rgba.size() - done, MSG_NOSIGNAL);
         if (sent < 0 && errno == EINTR) continue;
@@ -192,7 +192,7 @@ void Film::add(const std::vector<uint8_t>& rgba) {
     }
 }
 
-void Film::finish() {
+void FilmFile::finish() {
     const int status = end();
     std::error_code error;
     if (status != 0 || fs::file_size(made_, error) == 0 || error) fail(status);
@@ -204,4 +204,4 @@ void Film::finish() {
     kept.commit();
 }
 
-}  // namespace ewa::cli
+}  // namespace ewa::image

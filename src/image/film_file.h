@@ -10,7 +10,7 @@
 
 #include "core/folders.h"
 
-namespace ewa::cli {
+namespace ewa::image {
 
 inline constexpr int kFilmRate = 30;  // frames per second, of films that have no rate of their own
 
@@ -27,14 +27,15 @@ std::string find_encoder(const std::string& codec, const std::filesystem::path& 
 /// A film that is being written. ffmpeg runs as a process of its own, without a shell, and gets the frames on its
 /// standard input. It writes into a temporary folder; finish() moves the film to its place. The destructor ends an
 /// unfinished one and leaves nothing.
-class Film {
+class FilmFile {
   public:
     /// file: its name decides the format. width, height: of each frame, px. An odd last row or column is cut, since
     /// films have none. encoder: of find_encoder. rate: frames per second. Throws RunError.
-    Film(const std::filesystem::path& file, int width, int height, const std::string& encoder, double rate);
-    ~Film();
-    Film(const Film&) = delete;
-    Film& operator=(const Film&) = delete;
+    FilmFile(const std::filesystem::path& file, int width, int height, const std::string& encoder,
+             double rate);
+    ~FilmFile();
+    FilmFile(const FilmFile&) = delete;
+    FilmFile& operator=(const FilmFile&) = delete;
 
     /// rgba: width * height pixels, row by row from the top. Alpha is ignored. Throws RunError with ffmpeg's own
     /// reason if it has ended.
@@ -54,4 +55,4 @@ class Film {
     int input_ = -1;  // socket
 };
 
-}  // namespace ewa::cli
+}  // namespace ewa::image
