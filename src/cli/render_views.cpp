@@ -50,18 +50,28 @@ ViewPath moments_of(std::function<Camera(double)> at, int count) {
     return views;
 }
 
-ViewPath along_views(const std::vector<Camera>& keys, double seconds) {
-    const double frames = double(keys.size() - 1) * image::kFilmRate * seconds + 1;
+/// length: of the film, s. at: the camera after so many frames of so many.
+ViewPath film_of(double length, const std::function<Camera(double, double)>& at) {
+    const double frames = image::kFilmRate * length + 1;
     if (frames > kMostFrames)
         throw InputError(fmt::format("--film-seconds: a film of more than {} frames", kMostFrames));
     const int count = std::max(1, int(std::lround(frames)));
-    const double last = count - 1, parts = double(keys.size() - 1);
+    const double last = count - 1;
     // After the last frame, the camera goes back: that frame has the blur of the motion that led to it.
     return moments_of(
-        [=](double time) {
-            return along_path(keys, last > 0 ? parts * (time <= last ? time : 2 * last - time) / last : 0);
-        },
-        count);
+        [=](double time) { return at(time <= last ? time : 2 * last - time, std::max(last, 1.0)); }, count);
+}
+
+/// The film through the keys. times: when it passes them (s).
+ViewPath along_views(const std::vector<Camera>& keys, const std::vector<double>& times, double seconds) {
+    const double parts = double(keys.size() - 1);
+    if (times.empty())
+        return film_of(parts * seconds,
+                       [=](double done, double all) { return along_path(keys, parts * done / all); });
+    const double from = times.front(), length = times.back() - from;
+    return film_of(length, [=](double done, double all) {
+        return along_path(keys, times, from + length * done / all, true);
+    });
 }
 
 }  // namespace
@@ -86,8 +96,9 @@ ViewPath path_of(const Dataset& dataset, const std::vector<int>& frames) {
 namespace {
 
 ViewPath saved_views(const ViewsArguments& arguments, ViewsOutput output) {
+    const std::vector<io::NamedView> views = io::read_views(arguments.views);
     std::vector<Camera> cameras;
-    for (const io::NamedView& view : io::read_views(arguments.views)) cameras.push_back(view.camera);
+    for (const io::NamedView& view : views) cameras.push_back(view.camera);
     if (cameras.empty()) throw InputError(arguments.views.string() + ": has no views");
     const bool path = output == ViewsOutput::film || arguments.film_seconds > 0;
     if (!arguments.size.empty() || path) {
@@ -96,7 +107,9 @@ ViewPath saved_views(const ViewsArguments& arguments, ViewsOutput output) {
         for (Camera& camera : cameras) camera = scene::fitted(camera, size.width, size.height);
     }
     if (!path) return {cameras};
-    return along_views(cameras, arguments.film_seconds > 0 ? arguments.film_seconds : kSecondsBetweenViews);
+    if (arguments.film_seconds == 0 && views[0].time) return along_views(cameras, io::times_of(views, 0), 0);
+    return along_views(cameras, {},
+                       arguments.film_seconds > 0 ? arguments.film_seconds : kSecondsBetweenViews);
 }
 
 ViewPath around(const scene::Framing& framing, int count) {

@@ -178,7 +178,9 @@ std::vector<Option> from_a_to_o() {
         row("film-seconds", "ewa-view", kOutput, "S", "Duration of the film from view to view (2)",
             within(0.04, 3600)),
         row("film-seconds", "render", kData, "S",
-            "With --views: seconds from view to view [2]. A folder gets the frames of the film",
+            "With --views: seconds from view to view [the times in the file, or 2]. A folder gets the frames "
+            "of "
+            "the film",
             within(0.04, 3600)),
         row("focus", "render", kData, "D",
             "Distance along the view that is sharp (world units) [that of what the middle of the image "

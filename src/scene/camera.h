@@ -14,6 +14,10 @@ namespace ewa {
 /// relative to the width. Size and relative principal point are the first key's, and the shutter is global.
 Camera along_path(std::span<const Camera> keys, double time);
 
+/// The same with key i at times[i] (s), of which each is later than the one before. smooth: the velocity has no jumps at the keys,
+/// and with equal distances in time the path is that of the other function. Else the camera goes from key to key in straight lines.
+Camera along_path(std::span<const Camera> keys, std::span<const double> times, double time, bool smooth);
+
 /// The camera, or, if its image is wider than most_width px, the same view reduced to that width. The rounded height keeps the
 /// aspect ratio.
 Camera narrowed(const Camera& camera, int64_t most_width);

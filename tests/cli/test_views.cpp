@@ -273,6 +273,13 @@ TEST_F(Views, AFilmGoesToFfmpegFrameByFrame) {
     const std::string frames = read_file(folder / "a film.mp4"), words = read_file(folder / "arguments");
     ASSERT_EQ(frames.size(), size_t(4) * 48 * 32 * 4);
     EXPECT_NE(words.find("\n48x32\n"), std::string::npos) << words;
+    // The views' own times, where they have some.
+    std::vector<io::NamedView> views = io::read_views(saved_views());
+    views[0].time = 1;
+    views[1].time = 1.2;
+    io::write_views(folder / "timed.json", views);
+    expect_success(render({"--views", folder / "timed.json", "-o", folder / "timed.mp4"}, ffmpeg));
+    EXPECT_EQ(read_file(folder / "timed.mp4").size(), size_t(7) * 48 * 32 * 4);
     EXPECT_NE(words.find("\n30\n"), std::string::npos) << words;
     expect_success(render({"--views", saved_views(), "-o", folder / "saved"}));
     const Image first = load_image(folder / "saved/00000.png");

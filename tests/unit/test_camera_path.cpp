@@ -95,6 +95,38 @@ TEST(CameraPath, TurnsTheShortWayAndZoomsInProportion) {
     EXPECT_EQ(along_path(std::span(keys).first(1), 0.7).fx, 350);
 }
 
+/// With equal distances in time it is the path without times.
+TEST(CameraPath, PassesItsKeysAtTheirTimes) {
+    const std::vector<Camera> keys{camera_at({0, 0, 0}), camera_at({1, 0, 0}, 0.5), camera_at({2, 1, 0}, 1.0),
+                                   camera_at({3, 1, 2}, 1.2)};
+    const std::vector<double> even{1, 3, 5, 7}, times{0, 0.5, 3, 4};
+    for (double time = 0; time <= 3; time += 0.125) {
+        const Camera a = along_path(keys, time), b = along_path(keys, even, 1 + 2 * time, true);
+        EXPECT_NEAR(glm::length(a.position() - b.position()), 0, 1e-12) << time;
+        for (int k = 0; k < 3; ++k) EXPECT_NEAR(glm::length(a.rotation[k] - b.rotation[k]), 0, 1e-12);
+    }
+    for (const bool smooth : {true, false}) {
+        for (size_t i = 0; i < keys.size(); ++i) {
+            const Camera at = along_path(keys, times, times[i], smooth);
+            EXPECT_EQ(at.translation, keys[i].translation);
+            EXPECT_EQ(at.rotation, keys[i].rotation);
+        }
+        EXPECT_EQ(along_path(keys, times, -1, smooth).translation, keys.front().translation);
+        EXPECT_EQ(along_path(keys, times, 9, smooth).translation, keys.back().translation);
+    }
+    const auto velocity = [&](double time) {
+        const double step = 1e-6;
+        return (along_path(keys, times, time + step, true).position() -
+                along_path(keys, times, time, true).position()) /
+               step;
+    };
+    for (const double time : {0.5, 3.0})
+        EXPECT_LT(glm::length(velocity(time + 1e-7) - velocity(time - 1.1e-6)), 1e-4) << "a kink at " << time;
+    const glm::dvec3 third = along_path(keys, times, 0.5 + 2.5 / 3, false).position();
+    EXPECT_NEAR(glm::length(third - glm::dvec3(4.0 / 3, 1.0 / 3, 0)), 0, 1e-12) << "a straight line";
+    EXPECT_EQ(along_path(std::span(keys).first(1), std::span(times).first(1), 3, true).fx, 350);
+}
+
 }  // namespace
 /// A point that a render shows is where the lens puts it, and frusta are lines in the picture.
 TEST(CameraOfALens, PointsComeBack) {

@@ -44,6 +44,23 @@ TEST(ViewList, EveryNumberComesBack) {
     EXPECT_EQ(views[1].name, "");
 }
 
+TEST(ViewList, TimesComeBackInTheirOrder) {
+    const TempFolder folder;
+    std::vector<NamedView> views(3, some_view());
+    EXPECT_EQ(times_of(views, 1.5), (std::vector<double>{0, 1.5, 3}));
+    views[0].time = 0;
+    views[1].time = 1.0 / 3;
+    views[2].time = 7.5;
+    write_views(folder / "views.json", views);
+    EXPECT_EQ(times_of(read_views(folder / "views.json"), 2), (std::vector<double>{0, 1.0 / 3, 7.5}));
+    for (const std::optional<double>& wrong : {std::optional(-1.0), std::optional(7.5), std::optional(8.0),
+                                               std::optional(2e6), std::optional<double>()}) {
+        views[1].time = wrong;
+        write_views(folder / "views.json", views);
+        EXPECT_THROW(read_views(folder / "views.json"), InputError) << wrong.value_or(-2);
+    }
+}
+
 TEST(ViewList, AReadoutComesBack) {
     const TempFolder folder;
     NamedView view = some_view();

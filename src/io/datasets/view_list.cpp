@@ -16,6 +16,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr uint64_t kLargestView = 2048;  // bytes of the file
+constexpr double kLatestTime = 1e6;      // s
 constexpr double kRotationTolerance = 1e-6;
 
 bool is_rotation(const glm::dmat3& r) {
@@ -62,7 +63,17 @@ NamedView parse_view(const core::JsonField& view) {
     }
     camera.readout = parse_readout(view);
     named.aligned = view.flag("aligned");
+    if (view.has("time")) named.time = view.number("time");
     return named;
+}
+
+/// before: the view before it, or null.
+void check_time(const core::JsonField& field, const NamedView& view, const NamedView* before) {
+    if (before && before->time.has_value() != view.time.has_value())
+        field.fail("either all views have a time or none has");
+    const double earliest = before && before->time ? *before->time : -1;
+    if (view.time && !(*view.time >= 0 && *view.time > earliest && *view.time <= kLatestTime))
+        field.fail("time is not after that of the view before, or not from 0 to a million");
 }
 
 }  // namespace
@@ -98,9 +109,19 @@ std::vector<NamedView> read_views(const std::filesystem::path& path, size_t most
         top.fail("is not a list of views: expected an object with \"views\"");
     if (document["views"].size() > most) top.fail("more than " + std::to_string(most) + " views");
     std::vector<NamedView> views;
-    for (const nlohmann::json& entry : document["views"])
-        views.push_back(parse_view({entry, top.where() + ": view " + std::to_string(views.size())}));
+    for (const nlohmann::json& entry : document["views"]) {
+        const core::JsonField field(entry, top.where() + ": view " + std::to_string(views.size()));
+        NamedView view = parse_view(field);
+        check_time(field, view, views.empty() ? nullptr : &views.back());
+        views.push_back(std::move(view));
+    }
     return views;
+}
+
+std::vector<double> times_of(const std::vector<NamedView>& views, double distance) {
+    std::vector<double> times;
+    for (const NamedView& view : views) times.push_back(view.time.value_or(distance * double(times.size())));
+    return times;
 }
 
 void write_views(const std::filesystem::path& path, const std::vector<NamedView>& views) {
@@ -108,6 +129,7 @@ void write_views(const std::filesystem::path& path, const std::vector<NamedView>
     for (const NamedView& view : views) {
         list.push_back(camera_json(view.name, view.camera));
         list.back()["pivot"] = {view.pivot.x, view.pivot.y, view.pivot.z};
+        if (view.time) list.back()["time"] = *view.time;
     }
     core::write_text_file(path,
                           Json{{"views", list}}.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
