@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "ewa/dataset.h"
 #include "ewa/device.h"
 #include "ewa/evaluation.h"
 #include "ewa/summary.h"
@@ -17,7 +18,8 @@ namespace ewa {
 
 /// Facts of a run that are known before its training begins.
 struct RunStart {
-    std::string name;  // run_name
+    std::string name;                  // run_name
+    const Dataset* dataset = nullptr;  // exists for the length of the call
     size_t train_views = 0, test_views = 0;
     int width = 0, height = 0;         // of the first training image, px
     size_t splats = 0;                 // the initial ones

@@ -54,13 +54,14 @@ void check_serve(const std::string& where) {
 class TrainObserver::Served {
   public:
     /// where: [ADDRESS:]PORT. steps: of the whole training. folder/live.json holds the token while this lives.
-    /// Throws InputError, RunError.
-    Served(const std::string& where, const std::filesystem::path& folder, int steps)
+    /// page: see Server::describe. Throws InputError, RunError.
+    Served(const std::string& where, const std::filesystem::path& folder, int steps, const SaveOptions& page)
         : steps_(steps), folder_(folder) {
         const ServedAt at = served_at(where);
         address_ = at.address;
         const std::string token = live::random_token();
         server_ = std::make_unique<live::Server>(address_, at.port, token);
+        server_->describe(page);
         live::write_live_file(folder_, {server_->port(), token});
     }
     ~Served() {
@@ -72,8 +73,9 @@ class TrainObserver::Served {
     std::string announcement() const {
         const bool v6 = address_.find(':') != std::string::npos;
         const std::string where = fmt::format("{}:{}", v6 ? "[" + address_ + "]" : address_, server_->port());
-        return fmt::format("to watch: ewa-view {}, ewa-view --connect {}, or curl http://{}/status",
-                           folder_.string(), where, where);
+        return fmt::format(
+            "to watch: http://{}/ in a browser, ewa-view {}, ewa-view --connect {}, or curl http://{}/status",
+            where, folder_.string(), where, where);
     }
     void add_metrics(const MetricsLine& line) { server_->add_metrics(line); }
     /// Takes splats and saves if somebody asked for it. Returns late if somebody pauses the training: after the
@@ -133,6 +135,11 @@ void TrainObserver::on_start(const RunStart& start) {
                         core::counted(start.train_views, "view"), start.test_views, start.width, start.height,
                         core::counted(start.splats, "splat")));
     for (const std::string& remark : start.remarks) on_note(remark);
+    if (!output_.serve.empty()) {
+        cameras_.frames = start.dataset->frames;
+        page_.antialiased = start.train.render.kernel == Footprint::antialias;
+        page_.page = {.title = start.name, .cameras = &cameras_, .background = start.train.render.background};
+    }
     on_note("device: " + start.device.name);
     const MemoryEstimate& memory = start.memory;
     on_note(fmt::format("memory: up to {} for {} splats ({} model, {} frame, {} training images)",
@@ -161,7 +168,7 @@ void TrainObserver::on_plan(const std::vector<PlanLine>& plan) {
 
 void TrainObserver::on_begin(const std::filesystem::path& folder, const std::vector<MetricsLine>& metrics) {
     if (!output_.serve.empty()) {
-        served_ = std::make_unique<Served>(output_.serve, folder, steps_);
+        served_ = std::make_unique<Served>(output_.serve, folder, steps_, page_);
         for (const MetricsLine& line : metrics) served_->add_metrics(line);
         on_note(served_->announcement());
     }

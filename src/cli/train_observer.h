@@ -9,7 +9,9 @@
 
 #include "cli/interrupt.h"
 #include "cli/output.h"
+#include "ewa/dataset.h"
 #include "ewa/run.h"
+#include "ewa/splat_scene.h"
 #include "run/forecast.h"
 
 namespace ewa::cli {
@@ -51,6 +53,8 @@ class TrainObserver : public RunObserver {
     TrainOutput output_;
     int steps_;
     std::optional<InterruptWatch> watch_;
+    Dataset cameras_;  // those of the page that the server gives
+    SaveOptions page_;
     std::unique_ptr<Served> served_;  // null without --serve
     std::string undrawable_;          // why splats are skipped
     std::unique_ptr<Progress> progress_;

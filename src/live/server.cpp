@@ -21,6 +21,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/splats/formats.h"
+#include "io/splats/scene_page.h"
 #include "live/wire.h"
 
 namespace ewa::live {
@@ -81,13 +82,18 @@ void refuse(Response& response, int status, const std::string& why) {
 }
 
 /// guest: lives until the answer has been sent.
-void give_text(Response& response, std::string text, const char* type, std::shared_ptr<void> guest) {
-    const size_t size = text.size();
+void give_bytes(Response& response, std::shared_ptr<const std::string> bytes, const char* type,
+                std::shared_ptr<void> guest) {
+    const size_t size = bytes->size();
     response.set_content_provider(size, type,
-                                  [text = std::move(text), guest = std::move(guest)](
+                                  [bytes = std::move(bytes), guest = std::move(guest)](
                                       size_t from, size_t count, httplib::DataSink& sink) {
-                                      return sink.write(text.data() + from, count);
+                                      return sink.write(bytes->data() + from, count);
                                   });
+}
+
+void give_text(Response& response, std::string text, const char* type, std::shared_ptr<void> guest) {
+    give_bytes(response, std::make_shared<const std::string>(std::move(text)), type, std::move(guest));
 }
 
 /// As PLY, a few rows at a time: there is no second copy of the splats.
@@ -274,8 +280,11 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
             return give_text(response, status, "application/json", guest);
         }
         if (get && path == "/splats") return give_splats(request, response, trusted, guest);
+        if (get && path == "/scene") return give_scene(request, response, trusted, guest);
+        if (get && path == "/") return give_page(response, trusted, guest);
         if (request.method != "POST" || (path != "/pause" && path != "/resume" && path != "/save"))
-            return refuse(response, 404, "there is GET /status, /splats and POST /pause, /resume, /save");
+            return refuse(response, 404,
+                          "there is GET /, /scene, /splats, /status and POST /pause, /resume, /save");
         if (!trusted) {
             response.set_header("WWW-Authenticate", "Bearer");
             return refuse(response, 401, "this needs the token: Authorization: Bearer TOKEN (see live.json)");
@@ -329,21 +338,61 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
         return given;
     }
 
-    void give_splats(const Request& request, Response& response, bool trusted, std::shared_ptr<void> guest) {
-        const std::string known = request.get_header_value("If-None-Match");
-        const auto splats = splats_for(trusted, known.empty());
-        const std::string tag = splats ? "\"" + server_.run_ + "-" + std::to_string(splats->step) + "\"" : "";
-        if (!known.empty() && (!splats || known == tag)) {
+    static std::string known_tag(const Request& request) { return request.get_header_value("If-None-Match"); }
+
+    /// Names the splats of an answer, or completes one without splats, and then returns false. step: -1 for no splats.
+    bool name_splats(const std::string& known, Response& response, int step) const {
+        const std::string tag = "\"" + server_.run_ + "-" + std::to_string(step) + "\"";
+        if (!known.empty() && (step < 0 || known == tag)) {
             response.status = 304;
-            return;
+            return false;
         }
-        if (!splats) {
+        if (step < 0) {
             response.set_header("Retry-After", "1");
-            return refuse(response, 503, "no splats have been taken yet; ask again");
+            refuse(response, 503, "no splats have been taken yet; ask again");
+            return false;
         }
         response.set_header("ETag", tag);
-        response.set_header("Ewa-Step", std::to_string(splats->step));
-        give_ply(response, splats, std::move(guest));
+        response.set_header("Ewa-Step", std::to_string(step));
+        return true;
+    }
+
+    void give_splats(const Request& request, Response& response, bool trusted, std::shared_ptr<void> guest) {
+        const std::string known = known_tag(request);
+        const auto splats = splats_for(trusted, known.empty());
+        if (name_splats(known, response, splats ? splats->step : -1))
+            give_ply(response, splats, std::move(guest));
+    }
+
+    /// As the page reads them. They are made on this thread, so the training does not wait.
+    void give_scene(const Request& request, Response& response, bool trusted, std::shared_ptr<void> guest) {
+        const std::string known = known_tag(request);
+        const auto [options, busy] = page_options();
+        auto scene = server_.scenes_.kept(trusted, busy);
+        if (!scene)
+            if (const auto splats = splats_for(trusted, known.empty()))
+                scene = server_.scenes_.of(splats->step, splats->gaussians, options, trusted, busy);
+        if (!name_splats(known, response, scene ? scene->step : -1)) return;
+        give_bytes(response, {scene, &scene->sog}, "application/octet-stream", std::move(guest));
+    }
+
+    void give_page(Response& response, bool trusted, std::shared_ptr<void> guest) {
+        auto splats = splats_for(trusted, false);
+        if (!splats) splats = splats_for(trusted, true);
+        if (!splats) {
+            response.set_header("Refresh", "1");
+            return refuse(response, 503, "the training has no splats yet; this page will load by itself");
+        }
+        // The page's own policy is in it. This cannot be.
+        response.set_header("Content-Security-Policy", "frame-ancestors 'none'");
+        give_text(response, io::live_page(splats->gaussians, page_options().first.page),
+                  "text/html; charset=utf-8", std::move(guest));
+    }
+
+    /// What the page shows, and whether the training is busy.
+    std::pair<SaveOptions, bool> page_options() const {
+        const std::lock_guard lock(server_.mutex_);
+        return {server_.options_, server_.status_.state == State::running && !server_.paused_now()};
     }
 
     live::Server& server_;
@@ -384,6 +433,11 @@ Server::~Server() {
 
 uint16_t Server::port() const {
     return http_->port();
+}
+
+void Server::describe(const SaveOptions& options) {
+    const std::lock_guard lock(mutex_);
+    options_ = options;
 }
 
 void Server::report(const Status& status) {

@@ -7,6 +7,10 @@
 //                            A request makes the trainer take newer ones. The status is 304 if If-None-Match
 //                            names the newest. Without If-None-Match the answer waits up to 5 seconds for
 //                            splats of the present step. It is 503 if none have ever been taken.
+//   GET /                    A page that follows the run in a browser (web/). Its views come from the splats, so it
+//                            waits for them as /splats does, and the browser asks again after a 503.
+//   GET /scene               The splats as the page reads them, a SOG (scenes.h). The rest is as with /splats. While
+//                            the training runs, the splats may be older ones.
 //   POST /pause              Holds the training before its next step. It continues by itself 10 seconds after
 //                            the last request with the token.
 //   POST /resume, /save      Continue; save splats and checkpoint.
@@ -31,6 +35,8 @@
 #include <string>
 
 #include "ewa/gaussians.h"
+#include "ewa/splat_scene.h"
+#include "live/scenes.h"
 #include "live/status.h"
 
 namespace ewa::live {
@@ -63,6 +69,8 @@ class Server {
 
     // For the training loop.
 
+    /// Sets what the page shows besides the splats. options.page.cameras must outlive the server.
+    void describe(const SaveOptions& options);
     /// Sets the answer of /status. Members run, commands and metrics are ignored.
     void report(const Status& status);
     void add_metrics(const report::MetricsLine& line);
@@ -83,14 +91,16 @@ class Server {
 
     const std::string token_, run_ = random_token();
     const std::chrono::milliseconds lease_;
-    mutable std::mutex mutex_;  // of what follows but http_
+    mutable std::mutex mutex_;  // of what follows but scenes_ and http_
     std::condition_variable news_;
     Status status_;
+    SaveOptions options_;  // of the page
     std::shared_ptr<const Snapshot> splats_;
     std::weak_ptr<const Snapshot> given_;  // to those without the token, while any of them reads it
     Clock::time_point next_splats_, lease_end_;
     size_t trusted_ = 0, strangers_ = 0;  // requests that are being answered
     bool wanted_ = false, paused_ = false, save_ = false, stop_ = false;
+    Scenes scenes_;               // has its own mutex
     std::unique_ptr<Http> http_;  // last: its threads use the rest
 };
 

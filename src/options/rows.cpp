@@ -333,10 +333,11 @@ std::vector<Option> from_p_to_z() {
             "Write what the window shows, without the panel, as a PNG, and exit", kWritten),
         of_run("seed", "dataset"),
         row("serve", "train!", kOutput, "[ADDRESS:]PORT",
-            "Let ewa-view and HTTP clients watch by this port (0: any free port). Only this machine can "
-            "connect, unless an address stands before the port. Pausing and saving need the token in "
+            "Let browsers, ewa-view and HTTP clients watch by this port (0: any free port). Only this "
+            "machine "
+            "can connect, unless an address stands before the port. Pausing and saving need the token in "
             "DIR/live.json",
-            brief("Let ewa-view watch the training by this port")),
+            brief("Let browsers and ewa-view watch by this port")),
         row("sh-degree", kDrawing, kQuality, "0..3", "Highest degree of the spherical harmonics",
             within(0, kMaxShDegree), kUsual),
         row("shutter", "render", kData, "0..1",

@@ -205,6 +205,7 @@ void Run::start() {
 
     const Camera& camera = input_.dataset.frames[size_t(input_.split.train.front())].camera;
     start.name = input_.name;
+    start.dataset = &input_.dataset;
     start.train_views = input_.split.train.size();
     start.test_views = input_.split.test.size();
     start.width = camera.width;

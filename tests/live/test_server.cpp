@@ -2,15 +2,18 @@
 // The HTTP server of a training: what it gives, and what it refuses.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <regex>
 
+#include "ewa/dataset.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 #include "live/raw_socket.h"
 #include "live_test.h"
+#include "support/splat_scenes.h"
 #include "support/temp_folder.h"
 
 namespace ewa::live {
@@ -111,6 +114,97 @@ TEST(LiveServer, GivesAPlyFileOfThePresentStep) {
     EXPECT_EQ(answer.substr(answer.find("\r\n\r\n") + 4), test::file_bytes(folder.path() / "splats.ply"));
     const std::string head = ask(server, "HEAD /splats");
     EXPECT_EQ(head, answer.substr(0, answer.find("\r\n\r\n") + 4)) << "HEAD is GET without the body";
+}
+
+TEST(LiveServer, GivesAPageWhoseViewsAreThoseOfTheRun) {
+    Server server("127.0.0.1", 0, "secret");
+    const std::string early = ask(server, "GET /");
+    EXPECT_EQ(status_code(early), 503) << "there are no splats, so no views";
+    EXPECT_NE(early.find("\r\nRefresh: 1\r\n"), std::string::npos) << "a browser does not ask again";
+
+    Dataset cameras;
+    cameras.frames.resize(1);
+    cameras.frames[0].name = "first.jpg";
+    cameras.frames[0].camera = {40, 30, 50, 60, 20, 15};
+    SaveOptions options;
+    options.page = {.title = "a <run>", .cameras = &cameras, .background = {1, 0, 0.5f}};
+    server.describe(options);
+    server.offer({3, test::storable_splats(1, 50, 1)}, 0);
+    const std::string page = ask(server, "GET /");
+    EXPECT_EQ(status_code(page), 200);
+    for (const char* part :
+         {"\r\nContent-Type: text/html", "\r\nContent-Security-Policy: frame-ancestors 'none'\r\n",
+          "default-src 'none'", "connect-src 'self'", "\"live\":true", "<title>a &lt;run&gt;</title>",
+          "\"name\":\"first.jpg\"", "\"fx\":50.0,\"fy\":60.0", "\"background\":[1.0,0.0,0.5]"})
+        EXPECT_NE(page.find(part), std::string::npos) << part;
+
+    for (const char* path : {"GET /", "GET /scene"}) {
+        const RawSocket socket(server.port());
+        socket.send(std::string(path) + " HTTP/1.1\r\nHost: evil.example\r\n\r\n");
+        EXPECT_EQ(status_code(socket.receive()), 403) << path;
+        EXPECT_EQ(status_code(ask(server, path, "Sec-Fetch-Site: cross-site\r\n")), 403) << path;
+        EXPECT_EQ(status_code(ask(server, path, "Authorization: Bearer secreT\r\n")), 401) << path;
+    }
+}
+
+/// The value of a header of an answer.
+std::string header_of(const std::string& answer, const std::string& name) {
+    const size_t at = answer.find("\r\n" + name + ": ");
+    if (at == std::string::npos) return "";
+    const size_t begin = at + name.size() + 4;
+    return answer.substr(begin, answer.find("\r\n", begin) - begin);
+}
+
+TEST(LiveServer, GivesTheSceneAsASogFile) {
+    Server server("127.0.0.1", 0, "");
+    EXPECT_EQ(status_code(ask(server, "GET /scene", "If-None-Match: \"x\"\r\n")), 304) << "nothing newer";
+    EXPECT_TRUE(server.wants_splats(0));
+    Gaussians splats = test::storable_splats(1, 60, 2);
+    const test::TempFolder folder;
+    const SaveOptions antialiased{.antialiased = true};
+    save_splats(folder.path() / "file.sog", splats, antialiased);
+    server.describe(antialiased);
+    server.offer({3, splats}, 0);
+    const std::string first = ask(server, "GET /scene");
+    EXPECT_EQ(status_code(first), 200);
+    EXPECT_EQ(header_of(first, "Ewa-Step"), "3");
+    EXPECT_EQ(first.substr(first.find("\r\n\r\n") + 4), test::file_bytes(folder.path() / "file.sog"));
+
+    const std::string known = "If-None-Match: " + header_of(first, "ETag") + "\r\n";
+    EXPECT_EQ(status_code(ask(server, "GET /scene", known)), 304);
+    splats.means[3] = NAN;  // is left out
+    server.offer({4, splats}, 0);
+    std::string second;
+    EXPECT_TRUE(soon([&] { return status_code(second = ask(server, "GET /scene", known)) == 200; }));
+    EXPECT_EQ(header_of(second, "Ewa-Step"), "4");
+    EXPECT_NE(header_of(second, "ETag"), header_of(first, "ETag"));
+    const auto file = folder.write("second.sog", second.substr(second.find("\r\n\r\n") + 4));
+    EXPECT_EQ(load_splats(file).size(), 59u);
+}
+
+TEST(LiveScenes, LeaveTimeToTheTraining) {
+    Scenes scenes;
+    const Gaussians splats = test::storable_splats(1, 20000, 0);  // slow enough for a rest that is seen
+    EXPECT_FALSE(scenes.kept(true, true)) << "there is none";
+    const auto first = scenes.of(1, splats, {}, true, true);
+    EXPECT_EQ(scenes.kept(true, true), first);
+    EXPECT_EQ(scenes.kept(false, true), first);
+    EXPECT_EQ(scenes.of(2, splats, {}, true, true), first) << "asked for while it was made";
+    EXPECT_FALSE(scenes.kept(true, false)) << "a paused training has time";
+    EXPECT_EQ(scenes.of(1, splats, {}, true, false), first) << "it is of this step";
+    EXPECT_TRUE(soon([&] { return !scenes.kept(true, true); })) << "the rest has no end";
+}
+
+TEST(LiveScenes, StrangersHoldOne) {
+    Scenes scenes;
+    const Gaussians splats = test::storable_splats(1, 10, 0);
+    auto held = scenes.of(1, splats, {}, false, false);
+    EXPECT_EQ(scenes.of(2, splats, {}, true, false)->step, 2);
+    EXPECT_EQ(scenes.kept(false, false), held) << "a second scene is kept for strangers";
+    EXPECT_FALSE(scenes.kept(true, false));
+    held.reset();
+    EXPECT_FALSE(scenes.kept(false, false));
+    EXPECT_EQ(scenes.of(2, splats, {}, false, false)->step, 2);
 }
 
 TEST(LiveServer, TakesCommandsFromWhoHasTheToken) {

@@ -11,6 +11,7 @@ sys.dont_write_bytecode = True  # beside the sources
 import support
 from support import HEIGHT, PATIENCE, WIDTH, ActionChains, BrowserTest, By, Keys, browser, psnr, run, settled, trained_run
 from test_levels import LevelsTest, StreamTest  # noqa: F401 (unittest finds them here)
+from test_live import FiguresTest, LiveTest  # noqa: F401
 
 
 class PageTest(BrowserTest):

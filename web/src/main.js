@@ -3,6 +3,7 @@
 import {openArchive} from "./archive.js";
 import {between, Camera} from "./camera.js";
 import {Controls} from "./controls.js";
+import {Live} from "./live.js";
 import {joined, LevelScene, openLevels} from "./levels.js";
 import {Renderer} from "./renderer.js";
 import {decodeSog} from "./sog.js";
@@ -247,6 +248,13 @@ async function start() {
     try {
         const settings = JSON.parse(byId("settings").textContent), text = byId("scene").textContent.trim();
         byId("scene").remove();
+        if (settings.live) {
+            const page = new Page(gl, settings);
+            return new Live(gl, (scene, step) => {
+                page.show(scene);
+                state.step = step;
+            }, (part) => { byId("progress").value = part; }, fail).follow();
+        }
         if (settings.levels) {
             const opened = await openLevels(settings.levels);
             return new Page(gl, settings).stream(opened);

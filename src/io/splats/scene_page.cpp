@@ -46,6 +46,7 @@ std::string settings_text(const ScenePage& page) {
                          {"target", vector_json(page.target)},
                          {"start", view_json(page.start)},
                          {"cameras", PageJson::array()}};
+    if (page.live) settings["live"] = true;
     if (page.portrait) settings["portrait"] = view_json(*page.portrait);
     if (!page.levels.empty()) {
         settings["levels"] = page.levels;
@@ -97,7 +98,7 @@ std::string scene_page_html(const ScenePage& page) {
         html += text;
         rest.remove_prefix(at + mark.size());
     };
-    fill("@CONNECT@", page.levels.empty() ? "" : "; connect-src 'self'");
+    fill("@CONNECT@", page.levels.empty() && !page.live ? "" : "; connect-src 'self'");
     const std::string title = core::escape_html(page.title);
     fill("@TITLE@", title);
     fill("@TITLE@", title);
@@ -105,6 +106,15 @@ std::string scene_page_html(const ScenePage& page) {
     fill("@SCENE@", core::base64({reinterpret_cast<const unsigned char*>(page.sog.data()), page.sog.size()}));
     html += rest;
     return html;
+}
+
+std::string live_page(const Gaussians& gaussians, const PageOptions& options) {
+    ScenePage page;
+    page.title = options.title;
+    page.background = options.background;
+    page.live = true;
+    set_views(page, gaussians, options.cameras);
+    return scene_page_html(page);
 }
 
 std::filesystem::path levels_of_page(const std::filesystem::path& page) {

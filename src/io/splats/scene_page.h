@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ewa/camera.h"
+#include "ewa/splat_scene.h"
 
 namespace ewa::io {
 
@@ -22,6 +23,7 @@ struct ScenePage {
     std::string title;
     std::string sog;          // a .sog file of version 2 with stored entries; empty with `levels`
     std::string levels = {};  // name of the lod-meta.json beside the page; empty: the scene is in the page
+    bool live = false;        // the page shows the splats of a training that runs; `sog` is empty
     std::array<float, 3> background{};    // RGB, 0..1
     Camera start;                         // the first view
     std::optional<Camera> portrait = {};  // that of a window which is higher than wide; empty: `start`
@@ -31,6 +33,9 @@ struct ScenePage {
 
 /// The text of the file.
 std::string scene_page_html(const ScenePage& page);
+
+/// The page that asks the server it comes from for the splats of a training (live/server.h). gaussians: where its views lead.
+std::string live_page(const Gaussians& gaussians, const PageOptions& options);
 
 /// The levels of an unbundled NAME.html: NAME-levels/lod-meta.json beside it.
 std::filesystem::path levels_of_page(const std::filesystem::path& page);
