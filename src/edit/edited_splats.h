@@ -48,6 +48,7 @@ class EditedSplats {
     size_t size() const { return states_.size(); }  // deleted ones included
     /// Size() splats, deleted ones included. A copy of the first splats exists only while values differ.
     const std::shared_ptr<const Gaussians>& splats() const { return now_; }
+    const std::shared_ptr<const Gaussians>& first() const { return first_; }  // without any edit
     const std::vector<uint8_t>& states() const { return states_; }
     /// Empty once splats have moved.
     Cameras cameras() const;

@@ -35,6 +35,7 @@ class History {
     bool redo();
 
     const EditedSplats& splats() const { return splats_; }
+    const std::shared_ptr<const Gaussians>& first() const { return splats_.first(); }  // without any edit
     const std::vector<Step>& steps() const { return steps_; }  // the undone ones too
     size_t done() const { return done_; }                      // steps that are in effect
     /// The edits in effect, in order.

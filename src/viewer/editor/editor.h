@@ -2,6 +2,7 @@
 // The editor of the window: scenes with their histories, and the edits that tools and panels ask for. Edits run on a thread of their
 // own, one after another, so that the window goes on while a large scene is edited.
 #pragma once
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <future>
@@ -51,9 +52,10 @@ struct EditSettings {
 /// A scene in the list of scenes.
 struct EditedScene {
     std::string name;
-    std::filesystem::path file;  // empty: never saved
-    std::shared_ptr<edit::History> history;
-    std::unique_ptr<edit::Journal> journal;  // null: the folder cannot be written
+    std::filesystem::path file;  // that was opened; empty: none
+    bool journaled = false;      // the file gets a journal, once there are edits
+    uint64_t id = 0;
+    std::shared_ptr<edit::Journal> journal;  // null: there are no edits, or the folder cannot be written
     bool shown = true;
     bool unsaved = false;
 };
@@ -62,9 +64,10 @@ struct EditedScene {
 struct EditSnapshot {
     std::shared_ptr<const Gaussians> splats;
     std::shared_ptr<const std::vector<uint8_t>> states;
+    edit::Cameras cameras;  // of the splats' run, while no splat has moved
     size_t left = 0, selected = 0, locked = 0, hidden = 0;
-    std::optional<std::array<glm::dvec3, 2>>
-        bounds;            // of the selection: its lowest and highest corner, world
+    /// Of the selection: its lowest and highest corner, world.
+    std::optional<std::array<glm::dvec3, 2>> bounds;
     glm::dvec3 middle{0};  // of the selection: the mean of the means
     std::vector<edit::Step> steps;
     size_t done = 0;
@@ -72,10 +75,13 @@ struct EditSnapshot {
     double milliseconds = 0;  // of the last edit
 };
 
+class EditWorker;
+
 class Editor {
   public:
-    /// wake: called when take() has something new.
-    explicit Editor(std::function<void()> wake);
+    /// program: the file of `ewa`, which writes what is saved. wake: called on a thread of the editor when take() has something new.
+    /// budget: most splats of a draft, which is drawn while the view changes.
+    Editor(std::filesystem::path program, std::function<void()> wake, size_t budget);
     ~Editor();
 
     // Scenes.
@@ -84,6 +90,7 @@ class Editor {
                std::shared_ptr<const Gaussians> splats, edit::Cameras cameras, bool journaled);
     void add(const std::string& name, const std::filesystem::path& file,
              std::shared_ptr<const Gaussians> splats);
+    void clear();  // there is nothing to edit
     size_t scenes() const { return scenes_.size(); }
     const EditedScene& scene(size_t i) const { return *scenes_[i]; }
     size_t active() const { return active_; }
@@ -109,24 +116,24 @@ class Editor {
     bool busy() const;  // edits are being done
     /// Takes what has been done. Call it once per turn of the window's loop, before anything reads snapshot().
     struct News {
-        bool states = false, splats = false;  // marks() or splats() are others
-        std::string note;                     // a message for the user; empty: none
+        bool any = false, splats = false, marks = false;  // splats() and marks() are others
+        std::string note;                                 // a message for the user; empty: none
+        std::vector<edit::Step> done;                     // steps that have changed something
     };
     News take();
     /// Of the active scene.
     const EditSnapshot& snapshot() const { return *snapshot_; }
     /// Of all scenes that are shown, joined: what the render thread gets.
     std::shared_ptr<const Gaussians> splats() const { return drawn_; }
-    std::shared_ptr<const std::vector<uint8_t>> marks() const {
-        return marks_;
-    }  // ewa::Mark bits; null: none
+    /// ewa::Mark bits of splats(); null: none.
+    std::shared_ptr<const std::vector<uint8_t>> marks() const { return marks_; }
 
     // Files.
-    /// Replays the edits on the file as it was read, and writes the result. In the background. all: joins all scenes that are shown.
+    /// `ewa convert` replays the edits on the file and writes the result, on a thread of its own. all: joins all scenes that are shown.
     void save(const std::filesystem::path& file, bool all);
     bool saving() const { return saving_.valid(); }
     bool unsaved() const;  // any scene has edits that were not saved
-    /// The journal of a crashed session, if `file` has one with edits.
+    /// The journal of an earlier session, if `file` has one with edits. Throws InputError if it cannot be read.
     static std::optional<edit::ReadJournal> left_journal(const std::filesystem::path& file, size_t splats);
     void restore(const edit::ReadJournal& journal);
     /// The ewa convert line of the active scene's edits.
@@ -135,14 +142,26 @@ class Editor {
     EditSettings settings;
 
   private:
+    struct Saved {
+        std::string note;
+        std::vector<uint64_t> failed;  // scenes that are not saved
+    };
+    EditedScene& now() { return *scenes_[active_]; }
+    void insert(std::unique_ptr<EditedScene> scene, std::shared_ptr<const Gaussians> splats, edit::Cameras cameras);
+    void open_journal(EditedScene& scene, bool go_on);
+
+    std::filesystem::path program_;
     std::vector<std::unique_ptr<EditedScene>> scenes_;
     size_t active_ = 0;
     std::shared_ptr<const EditSnapshot> snapshot_ = std::make_shared<EditSnapshot>();
     std::shared_ptr<const Gaussians> drawn_;
     std::shared_ptr<const std::vector<uint8_t>> marks_;
     std::optional<size_t> preview_count_;
-    std::future<std::string> saving_;
     std::function<void()> wake_;
+    std::string note_;
+    uint64_t ids_ = 0;  // that were given to scenes
+    std::unique_ptr<EditWorker> worker_;
+    std::future<Saved> saving_;  // its thread ends before the rest
 };
 
 }  // namespace ewa::viewer
