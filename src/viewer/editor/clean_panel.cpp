@@ -88,8 +88,8 @@ void CleanSection::draw_rule(Editor& editor, const ui::Text& text, const char* t
                              const std::string& shape) {
     const bool shown = rule_ == text.name;
     ImGui::PushID(text.name);
-    switch (ui::button_line({{say::kPreview, true, shown ? ui::ButtonLook::chosen : ui::ButtonLook::plain},
-                             {say::kRemove, true, ui::ButtonLook::danger}})) {
+    switch (ui::button_line(
+        {{say::kPreview, true, shown ? ui::ButtonLook::chosen : ui::ButtonLook::plain}, {say::kRemove}})) {
         case 0:
             end(editor);
             if (shown) break;
@@ -120,9 +120,9 @@ void CleanSection::draw(Editor& editor) {
     if (scale_ == 0) scale_ = large_scale(*now.splats);
     ImGui::PushID("clean");
     draw_main(editor);
-    ui::caption(say::kFloaters);
+    ui::label_left(say::kFloaters);
     draw_rule(editor, say::kFloaters, say::kRemoveFloaters, kFloatersShape);
-    ui::caption(say::kFar);
+    ui::label_left(say::kFar);
     draw_rule(editor, say::kFar, say::kRemoveFar, "far");
     if (cameras_of(editor)) {
         ui::label_left(say::kFewViews);

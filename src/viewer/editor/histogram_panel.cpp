@@ -70,6 +70,7 @@ void HistogramSection::draw_bins(Editor& editor, const Histogram& histogram) {
     ImDrawList& list = *ImGui::GetWindowDrawList();
     list.AddRectFilled(low, high, ImGui::GetColorU32(ImGuiCol_FrameBg), ImGui::GetStyle().FrameRounding);
     const float width = size.x / float(histogram.bins());
+    const auto left_of = [&](size_t bin) { return low.x + std::floor(width * float(bin)); };
     const size_t last = histogram.bins() - 1;
     const float place = (ImGui::GetIO().MousePos.x - low.x) / width;
     const size_t pointed = size_t(std::clamp(place, 0.0f, float(last)));
@@ -77,8 +78,8 @@ void HistogramSection::draw_bins(Editor& editor, const Histogram& histogram) {
     if (first_) first_ = std::min(*first_, last);
     if (first_) {
         const auto [from, to] = std::minmax({*first_, pointed});
-        list.AddRectFilled(ImVec2(low.x + width * float(from), low.y),
-                           ImVec2(low.x + width * float(to + 1), high.y), ImU32(accent(kRangeOpacity)));
+        list.AddRectFilled(ImVec2(left_of(from), low.y), ImVec2(left_of(to + 1), high.y),
+                           ImU32(accent(kRangeOpacity)));
         if (ImGui::IsItemDeactivated()) {
             first_.reset();
             editor.select(range_of_bins(histogram, from, to));
@@ -91,8 +92,8 @@ void HistogramSection::draw_bins(Editor& editor, const Histogram& histogram) {
         for (size_t bin = 0; bin <= last; ++bin) {
             const float bar = bar_height((*counts[kind])[bin], most, counts_ == 1);
             if (bar > 0)
-                list.AddRectFilled(ImVec2(low.x + width * float(bin), high.y - std::max(1.0f, bar * size.y)),
-                                   ImVec2(low.x + width * float(bin + 1), high.y), colors[kind]);
+                list.AddRectFilled(ImVec2(left_of(bin), high.y - std::max(1.0f, bar * size.y)),
+                                   ImVec2(left_of(bin + 1), high.y), colors[kind]);
         }
     if (!ImGui::IsItemHovered() && !ImGui::IsItemActive()) return;
     ImGui::SetTooltip(

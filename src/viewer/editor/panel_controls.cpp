@@ -52,18 +52,14 @@ bool section(const Text& text, bool open_at_first, bool open_now) {
     ImGui::Dummy(ImVec2(0, 0.15f * ImGui::GetTextLineHeight()));
     if (open_now) ImGui::SetNextItemOpen(true);
     const bool open = ImGui::CollapsingHeader(text.name, open_at_first ? ImGuiTreeNodeFlags_DefaultOpen : 0);
-    show_hint(text.hint);
+    if (!open) show_hint(text.hint);
     return open;
 }
 
-void caption(const Text& text) {
+void label_left(const Text& text) {
     ImGui::AlignTextToFramePadding();
     ImGui::TextUnformatted(text.name);
     show_hint(text.hint);
-}
-
-void label_left(const Text& text) {
-    caption(text);
     const float usual = kLabelWidth * ImGui::GetTextLineHeight();
     const float needed = ImGui::CalcTextSize(text.name).x + ImGui::GetStyle().ItemInnerSpacing.x;
     ImGui::SameLine(ImGui::GetCursorPosX() + std::max(usual, needed));
@@ -78,16 +74,22 @@ void label_above(const Text& text) {
 
 int button_line(std::span<const Button> buttons, float gap) {
     if (gap < 0) gap = ImGui::GetStyle().ItemSpacing.x;
-    float rest = ImGui::GetContentRegionAvail().x - gap * float(buttons.size() - 1);
-    for (const Button& button : buttons) rest -= ImGui::CalcTextSize(button.text.name).x;
-    const float around = std::max(0.0f, rest / float(buttons.size()));
+    const float room = ImGui::GetContentRegionAvail().x - gap * float(buttons.size() - 1);
+    float texts = 0, longest = 0;
+    for (const Button& button : buttons) {
+        texts += ImGui::CalcTextSize(button.text.name).x;
+        longest = std::max(longest, ImGui::CalcTextSize(button.text.name).x);
+    }
+    const float equal = room / float(buttons.size());
+    const float around = std::max(0.0f, (room - texts) / float(buttons.size()));
+    const bool all_fit = longest + 2 * ImGui::GetStyle().FramePadding.x <= equal;
     int clicked = -1;
     for (size_t i = 0; i < buttons.size(); ++i) {
         const Button& button = buttons[i];
         if (i > 0) ImGui::SameLine(0, gap);
         ImGui::BeginDisabled(!button.enabled);
         push_look(button.look);
-        const float width = ImGui::CalcTextSize(button.text.name).x + around;
+        const float width = all_fit ? equal : ImGui::CalcTextSize(button.text.name).x + around;
         if (ImGui::Button(button.text.name, ImVec2(width, 0))) clicked = int(i);
         ImGui::PopStyleColor(3);
         ImGui::EndDisabled();

@@ -19,8 +19,6 @@ using Text = say::Item;
 void show_hint(const char* hint);
 /// A section's header. Returns whether it is open. open_now: opens it.
 bool section(const Text& text, bool open_at_first, bool open_now = false);
-/// A line of text.
-void caption(const Text& text);
 /// A label. The next item fills the rest of its line.
 void label_left(const Text& text);
 /// A label. The next item fills the line below.
@@ -32,7 +30,7 @@ struct Button {
     bool enabled = true;
     ButtonLook look = ButtonLook::plain;
 };
-/// Buttons side by side over the whole width. Returns which one is clicked, or -1. gap: in ImGui's coordinates; below 0: the usual
+/// Buttons side by side over the rest of the line, of equal widths where their texts fit. Returns which one is clicked, or -1. gap: in ImGui's coordinates; below 0: the usual
 /// one.
 int button_line(std::span<const Button> buttons, float gap = -1);
 int button_line(std::initializer_list<Button> buttons);
