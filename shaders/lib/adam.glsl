@@ -63,7 +63,8 @@ void move_rounded(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, 
 #endif
     vec4 moved = adam_moved(value, m, v, gradient, rate, vec2(push.moment_share, push.gradient_share), push.bias2, EPSILON);
     const bool limited = limit_step(plane, value, depth, moved);
-    if (is_finite(moved) && is_finite(m) && is_finite(v)) {
+    const bool frozen = is_frozen(words);
+    if (is_finite(moved) && is_finite(m) && is_finite(v) && !frozen) {
         if (limited) ++limited_steps;
         params_out[at] = as_texel(moved);
         if (PACKED_MOMENTS) {
@@ -72,7 +73,7 @@ void move_rounded(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, 
             moments1_out[at] = as_texel(floatBitsToUint(m));
             moments2_out[at] = as_texel(floatBitsToUint(v));
         }
-    } else if (is_finite(value)) {
+    } else if (is_finite(value) && !frozen) {
         ++dropped_updates;
     }
 }

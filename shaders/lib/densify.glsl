@@ -2,7 +2,7 @@
 // What adaptive density control does with one splat (3DGS, section 5.2 and densify_and_prune of its code). A splat
 // whose mean gradient reaches the threshold is cloned if it is small and split if it is large. A splat that has
 // become transparent is pruned, and one that is too large once prune_scale is set. The children of a split are judged
-// by their own size. A negative number of views prunes, whatever the splat is like. Outside of the region no splat
+// by their own size. A negative number of views prunes, whatever the splat is like. All else keeps a frozen splat. Outside of the region no splat
 // grows. A splat whose largest scale is above the distance of its mean to every point of the cameras' ball is pruned.
 #ifndef EWA_LIB_DENSIFY
 #define EWA_LIB_DENSIFY
@@ -11,7 +11,8 @@ const uint ACTION_PRUNE = 0u, ACTION_KEEP = 1u, ACTION_CLONE = 2u, ACTION_SPLIT 
 
 uint outputs_of(uint action) { return min(action, 2u); }
 
-uint action_of(DensifyPush push, vec4 mean_logit, vec4 quaternion, vec4 scale_red, vec2 statistics) {
+uint action_of(DensifyPush push, vec4 mean_logit, vec4 quaternion, vec4 scale_red, vec2 statistics, bool frozen) {
+    if (frozen) return statistics.y < 0.0 ? ACTION_PRUNE : ACTION_KEEP;
     const bool whole = is_finite(mean_logit) && is_finite(quaternion) && is_finite(scale_red);
     const bool opaque = mean_logit.w >= push.prune_opacity;
     if (!(whole && opaque) || statistics.y < 0.0) return ACTION_PRUNE;

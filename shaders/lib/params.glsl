@@ -6,4 +6,7 @@
 uint param_texel(uint planes, uint plane, uint i) {
     return (i / PARAM_BLOCK * planes + plane) * PARAM_BLOCK + i % PARAM_BLOCK;
 }
+
+// Whether a splat is frozen, by a texel of its moments.
+bool is_frozen(uvec4 moments) { return moments.x == FROZEN_MOMENT; }
 #endif

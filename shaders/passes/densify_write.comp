@@ -33,7 +33,7 @@ void main() {
     [[unroll]] for (uint plane = 0; plane < 3; ++plane)
         p[plane] = fetch(params, param_texel(PLANES, plane, i));
     const vec4 p0 = p[0], p1 = p[1], p2 = p[2];
-    const uint action = action_of(push, p0, p1, p2, statistics[i]);
+    const uint action = action_of(push, p0, p1, p2, statistics[i], is_frozen(fetch(moments, param_texel(PLANES, 0u, i))));
     const uint first = totals[i / push.scan_block] + prefix[i];
     [[unroll]] for (uint child = 0; child < 2; ++child) {
         const uint to = first + child;

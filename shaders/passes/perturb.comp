@@ -3,7 +3,8 @@
 // Adds noise of a splat's own shape to its mean; transparent splats move more (Kheradmand et al. 2024, eq. 8): mean
 // += amplitude sigmoid(-MCMC_GATE_SLOPE (opacity - MCMC_GATE_OPACITY)) Sigma n, at most `max_length` along each
 // axis of the splat.
-// One invocation owns splat i. It updates the splat's mean in place and counts shortened steps.
+// One invocation owns splat i. It updates the splat's mean in place and counts shortened steps. With push.frozen it reads the
+// moments, and a frozen splat stays.
 // A frame whose instances did not fit changes nothing: the host repeats it.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
@@ -14,12 +15,14 @@
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0, scalar) buffer Params { vec4 params[]; };
 layout(set = 0, binding = 1, scalar) buffer CountsBlock { Counts counts; };
+layout(set = 0, binding = 2, scalar) readonly buffer Moments { uvec4 moments[]; };
 layout(push_constant, scalar) uniform Push { PerturbPush push; };
 
 void main() {
     const uint i = item_index();
     if (i >= push.splats || counts.instances > push.instance_capacity) return;
     const uint at = param_texel(push.planes, 0u, i);
+    if (push.frozen != 0u && is_frozen(moments[at])) return;
     const vec4 p0 = params[at];
     const vec3 scale = exp(params[param_texel(push.planes, 2u, i)].xyz);
     const float opacity = 1.0 / (1.0 + exp(-p0.w));

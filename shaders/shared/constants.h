@@ -133,6 +133,8 @@ EWA_UINT(MCMC_DRAW_STREAM, 0x64726177u);
 EWA_UINT(MCMC_NOISE_STREAM, 0x6e6f6973u);
 EWA_UINT(MCMC_SPREAD_STREAM, 0x73707264u);
 EWA_UINT(MOMENT_STREAM, 0x6d6f6d00u);  // plus the plane: rounding of Adam's moments
+// Each word of the moments of a frozen splat. Adam writes finite moments, and this is NaN, in 32 bits and in 16.
+EWA_UINT(FROZEN_MOMENT, 0xffffffffu);
 
 // How a splat's opacity depends on its footprint. Values of SPEC_KERNEL and of ewa::Footprint.
 // 3DGS: the opacity is the peak of the footprint.

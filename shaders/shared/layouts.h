@@ -605,6 +605,7 @@ struct DensifyPush {
     float region[6];
     // Middle and radius of the cameras' ball: a splat that is larger than its distance to the ball is pruned.
     float ball[4];
+    uint frozen;  // 1: some splats are frozen, and the moments say which; else 0
 };
 
 struct ResetPush {
@@ -630,7 +631,8 @@ struct McmcPush {
     float region[6];      // low corner, then high corner: a splat whose mean is outside is no source
     uint seed[2];
     uint step;
-    uint first;  // number of the first splat, among those of all ranks
+    uint first;   // number of the first splat, among those of all ranks
+    uint frozen;  // as in DensifyPush
 };
 
 struct PerturbPush {
@@ -641,7 +643,8 @@ struct PerturbPush {
     float max_length;  // of the noise along an axis of the splat (world units)
     uint seed[2];
     uint step;
-    uint first;  // number of the first splat, among those of all ranks
+    uint first;   // number of the first splat, among those of all ranks
+    uint frozen;  // as in DensifyPush
 };
 
 // ---- A mesh scene for ray tracing: buffers of rgba32ui texels that hold floats by their bits ----

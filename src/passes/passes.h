@@ -493,7 +493,7 @@ struct GridUpdate {
 struct DensifyDecide {
     static constexpr char shader[] = "densify_decide";
     using Work = PerElement<&shared::DensifyPush::splats>;
-    gpu::BufferPart params, statistics, outputs;
+    gpu::BufferPart params, statistics, outputs, moments;
 };
 
 /// Writes one array of the next generation of splats. moments: the old array to write with WRITE_MOMENTS.
@@ -515,7 +515,7 @@ struct ResetOpacity {
 struct McmcWeigh {
     static constexpr char shader[] = "mcmc_weigh";
     using Work = PerElement<&shared::McmcPush::splats>;
-    gpu::BufferPart params, weights, dead;
+    gpu::BufferPart params, weights, dead, moments;
 };
 
 /// Draws the sources of relocated and added splats, and counts their hits.
@@ -537,7 +537,7 @@ struct McmcWrite {
 struct Perturb {
     static constexpr char shader[] = "perturb";
     using Work = PerElement<&shared::PerturbPush::splats>;
-    gpu::BufferPart params, counts;
+    gpu::BufferPart params, counts, moments;
 };
 
 // The sky behind the splats.

@@ -47,7 +47,8 @@ shared::DensifyPush densify_push(const Model& model, const FrameBuffers& frame, 
                              .first = model.first,
                              .split = rules.split,
                              .region = {},
-                             .ball = {}};
+                             .ball = {},
+                             .frozen = rules.frozen};
     std::ranges::copy(rules.region, push.region);
     std::ranges::copy(rules.ball, push.ball);
     return push;
@@ -82,9 +83,15 @@ shared::McmcPush mcmc_push(const Phase& phase, const Model& model, const McmcRul
                           .region = {},
                           .seed = {uint32_t(rules.seed), uint32_t(rules.seed >> 32)},
                           .step = rules.step,
-                          .first = model.first};
+                          .first = model.first,
+                          .frozen = rules.frozen};
     std::ranges::copy(rules.region, push.region);
     return push;
+}
+
+/// Which splats are frozen is read only where some are. Else the binding takes another buffer, since the moments may be on the host.
+const gpu::Buffer& marks(const Model& model, bool frozen) {
+    return frozen ? model.moments1 : model.params;
 }
 
 /// The weights of a model's splats as sources, and which of them are dead.
@@ -96,9 +103,11 @@ struct Weighed {
         : weights(phase.cache.device(), "weights", model, phase.frame),
           dead(phase.cache.device(), "dead", model, phase.frame) {
         phase.run([&](const passes::Recorder& on) {
-            on.record(
-                passes::McmcWeigh{.params = model.params, .weights = weights.values, .dead = dead.values},
-                push);
+            on.record(passes::McmcWeigh{.params = model.params,
+                                        .weights = weights.values,
+                                        .dead = dead.values,
+                                        .moments = marks(model, push.frozen != 0)},
+                      push);
         });
         sums.weight = sum(phase, weights, model.splats);
         sums.dead = sum(phase, dead, model.splats);
@@ -124,10 +133,11 @@ struct Weighed {
 uint32_t count_densified(const Phase& phase, const Model& model, const DensifyRules& rules, float threshold) {
     const FrameBuffers& frame = phase.frame;
     phase.run([&](const passes::Recorder& on) {
-        on.record(
-            passes::DensifyDecide{
-                .params = model.params, .statistics = model.statistics, .outputs = frame.tile_counts},
-            densify_push(model, frame, rules, threshold, 0));
+        on.record(passes::DensifyDecide{.params = model.params,
+                                        .statistics = model.statistics,
+                                        .outputs = frame.tile_counts,
+                                        .moments = marks(model, rules.frozen)},
+                  densify_push(model, frame, rules, threshold, 0));
         // Leaves the offsets of the next generation in frame.prefix and frame.scan_totals.
         record_sum(phase, on,
                    {.source = frame.tile_counts,
@@ -248,15 +258,18 @@ void write_mcmc(const Phase& phase, Model& model, const McmcRules& rules, const 
 
 void record_noise(const passes::Recorder& on, const Model& model, const FrameBuffers& frame,
                   const Noise& noise) {
-    on.record(passes::Perturb{.params = model.params, .counts = frame.counts},
-              {.splats = model.splats,
-               .planes = model.planes(),
-               .instance_capacity = frame.instance_capacity,
-               .amplitude = noise.amplitude,
-               .max_length = noise.max_length,
-               .seed = {uint32_t(noise.seed), uint32_t(noise.seed >> 32)},
-               .step = noise.step,
-               .first = model.first});
+    on.record(
+        passes::Perturb{
+            .params = model.params, .counts = frame.counts, .moments = marks(model, noise.frozen)},
+        {.splats = model.splats,
+         .planes = model.planes(),
+         .instance_capacity = frame.instance_capacity,
+         .amplitude = noise.amplitude,
+         .max_length = noise.max_length,
+         .seed = {uint32_t(noise.seed), uint32_t(noise.seed >> 32)},
+         .step = noise.step,
+         .first = model.first,
+         .frozen = noise.frozen});
 }
 
 }  // namespace ewa::pipeline

@@ -60,6 +60,7 @@ struct DensifyRules {
     uint32_t max_splats = 0;  // hard cap: the threshold is raised until the next generation fits
     Region region = kEverywhere;
     Ball ball = kUnlimited;  // a splat larger than its distance to the ball is pruned
+    bool frozen = false;     // some splats are frozen: the moments say which
 };
 
 /// The number of splats in a model's next generation, if splats with a mean gradient norm above `threshold` are cloned or split.
@@ -76,7 +77,7 @@ Densified decide_densify(const DensifyRules& rules, const std::function<uint64_t
 /// Writes the next generation. The model then has no statistics.
 void write_densified(const Phase& phase, Model& model, const DensifyRules& rules, float threshold);
 
-/// Records a pass that lowers every opacity to at most this logit and zeroes the opacity's moments.
+/// Records a pass that lowers every opacity to at most this logit and zeroes the opacity's moments. Frozen splats stay.
 void record_reset_opacity(const passes::Recorder& on, const Model& model, float logit);
 
 /// The rules of 3DGS as Markov chain Monte Carlo (Kheradmand et al. 2024). Dead splats move to living ones, the number
@@ -90,6 +91,7 @@ struct McmcRules {
     uint64_t seed = 0;
     uint32_t step = 0;
     Region region = kEverywhere;  // dead splats outside of it move into it
+    bool frozen = false;          // as in DensifyRules
 };
 
 /// A portion's part of a refinement.
@@ -127,6 +129,7 @@ struct Noise {
     float max_length = 0;  // world units, along each axis of a splat
     uint64_t seed = 0;
     uint32_t step = 0;
+    bool frozen = false;  // as in DensifyRules
 };
 
 /// Records a pass that adds to each mean amplitude * gate(opacity) * Sigma * a standard normal vector

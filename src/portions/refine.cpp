@@ -18,9 +18,9 @@ using namespace pipeline;
 Refinement densify(Portions& portions, const Phase& phase, const DensifyRules& rules) {
     const Densified next = decide_densify(rules, [&](float threshold) {
         uint64_t own = 0;
-        portions.visit(Portions::Need::statistics, [&](int, const Model& model) {
-            own += count_densified(phase, model, rules, threshold);
-        });
+        const auto need = rules.frozen ? Portions::Need::state : Portions::Need::statistics;
+        portions.visit(
+            need, [&](int, const Model& model) { own += count_densified(phase, model, rules, threshold); });
         const std::vector<uint64_t> all = portions.ranks().gather(std::span(&own, 1));
         return std::accumulate(all.begin(), all.end(), uint64_t(0));
     });
@@ -53,9 +53,14 @@ size_t portion_of(const std::vector<McmcPart>& parts, uint32_t draw) {
     return size_t(after - parts.begin()) - 1;
 }
 
+/// Moments say which splats are frozen.
+Portions::Need need_of(const McmcRules& rules) {
+    return rules.frozen ? Portions::Need::state : Portions::Need::params;
+}
+
 std::vector<McmcPart> weighed(Portions& portions, const Phase& phase, const McmcRules& rules) {
     std::vector<uint64_t> own(2 * size_t(portions.count()));
-    portions.visit(Portions::Need::params, [&](int portion, const Model& model) {
+    portions.visit(need_of(rules), [&](int portion, const Model& model) {
         const McmcPart part = weigh_mcmc(phase, model, rules);
         own[2 * size_t(portion)] = part.weight;
         own[2 * size_t(portion) + 1] = part.dead;
@@ -143,7 +148,7 @@ Refinement refine_mcmc(Portions& portions, const Phase& phase, const McmcRules& 
     } else {
         const size_t first = size_t(portions.first());
         std::vector<Draws> draws(size_t(portions.count()));
-        portions.visit(Portions::Need::params, [&](int portion, const Model& model) {
+        portions.visit(need_of(rules), [&](int portion, const Model& model) {
             draws[size_t(portion)] = sources_of(phase, model, rules, parts, first + size_t(portion));
         });
         std::vector<std::vector<std::byte>> out(size_t(portions.ranks().size()));

@@ -203,13 +203,15 @@ TEST(DensifyEdges, WritesNothingPastItsCapacity) {
                                    0,
                                    0,
                                    {-far, -far, -far, far, far, far},
-                                   {0, 0, 0, far}};
+                                   {0, 0, 0, far},
+                                   0};
     };
     const uint64_t bytes = pipeline::parameter_bytes(capacity, 1);
     Guarded params("params", bytes), moments("moments", bytes);
     r.run([&](gpu::Recording& recording) {
         r.cache.get<passes::DensifyDecide>().record(
-            recording, {start.model.params, start.model.statistics, frame.tile_counts}, push(0));
+            recording, {start.model.params, start.model.statistics, frame.tile_counts, start.model.moments1},
+            push(0));
         pipeline::record_scan({recording, r.cache},
                               {frame.tile_counts, nullptr, frame.prefix, frame.scan_totals, frame.counts},
                               {500, frame.sizes.scan_block, shared::TOTAL_SCAN, "offsets"});

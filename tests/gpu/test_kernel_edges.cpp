@@ -127,7 +127,7 @@ Weighed weigh(const Gaussians& gaussians, float dead_logit) {
     push.dead_logit = dead_logit;
     std::ranges::copy(pipeline::kEverywhere, push.region);
     r.run([&](gpu::Recording& recording) {
-        r.cache.get<passes::McmcWeigh>().record(recording, {model.params, weights, dead}, push);
+        r.cache.get<passes::McmcWeigh>().record(recording, {model.params, weights, dead, model.params}, push);
     });
     expect_intact({&weights, &dead});
     return {weights.read<uint32_t>(), dead.read<uint32_t>()};

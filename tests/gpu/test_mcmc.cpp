@@ -73,7 +73,8 @@ std::vector<uint32_t> device_weights(const McmcStart& start, const pipeline::Reg
     push.dead_logit = float(std::log(0.005 / 0.995));
     std::ranges::copy(region, push.region);
     r.run([&](gpu::Recording& recording) {
-        r.cache.get<passes::McmcWeigh>().record(recording, {start.model.params, weights, dead}, push);
+        r.cache.get<passes::McmcWeigh>().record(
+            recording, {start.model.params, weights, dead, start.model.moments1}, push);
     });
     expect_intact({&weights, &dead});
     const auto result = weights.read<uint32_t>(), flags = dead.read<uint32_t>();

@@ -406,6 +406,39 @@ TEST(UpdateEdges, AnUpdateThatIsNotFiniteIsDroppedAndCounted) {
 
 /// What is not finite already is no update that was dropped; a gradient that is merely huge moves as any
 /// does.
+TEST(UpdateEdges, FrozenSplatsStayAndAreNotCounted) {
+    const Scene scene = random_scene(1912, 90, SplatKind::ordinary, 61, 47, 1);
+    const Slots slots(scene);
+    for (const uint32_t mode : {0u, kPacked}) {
+        GuardedModel model(scene.gaussians);
+        const uint32_t planes = model.model.planes();
+        std::vector<uint32_t> words(GuardedModel::zeros(scene.gaussians).size());
+        for (uint32_t f = 0; f < 4 * planes; ++f)
+            for (size_t i = 0; i < 90; i += 3)
+                words[pipeline::parameter_index(planes, f, i)] = shared::FROZEN_MOMENT;
+        model.moments1 = Guarded("moments1", words, gpu::Texel::rgba32ui);
+        model.moments2 = Guarded("moments2", words, gpu::Texel::rgba32ui);
+        Bench bench(slots);
+        for (uint32_t step = 1; step <= 3; ++step)
+            bench.run(scene, model.model, model.moments1, model.moments2, mode, push_for(scene, step));
+        const Gaussians after = model.read(model.model.params);
+        const auto moments1 = model.moments1.read<uint32_t>();
+        size_t moved = 0;
+        for (size_t i = 0; i < 90; ++i) {
+            const bool frozen = i % 3 == 0;
+            EXPECT_EQ(moments1[pipeline::parameter_index(planes, 5, i)] == shared::FROZEN_MOMENT, frozen);
+            moved += after.means[3 * i] != scene.gaussians.means[3 * i];
+            if (!frozen) continue;
+            EXPECT_EQ(after.means[3 * i], scene.gaussians.means[3 * i]);
+            EXPECT_EQ(after.opacity_logits[i], scene.gaussians.opacity_logits[i]);
+            for (size_t k = 0; k < after.sh_stride(); ++k)
+                EXPECT_EQ(after.sh[after.sh_stride() * i + k], scene.gaussians.sh[after.sh_stride() * i + k]);
+        }
+        EXPECT_GT(moved, 30u);
+        EXPECT_EQ(bench.counts.read<shared::Counts>()[0].dropped_updates, 0u);
+    }
+}
+
 TEST(UpdateEdges, HugeGradientsMoveAndBrokenValuesAreNotCounted) {
     Scene scene = random_scene(1907, 40, SplatKind::ordinary, 61, 47, 1);
     Slots slots(scene);
