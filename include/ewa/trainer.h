@@ -30,6 +30,19 @@ class StateReader;
 class Training;
 }  // namespace train
 
+/// An edit of the splats that are trained. Indices count the splats of Trainer::gaussians, in any order.
+struct SplatEdit {
+    std::vector<uint32_t> remove = {};
+    /// A frozen splat is drawn, but no step changes it, and no refinement copies, moves or removes it.
+    std::vector<uint32_t> freeze = {};
+    std::vector<uint32_t> unfreeze = {};  // such a splat learns again, from moments of zero; `freeze` wins
+};
+
+/// How many splats an edit has changed.
+struct EditCounts {
+    uint32_t removed = 0, frozen = 0, unfrozen = 0;
+};
+
 /// Owns the model and the cached training images on the device. A cached image takes 4 bytes a pixel if its
 /// file has at most 256 levels, else 16. Each step is one submission. On a GPU, step() may return before the device is done;
 /// all other functions wait for it.
@@ -63,6 +76,12 @@ class Trainer {
     /// state() and restore() in pieces, for checkpoints (train/state_stream.h). If reading fails, the trainer cannot be used any more.
     void save(train::StateWriter& to) const;
     void restore(train::StateReader& from);
+
+    /// Edits the splats after the last step. The others keep their values, Adam's moments and statistics. Takes host memory for a
+    /// state(). A trainer that restores the state() after an edit takes the same steps. Throws InputError, before any change,
+    /// for an index that is too large, or if too few splats would be left.
+    EditCounts edit(const SplatEdit& edit);
+    uint32_t frozen_splats() const;
 
     /// The splats, read back from the device, in the dataset's world frame. Their order is the trainer's own.
     Gaussians gaussians() const;

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "portions/refine.h"
+#include "train/state_edit.h"
 #include "train/step_views.h"
 
 namespace ewa::train {
@@ -77,7 +78,8 @@ void Refinement::after(int step) {
                           .kernel = parts_.options.render.kernel,
                           .seed = parts_.options.seed,
                           .step = uint32_t(step),
-                          .region = region_of(parts_.options, parts_.portions.origin())};
+                          .region = region_of(parts_.options, parts_.portions.origin()),
+                          .frozen = parts_.frozen > 0};
     run([&](const Phase& phase) { refine_mcmc(parts_.portions, phase, rules); });
 }
 
@@ -97,6 +99,7 @@ void Refinement::control_density(int step) {
         rules.step = uint32_t(step);
         rules.max_splats = parts_.options.max_splats;
         rules.region = region_of(parts_.options, parts_.portions.origin());
+        rules.frozen = parts_.frozen > 0;
         if (parts_.schedule.bounded) rules.ball = ball_of(cameras_, parts_.portions.origin());
         run([&](const Phase& phase) { densify(parts_.portions, phase, rules); });
     }
@@ -107,6 +110,16 @@ void Refinement::control_density(int step) {
             parts_.tools.executor.run(recording);
             parts_.portions.changed();
         });
+    }
+}
+
+/// Gives frozen splats the largest weight.
+void Refinement::keep_frozen(std::vector<std::vector<float>>& weights) {
+    const uint32_t planes = parameter_planes(parts_.portions.sh_degree());
+    for (size_t p = 0; p < weights.size(); ++p) {
+        const auto moments = parts_.portions.holder().download(int(p), portions::moments1);
+        for (size_t i = 0; i < weights[p].size(); ++i)
+            if (is_frozen(moments, planes, i)) weights[p][i] = std::numeric_limits<float>::infinity();
     }
 }
 
@@ -132,9 +145,9 @@ void Refinement::prune(int step) {
         parts_.several.raise_weights(drawing, views, largest);
     }
     if (parts_.fused()) parts_.several.free_buffers();
-    run([&](const Phase& phase) {
-        keep_largest(parts_.portions, phase, largest, parts_.options.final_splats);
-    });
+    if (parts_.frozen > 0) keep_frozen(largest);
+    const uint32_t kept = std::max(parts_.options.final_splats, parts_.frozen);
+    run([&](const Phase& phase) { keep_largest(parts_.portions, phase, largest, kept); });
 }
 
 }  // namespace ewa::train

@@ -26,6 +26,7 @@ class Refinement {
     void control_density(int step);
     /// Removes splats down to final_splats.
     void prune(int step);
+    void keep_frozen(std::vector<std::vector<float>>& weights);
     /// Runs a refinement. refine: changes the numbers of splats in the portions.
     void run(const std::function<void(const pipeline::Phase&)>& refine);
 

@@ -69,7 +69,8 @@ Noise noise_of(const TrainingParts& parts, int step) {
     return {.amplitude = float(amplitude),
             .max_length = float(parts.extent),
             .seed = parts.options.seed,
-            .step = uint32_t(step)};
+            .step = uint32_t(step),
+            .frozen = parts.frozen > 0};
 }
 
 portions::StepView view_of(TrainingParts& parts, int step, ImageCache& seen, int sh_degree, uint32_t slot) {

@@ -16,6 +16,7 @@
 #include "train/fused_steps.h"
 #include "train/needs.h"
 #include "train/refinement.h"
+#include "train/state_edit.h"
 #include "train/step_views.h"
 #include "train/training_parts.h"
 #include "train/training_state.h"
@@ -250,6 +251,21 @@ void Trainer::restore(train::StateReader& from) {
 void Trainer::restore(const TrainerState& state) {
     train::StateOfMemory memory(state);
     restore(memory);
+}
+EditCounts Trainer::edit(const SplatEdit& edit) {
+    TrainerState edited = state();
+    const EditCounts counts = train::apply_edit(edit, edited);
+    if (counts.removed + counts.frozen + counts.unfrozen == 0) return counts;
+    const int all = training_->portions().all();
+    if (edited.report.splats <= uint64_t(all - 1) * shared::PARAM_BLOCK)
+        throw InputError("the edit would leave " + std::to_string(edited.report.splats) +
+                         " splats, which are too few for the " + std::to_string(all) +
+                         " parts of this training");
+    restore(edited);
+    return counts;
+}
+uint32_t Trainer::frozen_splats() const {
+    return training_->parts.frozen;
 }
 Gaussians Trainer::gaussians() const {
     return train::gaussians_of(call(*training_, Call::gaussians).finished());

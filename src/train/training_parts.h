@@ -84,6 +84,7 @@ struct TrainingParts {
     portions::Step several;  // steps of several parts of views, or portions
     Learned learned;
     StepLog log;
+    uint32_t frozen = 0;  // splats of all ranks (train/state_edit.h)
 
     /// The parts of a training. resolved: options without automatic values. portions_of_rank: number of portions of each rank.
     TrainingParts(std::shared_ptr<gpu::Device> on, const Dataset& dataset, const std::vector<int>& frames,

@@ -5,12 +5,14 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <numeric>
 #include <type_traits>
 #include <utility>
 
 #include "ewa/error.h"
 #include "pipeline/image_reader.h"
 #include "portions/collect.h"
+#include "train/state_edit.h"
 #include "train/step_views.h"
 
 namespace ewa::train {
@@ -119,7 +121,8 @@ void restore(TrainingParts& parts, StateReader* from) {
     const auto sent = portions::from_rank_0(parts.portions.ranks(), std::as_bytes(std::span(&report, 1)));
     std::memcpy(&report, sent.data(), sizeof(report));
     parts.portions.clear(report.splats);
-    size_t read = 0;  // arrays
+    size_t read = 0;      // arrays
+    uint64_t frozen = 0;  // splats of this rank
     for (const portions::Array array : parts.portions.holder().kept()) {
         std::vector<uint64_t> sizes;
         for (int p = 0; p < parts.portions.all(); ++p)
@@ -130,6 +133,8 @@ void restore(TrainingParts& parts, StateReader* from) {
             parts.portions.ranks(), sizes,
             [&](uint64_t offset, std::span<std::byte> into) { from->read(read, offset, into); },
             [&](size_t part, std::vector<std::byte> bytes) {
+                if (array == portions::moments1)
+                    frozen += count_frozen(bytes, parameter_planes(parts.portions.sh_degree()));
                 parts.portions.holder().give(int(part) - parts.portions.first(), array, std::move(bytes));
             });
         ++read;
@@ -140,6 +145,8 @@ void restore(TrainingParts& parts, StateReader* from) {
         array.buffer->upload(
             std::span<const std::byte>(portions::from_rank_0(parts.portions.ranks(), bytes)));
     }
+    const std::vector<uint64_t> all_frozen = parts.portions.ranks().gather(std::span(&frozen, 1));
+    parts.frozen = uint32_t(std::accumulate(all_frozen.begin(), all_frozen.end(), uint64_t(0)));
     parts.log.report = report;
     parts.tools.expect(report.splats);
 }

@@ -90,10 +90,15 @@ struct DividedResult {
     Gaussians splats;
 };
 
-/// Trains so many steps. resume: where the training begins.
+struct EditAt {
+    int step;
+    SplatEdit edit;
+};
+
+/// Trains so many steps. resume: where the training begins. edited: what is edited, and after which step.
 inline DividedResult train_divided(TrainOptions options, const Gaussians& start, const DividedBy& by,
                                    int until, const Dataset& dataset = seven_views().dataset,
-                                   const TrainerState* resume = nullptr) {
+                                   const TrainerState* resume = nullptr, const EditAt* edited = nullptr) {
     options.device_memory_bytes = by.limit;
     DividedResult result;
     run_ranks(by.ranks, [&](std::shared_ptr<Ranks> group) {
@@ -102,7 +107,10 @@ inline DividedResult train_divided(TrainOptions options, const Gaussians& start,
         Trainer trainer(device, dataset, all_frames(dataset), start, options, group);
         if (group->rank() != 0) return trainer.follow();
         if (resume) trainer.restore(*resume);
-        while (trainer.steps_done() < until) trainer.step();
+        while (trainer.steps_done() < until) {
+            trainer.step();
+            if (edited && trainer.steps_done() == edited->step) trainer.edit(edited->edit);
+        }
         trainer.keep_waiting();
         result.state = trainer.state();
         result.peak = peak_device_bytes(*device);
