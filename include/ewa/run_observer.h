@@ -31,6 +31,13 @@ struct RunStart {
     MemoryEstimate memory;
 };
 
+/// What an observer may ask of a run between two steps.
+struct RunCommands {
+    std::function<void()> save;  // writes splats.ply and checkpoint.ewa
+    /// Trainer::edit. It is noted in metrics.jsonl and in the report, and the observer's StepReport has the new number of splats.
+    std::function<EditCounts(const SplatEdit&)> edit;
+};
+
 /// Follows a run and may end it. All calls come from the thread that called run_training, in the order of
 /// their declarations. An exception from any of them ends the run and reaches the caller of run_training.
 class RunObserver {
@@ -56,8 +63,8 @@ class RunObserver {
     virtual void on_evaluation(int /*step*/, const Evaluation&) {}
     /// A line was added to metrics.jsonl.
     virtual void on_metrics(const MetricsLine&) {}
-    /// All work after a step is done, and another step follows. save: writes splats.ply and checkpoint.ewa.
-    virtual void between_steps(const StepReport&, const Trainer&, const std::function<void()>& /*save*/) {}
+    /// All work after a step is done, and another step follows.
+    virtual void between_steps(const StepReport&, const Trainer&, const RunCommands&) {}
     /// Training has ended. splats.ply and checkpoint.ewa are written.
     virtual void on_saved(const StepReport&) {}
     /// The final evaluation has evaluated `done` of `views` views.

@@ -60,6 +60,11 @@ struct Summary {
     std::optional<ChunkFigures> chunks;  // of a training in chunks
 };
 
+/// How many splats an edit of a training has changed.
+struct EditCounts {
+    uint32_t removed = 0, frozen = 0, unfrozen = 0;
+};
+
 /// A line of metrics.jsonl.
 struct MetricsLine {
     int step = 0;
@@ -69,6 +74,7 @@ struct MetricsLine {
     std::optional<double> test_psnr, test_ssim;  // if the test views were evaluated after this step
     std::optional<double> train_psnr;            // dB, of this step's training view, as StepReport::psnr
     std::vector<Figure> test_figures = {};       // of RunOptions::metrics, with test_psnr
+    std::optional<EditCounts> edit = {};         // if the line is that of an edit after this step
 };
 
 }  // namespace ewa

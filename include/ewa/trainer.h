@@ -38,11 +38,6 @@ struct SplatEdit {
     std::vector<uint32_t> unfreeze = {};  // such a splat learns again, from moments of zero; `freeze` wins
 };
 
-/// How many splats an edit has changed.
-struct EditCounts {
-    uint32_t removed = 0, frozen = 0, unfrozen = 0;
-};
-
 /// Owns the model and the cached training images on the device. A cached image takes 4 bytes a pixel if its
 /// file has at most 256 levels, else 16. Each step is one submission. On a GPU, step() may return before the device is done;
 /// all other functions wait for it.

@@ -227,8 +227,8 @@ void TrainObserver::on_metrics(const MetricsLine& line) {
 }
 
 void TrainObserver::between_steps(const StepReport& step, const Trainer& trainer,
-                                  const std::function<void()>& save) {
-    if (served_) served_->attend(trainer, step, save);
+                                  const RunCommands& commands) {
+    if (served_) served_->attend(trainer, step, commands.save);
 }
 
 void TrainObserver::on_saved(const StepReport&) {

@@ -38,8 +38,7 @@ class TrainObserver : public RunObserver {
     void on_step(const StepReport& step) override;
     void on_evaluation(int step, const Evaluation& evaluation) override;
     void on_metrics(const MetricsLine& line) override;
-    void between_steps(const StepReport& step, const Trainer& trainer,
-                       const std::function<void()>& save) override;
+    void between_steps(const StepReport& step, const Trainer& trainer, const RunCommands& commands) override;
     void on_saved(const StepReport& step) override;
     void on_view(size_t done, size_t views) override;
     void on_evaluated(const StepReport& step, const Gaussians& gaussians) override;

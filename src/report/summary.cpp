@@ -96,6 +96,11 @@ Json to_json(const MetricsLine& line) {
     if (line.test_ssim) json["test_ssim"] = figure(line.test_ssim);
     if (line.train_psnr) json["train_psnr"] = figure(line.train_psnr);
     for (const Figure& one : line.test_figures) json["test_" + one.name] = figure(one.value);
+    if (line.edit) {
+        json["removed"] = line.edit->removed;
+        json["frozen"] = line.edit->frozen;
+        json["unfrozen"] = line.edit->unfrozen;
+    }
     return json;
 }
 
@@ -122,6 +127,8 @@ MetricsLine metrics_line(const core::JsonField& field) {
         if (const std::string key = "test_" + metric.name;
             metric.name != "psnr" && metric.name != "ssim" && known(key))
             line.test_figures.push_back({metric.name, number_or_nan(field, key.c_str())});
+    const auto splats = [&](const char* key) { return uint32_t(field.whole(key, UINT32_MAX)); };
+    if (known("removed")) line.edit = EditCounts{splats("removed"), splats("frozen"), splats("unfrozen")};
     return line;
 }
 

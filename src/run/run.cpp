@@ -5,7 +5,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <chrono>
 #include <future>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -19,7 +18,6 @@
 #include "gpu/device.h"
 #include "pipeline/model.h"
 #include "report/step_time.h"
-#include "report/tensorboard.h"
 #include "run/agreement.h"
 #include "run/disk_room.h"
 #include "run/earlier_run.h"
@@ -31,6 +29,7 @@
 #include "run/run_cameras.h"
 #include "run/run_files.h"
 #include "run/run_input.h"
+#include "run/run_log.h"
 #include "run/run_outputs.h"
 #include "run/run_saves.h"
 #include "run/run_times.h"
@@ -60,12 +59,6 @@ std::vector<PlanLine> plan_of(const Trainer& trainer, const train::RunInput& inp
 struct EarlierRun {
     std::unique_ptr<train::CheckpointReader> reader;  // until the trainer has it
     int steps = 0;                                    // that its run was asked for
-};
-
-/// The files of a run's metrics.
-struct MetricsFiles {
-    report::MetricsLog lines;
-    std::optional<report::EventsLog> events;
 };
 
 class Run {
@@ -99,7 +92,7 @@ class Run {
     void train(Trainer& trainer);
     void after_step(Trainer& trainer, int before);
     Evaluation evaluate(Trainer& trainer);
-    void log(const std::optional<Evaluation>& evaluation);
+    EditCounts edit(Trainer& trainer, const SplatEdit& edit);
     bool draws_with_ranks() const { return options().ranks->size() > 1; }
     train::ViewRenderer view_renderer(const Gaussians& gaussians, std::shared_ptr<const SkyMap> sky,
                                       const Trainer* trainer) const;
@@ -118,7 +111,7 @@ class Run {
     std::optional<EarlierRun> earlier_;
     std::optional<train::Masks> masks_;  // of --robust, once they are known
     std::shared_ptr<gpu::Device> device_;
-    std::optional<MetricsFiles> files_;
+    std::optional<train::RunLog> log_;
     report::ReportData report_;
     std::filesystem::path first_render_;
 };
@@ -148,12 +141,7 @@ void Run::begin_files() {
     folder_.set_place(train::place_of(input_));
     if (options().robust) train::save_masks(input_);
     if (!earlier_) train::remove_inria_splats(folder_.path());
-    files_.emplace(MetricsFiles{report::MetricsLog(folder_.metrics(), progress_.metrics), {}});
-    if (options().tensorboard)
-        files_->events.emplace(
-            folder_.path() / folders::kEventsFile, progress_.metrics,
-            std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count() -
-                progress_.wall_seconds());
+    log_.emplace(folder_, options().tensorboard, progress_);
 }
 
 void Run::list_settings() {
@@ -275,21 +263,6 @@ train::TimesAt Run::restored_times() {
     return own;
 }
 
-void Run::log(const std::optional<Evaluation>& evaluation) {
-    const StepReport& last = progress_.last;
-    MetricsLine line{last.step, last.seconds, progress_.wall_seconds(), last.loss, last.splats, {}, {}, {}};
-    if (last.step > 0) line.train_psnr = last.psnr;
-    if (evaluation && !evaluation->frames.empty()) {
-        line.test_psnr = evaluation->psnr;
-        line.test_ssim = evaluation->ssim;
-        line.test_figures = evaluation->figures;
-    }
-    files_->lines.append(line);
-    if (files_->events) files_->events->append(line);
-    progress_.metrics.push_back(line);
-    observer_.on_metrics(line);
-}
-
 /// The held-out views while the run trains. Cannot be stopped: a run that is resumed would not repeat it.
 Evaluation Run::evaluate(Trainer& trainer) {
     const Gaussians gaussians = draws_with_ranks() ? Gaussians() : trainer.gaussians();
@@ -309,6 +282,15 @@ Evaluation Run::evaluate(Trainer& trainer) {
     return evaluation;
 }
 
+/// Edits the splats for the observer, and notes it.
+EditCounts Run::edit(Trainer& trainer, const SplatEdit& edit) {
+    const EditCounts counts = trainer.edit(edit);
+    progress_.last = trainer.report();
+    observer_.on_metrics(log_->add({}, counts));
+    observer_.on_note(train::edit_text(progress_.last.step, counts));
+    return counts;
+}
+
 /// Evaluates, logs and saves as far as this step is due for it. before: steps done before it.
 void Run::after_step(Trainer& trainer, int before) {
     const int step = progress_.last.step;
@@ -319,7 +301,7 @@ void Run::after_step(Trainer& trainer, int before) {
     const int log_every = std::max(1, options().train.steps / 100);
     if (evaluation || before == 0 || at(log_every)) {
         progress_.last = trainer.report();  // the step's own, also where steps overlap
-        log(evaluation);
+        observer_.on_metrics(log_->add(evaluation));
     }
     // The checkpoint comes first: with it alone, no step is lost where the disk is full.
     if (options().save_every == 0)
@@ -328,10 +310,13 @@ void Run::after_step(Trainer& trainer, int before) {
         saves_.checkpoint(trainer);
         saves_.result(trainer, true);
     }
-    observer_.between_steps(progress_.last, trainer, [&] {
-        saves_.checkpoint(trainer);
-        saves_.result(trainer, false);
-    });
+    observer_.between_steps(progress_.last, trainer,
+                            {.save =
+                                 [&] {
+                                     saves_.checkpoint(trainer);
+                                     saves_.result(trainer, false);
+                                 },
+                             .edit = [&](const SplatEdit& asked) { return edit(trainer, asked); }});
 }
 
 void Run::train(Trainer& trainer) {
@@ -411,7 +396,7 @@ void Run::finish(std::unique_ptr<Trainer> trainer) {
     };
     train::FinalEvaluation evaluation(observer_, input_, measures_, scene, keep_waiting, report_);
     const bool evaluated = evaluation.evaluate(cameras_, folder_);
-    if (progress_.last.step > 0) log(evaluation.of_test_views());
+    if (progress_.last.step > 0) observer_.on_metrics(log_->add(evaluation.of_test_views()));
     observer_.on_evaluated(progress_.last, scene.gaussians);
     const bool shown = evaluated && evaluation.add_full_size();
     trainer.reset();  // ends the other ranks
@@ -421,6 +406,7 @@ void Run::finish(std::unique_ptr<Trainer> trainer) {
     if (options().robust) report_.left_out = train::left_out_views(input_);
     report_.cameras = train::camera_rows(input_.dataset);
     report_.metrics = progress_.metrics;
+    for (std::string& text : train::edit_texts(progress_.metrics)) report_.notes.push_back(std::move(text));
     folder_.save_report(report_);
 }
 

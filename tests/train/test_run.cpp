@@ -58,9 +58,14 @@ struct Recorder : RunObserver {
     }
     void on_metrics(const MetricsLine& line) override { logged.push_back(line.step); }
     void between_steps(const StepReport& report, const Trainer& trainer,
-                       const std::function<void()>& save) override {
+                       const RunCommands& commands) override {
         EXPECT_EQ(trainer.steps_done(), report.step);
-        if (report.step == save_at) save();
+        if (report.step == edit_at) {
+            const EditCounts counts = commands.edit(edit);
+            EXPECT_EQ(counts.removed, edit.remove.size());
+            EXPECT_EQ(report.splats, trainer.splats());
+        }
+        if (report.step == save_at) commands.save();
         if (report.step == save_at) saved_at_step = fs::exists(save_file);
     }
     void on_saved(const StepReport&) override { calls_ = "saved"; }
@@ -69,7 +74,8 @@ struct Recorder : RunObserver {
     }
 
     RunStart started;
-    int steps = 0, save_at = 0;
+    int steps = 0, save_at = 0, edit_at = 0;
+    SplatEdit edit;
     fs::path save_file;
     bool saved_at_step = false;
     size_t earlier_lines = 0, splats_at_end = 0;
@@ -116,6 +122,48 @@ TEST(Run, WritesItsFilesAndTellsItsObserver) {
     EXPECT_EQ(config["strategy"], "mcmc");
     EXPECT_EQ(config["sh-degree"], 3);
     EXPECT_EQ(config["background"], "0.24,0.28,0.21");
+}
+
+/// The checkpoint has the edit, also one that is saved later, and so has the run that continues it.
+TEST(Run, AnEditedRunEndsWithTheSameBytesAfterAResume) {
+    TempFolder folder;
+    const auto edited = [](int last) {
+        auto recorder = std::make_unique<Recorder>(last);
+        recorder->edit_at = 7;
+        recorder->edit = {.remove = {3, 5, 8}, .freeze = {0, 1, 2}};
+        return recorder;
+    };
+    const auto whole = edited(1000), first = edited(13);
+    run_training(small_run(folder / "whole"), *whole);
+    EXPECT_NE(std::ranges::find(whole->notes, "step 7: an edit removed 3 splats, froze 3 splats"),
+              whole->notes.end());
+    RunOptions options = small_run(folder / "cut");
+    options.resume = true;
+    run_training(options, *first);
+    Recorder second;
+    run_training(options, second);
+    for (const char* file : {"splats.ply", "checkpoint.ewa"})
+        EXPECT_EQ(file_bytes(folder / "whole" / file), file_bytes(folder / "cut" / file)) << file;
+    for (const char* run : {"whole", "cut"}) {
+        std::ifstream lines(folder / run / "metrics.jsonl");
+        std::string line;
+        int found = 0;
+        while (std::getline(lines, line)) {
+            const Json json = Json::parse(line);
+            if (!json.contains("removed")) continue;
+            ++found;
+            EXPECT_EQ(json["step"], 7);
+            EXPECT_EQ(json["removed"], 3);
+            EXPECT_EQ(json["frozen"], 3);
+            EXPECT_EQ(json["unfrozen"], 0);
+        }
+        EXPECT_EQ(found, 1) << run;
+        EXPECT_NE(file_bytes(folder / run / "report.html").find("step 7: an edit removed 3 splats"),
+                  std::string::npos);
+    }
+    RunOptions unedited = small_run(folder / "unedited");
+    run_training(unedited);
+    EXPECT_NE(file_bytes(folder / "whole/splats.ply"), file_bytes(folder / "unedited/splats.ply"));
 }
 
 TEST(Run, StoppedAndResumedEndsWithTheSameBytes) {

@@ -76,6 +76,12 @@ TEST(Report, MetricsHaveTestFiguresOnlyWhereEvaluated) {
         return metrics_line({parsed, "a line"});
     };
     EXPECT_EQ(read_back(line).train_psnr, 25.5);
+    EXPECT_FALSE(to_json(line).contains("removed"));
+    EXPECT_FALSE(read_back(line).edit);
+    line.edit = EditCounts{4, 3, 0};
+    EXPECT_EQ(to_json(line)["removed"], 4);
+    EXPECT_EQ(read_back(line).edit->frozen, 3u);
+    EXPECT_EQ(read_back(line).edit->unfrozen, 0u);
     line.test_figures = {{"cc_psnr", 21.5}, {"ms_ssim", std::nan("")}};
     EXPECT_EQ(to_json(line)["test_cc_psnr"], 21.5);
     EXPECT_TRUE(to_json(line)["test_ms_ssim"].is_null());
