@@ -8,6 +8,7 @@
 #include <thread>
 #include <utility>
 
+#include "cli/live_edit.h"
 #include "cli/metric_arguments.h"
 #include "cli/splat_statistics.h"
 #include "core/messages.h"
@@ -78,19 +79,24 @@ class TrainObserver::Served {
             where, folder_.string(), where, where);
     }
     void add_metrics(const MetricsLine& line) { server_->add_metrics(line); }
-    /// Takes splats and saves if somebody asked for it. Returns late if somebody pauses the training: after the
-    /// pause, or at an interruption.
-    void attend(const Trainer& trainer, const StepReport& step, const std::function<void()>& save) {
+    /// Edits, takes splats and saves if somebody asked for it. Returns late if somebody pauses the training: after the
+    /// pause, or at an interruption. step: the observer's, which follows an edit.
+    void attend(const Trainer& trainer, const StepReport& step, const RunCommands& commands) {
         constexpr auto kPausedLook = std::chrono::milliseconds(20);
         report(step, live::State::running);
         for (;;) {
+            const auto perform = [&](const std::string& body) {
+                const EditCounts counts = commands.edit(live_edit(trainer.gaussians(), body));
+                return live::EditReply{step.step, step.splats, counts};
+            };
+            if (server_->perform_edits(perform)) report(step, live::State::running);
             if (server_->wants_splats(step.step)) {
                 const auto start = std::chrono::steady_clock::now();
                 live::Snapshot snapshot{step.step, trainer.gaussians()};
                 const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
                 server_->offer(std::move(snapshot), taken.count());
             }
-            if (server_->take_save()) save();
+            if (server_->take_save()) commands.save();
             if (!server_->paused() || interrupted()) return;
             trainer.keep_waiting();
             std::this_thread::sleep_for(kPausedLook);
@@ -228,7 +234,7 @@ void TrainObserver::on_metrics(const MetricsLine& line) {
 
 void TrainObserver::between_steps(const StepReport& step, const Trainer& trainer,
                                   const RunCommands& commands) {
-    if (served_) served_->attend(trainer, step, commands.save);
+    if (served_) served_->attend(trainer, step, commands);
 }
 
 void TrainObserver::on_saved(const StepReport&) {

@@ -2,6 +2,8 @@
 // The splats of a run as the page reads them: a SOG (io/splats/sog.h), made when somebody asks for it.
 #pragma once
 #include <chrono>
+#include <compare>
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -11,8 +13,14 @@
 
 namespace ewa::live {
 
-struct Scene {
+/// The splats that a scene is of: the step of the training, and the edits before them.
+struct Version {
     int step = 0;
+    uint64_t edits = 0;
+    auto operator<=>(const Version&) const = default;
+};
+
+struct Scene : Version {
     std::string sog;
 };
 
@@ -23,7 +31,7 @@ class Scenes {
     /// most a fifth of the time.
     std::shared_ptr<const Scene> kept(bool trusted, bool busy);
     /// The scene of these splats, or of later ones. Returns late while another scene is made.
-    std::shared_ptr<const Scene> of(int step, const Gaussians& gaussians, const SaveOptions& options,
+    std::shared_ptr<const Scene> of(const Version& version, const Gaussians& gaussians, const SaveOptions& options,
                                     bool trusted, bool busy);
 
   private:

@@ -15,6 +15,7 @@
 #include <cstring>
 #include <future>
 #include <list>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -233,6 +234,7 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
     void serve(Connection& connection) {
         try {
             Wire wire(connection.socket, kMostRequest, patience_);
+            wire_ = &wire;
             process(*this, wire, [&](Request& request) {
                 const std::lock_guard lock(mutex_);
                 if (connection.cut) throw RunError("the connection was cut");
@@ -262,7 +264,8 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
         if (request.get_header_value_count("Host") != 1 || !own_host(request.get_header_value("Host")))
             return refuse(response, 403, "the Host header must be localhost or an address in numbers");
         if (of_a_web_page(request)) return refuse(response, 403, "requests from web pages are refused");
-        if (has_body(request)) return refuse(response, 413, "a request has no body here");
+        const bool edits = request.method == "POST" && request.path == "/edit";
+        if (has_body(request) && !edits) return refuse(response, 413, "a request has no body here");
         const std::string shown = request.get_header_value("Authorization");
         const bool trusted = !server_.token_.empty() && same_secret(shown, "Bearer " + server_.token_);
         if (!shown.empty() && !trusted) return refuse(response, 401, "this is not the run's token");
@@ -282,13 +285,15 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
         if (get && path == "/splats") return give_splats(request, response, trusted, guest);
         if (get && path == "/scene") return give_scene(request, response, trusted, guest);
         if (get && path == "/") return give_page(response, trusted, guest);
-        if (request.method != "POST" || (path != "/pause" && path != "/resume" && path != "/save"))
+        if (!edits &&
+            (request.method != "POST" || (path != "/pause" && path != "/resume" && path != "/save")))
             return refuse(response, 404,
-                          "there is GET /, /scene, /splats, /status and POST /pause, /resume, /save");
+                          "there is GET /, /scene, /splats, /status and POST /pause, /resume, /save, /edit");
         if (!trusted) {
             response.set_header("WWW-Authenticate", "Bearer");
             return refuse(response, 401, "this needs the token: Authorization: Bearer TOKEN (see live.json)");
         }
+        if (edits) return take_edit(request, response, guest);
         {
             const std::lock_guard lock(server_.mutex_);
             if (path == "/save")
@@ -297,6 +302,42 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
                 server_.paused_ = path == "/pause";
         }
         give_text(response, "done\n", "text/plain", guest);
+    }
+
+    /// Reads the body of an edit. Nothing, with a refusal, if it has none, is too long or does not come.
+    static std::optional<std::string> body_of(const Request& request, Response& response) {
+        const auto bytes = core::parse_integer<uint64_t>(request.get_header_value("Content-Length"));
+        const auto refused = [&](int status, const std::string& why) {
+            refuse(response, status, why);
+            return std::nullopt;
+        };
+        if (!bytes || *bytes == 0 || request.has_header("Transfer-Encoding"))
+            return refused(411, "an edit is the body of its request, with a Content-Length");
+        if (*bytes > kMostEdit)
+            return refused(413, "an edit has at most " + std::to_string(kMostEdit) + " bytes");
+        std::string body(size_t(*bytes), '\0');
+        wire_->allow(*bytes);
+        for (size_t at = 0; at < body.size();) {
+            const ssize_t got = wire_->read(&body[at], body.size() - at);
+            if (got <= 0) return refused(408, "the edit has not come whole");
+            at += size_t(got);
+        }
+        return body;
+    }
+
+    void take_edit(const Request& request, Response& response, std::shared_ptr<void> guest) {
+        auto body = body_of(request, response);
+        if (!body) return;
+        {
+            const std::lock_guard lock(server_.mutex_);
+            if (server_.status_.state == State::done) return refuse(response, 409, "the training has ended");
+        }
+        const auto outcome = server_.edits_.ask(std::move(*body), server_.edit_wait_);
+        if (!outcome)
+            return refuse(response, 503,
+                          "the training takes no edit now, and nothing was changed; try again");
+        if (!outcome->refusal.empty()) return refuse(response, 400, outcome->refusal);
+        give_text(response, encode(outcome->reply), "application/json", std::move(guest));
     }
 
     /// Counts a request until the pointer is gone. Null: there are too many without the token.
@@ -330,7 +371,8 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
         server_.wanted_ = true;
         if (fresh)
             server_.news_.wait_for(lock, kFreshWait, [&server = server_, step = server_.status_.step] {
-                return server.stop_ || (server.splats_ && server.splats_->step >= step);
+                return server.stop_ || (server.splats_ && server.splats_->step >= step &&
+                                        server.splats_->edits == server.edits_.performed());
             });
         if (trusted) return server_.splats_;
         auto given = server_.given_.lock();
@@ -341,8 +383,10 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
     static std::string known_tag(const Request& request) { return request.get_header_value("If-None-Match"); }
 
     /// Names the splats of an answer, or completes one without splats, and then returns false. step: -1 for no splats.
-    bool name_splats(const std::string& known, Response& response, int step) const {
-        const std::string tag = "\"" + server_.run_ + "-" + std::to_string(step) + "\"";
+    bool name_splats(const std::string& known, Response& response, int step, uint64_t edits) const {
+        std::string tag = "\"" + server_.run_ + "-" + std::to_string(step);
+        if (edits > 0) tag += "-" + std::to_string(edits);
+        tag += '"';
         if (!known.empty() && (step < 0 || known == tag)) {
             response.status = 304;
             return false;
@@ -360,7 +404,7 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
     void give_splats(const Request& request, Response& response, bool trusted, std::shared_ptr<void> guest) {
         const std::string known = known_tag(request);
         const auto splats = splats_for(trusted, known.empty());
-        if (name_splats(known, response, splats ? splats->step : -1))
+        if (name_splats(known, response, splats ? splats->step : -1, splats ? splats->edits : 0))
             give_ply(response, splats, std::move(guest));
     }
 
@@ -371,8 +415,8 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
         auto scene = server_.scenes_.kept(trusted, busy);
         if (!scene)
             if (const auto splats = splats_for(trusted, known.empty()))
-                scene = server_.scenes_.of(splats->step, splats->gaussians, options, trusted, busy);
-        if (!name_splats(known, response, scene ? scene->step : -1)) return;
+                scene = server_.scenes_.of({splats->step, splats->edits}, splats->gaussians, options, trusted, busy);
+        if (!name_splats(known, response, scene ? scene->step : -1, scene ? scene->edits : 0)) return;
         give_bytes(response, {scene, &scene->sog}, "application/octet-stream", std::move(guest));
     }
 
@@ -395,6 +439,7 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
         return {server_.options_, server_.status_.state == State::running && !server_.paused_now()};
     }
 
+    inline static thread_local Wire* wire_ = nullptr;  // of the connection that this thread serves
     live::Server& server_;
     const std::chrono::milliseconds patience_;
     uint16_t port_ = 0;
@@ -417,9 +462,10 @@ std::string random_token() {
 }
 
 Server::Server(const std::string& address, uint16_t port, std::string token, std::chrono::milliseconds lease,
-               std::chrono::milliseconds request_patience)
+               std::chrono::milliseconds request_patience, std::chrono::milliseconds edit_wait)
     : token_(std::move(token)),
       lease_(lease),
+      edit_wait_(edit_wait),
       http_(std::make_unique<Http>(*this, address, port, request_patience)) {}
 
 Server::~Server() {
@@ -428,6 +474,7 @@ Server::~Server() {
         stop_ = true;
     }
     news_.notify_all();
+    edits_.stop();
     http_.reset();
 }
 
@@ -454,10 +501,12 @@ void Server::add_metrics(const report::MetricsLine& line) {
 
 bool Server::wants_splats(int step) const {
     const std::lock_guard lock(mutex_);
-    return wanted_ && (!splats_ || splats_->step != step) && Clock::now() >= next_splats_;
+    const bool newest = splats_ && splats_->step == step && splats_->edits == edits_.performed();
+    return wanted_ && !newest && Clock::now() >= next_splats_;
 }
 
 void Server::offer(Snapshot&& snapshot, double seconds) {
+    snapshot.edits = edits_.performed();
     auto shared = std::make_shared<const Snapshot>(std::move(snapshot));
     const std::chrono::duration<double> pause(std::max(kLeastPause, seconds / kShare));
     {

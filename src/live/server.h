@@ -14,6 +14,9 @@
 //   POST /pause              Holds the training before its next step. It continues by itself 10 seconds after
 //                            the last request with the token.
 //   POST /resume, /save      Continue; save splats and checkpoint.
+//   POST /edit               Edits the splats before the next step, also during a pause. The body is the edit, at most kMostEdit
+//                            bytes with a Content-Length. The answer waits until it is done, and is EditReply as JSON (status.h).
+//                            An edit that the trainer refuses is 400. It is 503 if no step ends within kEditWait.
 //
 // A POST needs "Authorization: Bearer TOKEN". GET works without it. A wrong token is refused everywhere.
 // An error is one line of text.
@@ -21,7 +24,7 @@
 // Strangers reach the port. The server therefore
 // - refuses a Host that is neither an address in numbers nor localhost (DNS rebinding);
 // - refuses every request of a web page (Origin, Sec-Fetch-Site);
-// - reads at most 4 KiB of request line and headers, within 2 seconds, and never a body;
+// - reads at most 4 KiB of request line and headers, within 2 seconds, and no body but that of an edit with the token;
 // - answers one request a connection and 64 connections at a time. A new connection replaces the one that has
 //   waited longest without a request;
 // - answers kMostStrangers requests without the token at a time. All of these get one set of splats, so slow
@@ -30,6 +33,7 @@
 #pragma once
 #include <chrono>
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -37,16 +41,19 @@
 #include "ewa/gaussians.h"
 #include "ewa/splat_scene.h"
 #include "live/scenes.h"
+#include "live/edit_queue.h"
 #include "live/status.h"
 
 namespace ewa::live {
 
 inline constexpr size_t kMostStrangers = 8;
-inline constexpr std::chrono::seconds kLease{10}, kRequestPatience{2};
+inline constexpr std::chrono::seconds kLease{10}, kRequestPatience{2}, kEditWait{20};
+inline constexpr size_t kMostEdit = 256u << 10;  // bytes
 
 struct Snapshot {
     int step = 0;
     Gaussians gaussians;
+    uint64_t edits = 0;  // before them in this run; Server::offer sets it
 };
 
 /// 128 bits from the system's random source, in hexadecimal. Throws RunError.
@@ -56,11 +63,12 @@ std::string random_token();
 class Server {
   public:
     /// Listens at once. port 0: any free one. token: empty refuses all commands. lease: how long a pause
-    /// outlasts the last request with the token. request_patience: for a whole request. Throws RunError if
-    /// nothing can listen on the address.
+    /// outlasts the last request with the token. request_patience: for a whole request. edit_wait: for the step before an edit.
+    /// Throws RunError if nothing can listen on the address.
     Server(const std::string& address, uint16_t port, std::string token,
            std::chrono::milliseconds lease = kLease,
-           std::chrono::milliseconds request_patience = kRequestPatience);
+           std::chrono::milliseconds request_patience = kRequestPatience,
+           std::chrono::milliseconds edit_wait = kEditWait);
     ~Server();
     Server(const Server&) = delete;
     Server& operator=(const Server&) = delete;
@@ -82,6 +90,10 @@ class Server {
     bool paused();
     /// Whether a client has requested /save since the last call.
     bool take_save();
+    /// Performs the edits that clients wait for: EditQueue::perform.
+    bool perform_edits(const std::function<EditReply(const std::string& body)>& perform) {
+        return edits_.perform(perform);
+    }
 
   private:
     using Clock = std::chrono::steady_clock;
@@ -90,7 +102,8 @@ class Server {
     bool paused_now();  // under mutex_
 
     const std::string token_, run_ = random_token();
-    const std::chrono::milliseconds lease_;
+    const std::chrono::milliseconds lease_, edit_wait_;
+    EditQueue edits_;
     mutable std::mutex mutex_;  // of what follows but scenes_ and http_
     std::condition_variable news_;
     Status status_;

@@ -58,6 +58,23 @@ Status decode_status(const std::string& text) {
     return status;
 }
 
+std::string encode(const EditReply& reply) {
+    return Json{{"step", reply.step},
+                {"splats", reply.splats},
+                {"removed", reply.counts.removed},
+                {"frozen", reply.counts.frozen},
+                {"unfrozen", reply.counts.unfrozen}}
+        .dump();
+}
+
+EditReply decode_edit_reply(const std::string& text) {
+    const auto field = core::JsonField::of_text(text, "the trainer's answer to an edit");
+    const auto splats = [&](const char* key) { return uint32_t(field.whole(key, UINT32_MAX)); };
+    return {int(field.whole("step", INT32_MAX)),
+            splats("splats"),
+            {splats("removed"), splats("frozen"), splats("unfrozen")}};
+}
+
 double seconds_left(const Status& status) {
     const auto& lines = status.metrics;
     const double unknown = std::numeric_limits<double>::quiet_NaN();

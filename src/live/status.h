@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The state of a training run, as GET /status answers it.
+// The state of a training run, as GET /status answers it, and what POST /edit answers.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -27,6 +27,17 @@ struct Status {
 std::string encode(const Status& status);
 /// Throws InputError that names the member.
 Status decode_status(const std::string& text);
+
+struct EditReply {
+    int step = 0;         // after which the splats were edited
+    uint32_t splats = 0;  // that are left
+    EditCounts counts = {};
+};
+
+/// One JSON object with step, splats, removed, frozen and unfrozen.
+std::string encode(const EditReply& reply);
+/// Throws InputError that names the member.
+EditReply decode_edit_reply(const std::string& text);
 
 /// The time to the end of the run, s, if it continues as in its last lines of metrics. NaN if these do not suffice, or it does
 /// not run.

@@ -111,9 +111,10 @@ class Client::Http final : public httplib::ClientImpl {
         return checked(Get(path, headers, begin, receive), text);
     }
 
-    void post(const std::string& path) {
-        const auto result = Post(path);
-        checked(result, result ? result->body : "");
+    /// Returns the body of the answer.
+    std::string post(const std::string& path, const std::string& body = "") {
+        const auto result = body.empty() ? Post(path) : Post(path, body, "application/json");
+        return checked(result, result ? result->body : "").body;
     }
 
     const std::string& name() const { return name_; }
@@ -181,6 +182,10 @@ void Client::command(const std::string& name) {
     http_->post("/" + name);
 }
 
+EditReply Client::edit(const std::string& body) {
+    return decode_edit_reply(http_->post("/edit", body));
+}
+
 Address parse_address(const std::string& text) {
     const size_t colon = text.rfind(':');
     const std::string_view digits =
@@ -245,10 +250,18 @@ uint64_t Watcher::number() const {
     return update_.number;
 }
 
-void Watcher::command(const std::string& name) {
+void Watcher::add(Command command) {
     const std::lock_guard lock(mutex_);
-    commands_.push_back(name);
+    commands_.push_back(std::move(command));
     wake_.notify_one();
+}
+
+void Watcher::command(const std::string& name) {
+    add({name});
+}
+
+void Watcher::edit(const std::string& body) {
+    add({{}, body});
 }
 
 void Watcher::change(const std::function<void(Update&)>& change) {
@@ -260,12 +273,29 @@ void Watcher::change(const std::function<void(Update&)>& change) {
     on_news_();
 }
 
-std::optional<std::string> Watcher::next_command() {
+std::optional<Watcher::Command> Watcher::next_command() {
     const std::lock_guard lock(mutex_);
     if (commands_.empty()) return std::nullopt;
-    std::string name = commands_.front();
+    Command command = std::move(commands_.front());
     commands_.erase(commands_.begin());
-    return name;
+    return command;
+}
+
+void Watcher::note_edit(const std::optional<EditReply>& reply, const std::string& refusal) {
+    change([&](Update& update) {
+        ++update.edits;
+        update.last_edit = reply;
+        update.edit_refusal = refusal;
+    });
+}
+
+void Watcher::send(const Command& command) {
+    if (!command.edit) return client_->command(command.name);
+    try {
+        note_edit(client_->edit(*command.edit), {});
+    } catch (const std::exception& error) {
+        note_edit({}, error.what());  // whether the connection has ended shows with the next request
+    }
 }
 
 void Watcher::work() {
@@ -307,11 +337,15 @@ void Watcher::look() {
     }
     if (client_) return look_by_connection();
     if (!what_.folder.empty()) look_at_files();
-    if (next_command()) throw InputError("the training cannot be reached; start it with --serve");
+    if (const auto command = next_command()) {
+        const std::string why = "the training cannot be reached; start it with --serve";
+        if (command->edit) note_edit({}, why);
+        throw InputError(why);
+    }
 }
 
 void Watcher::look_by_connection() {
-    while (const auto name = next_command()) client_->command(*name);
+    while (const auto command = next_command()) send(*command);
     const Update before = update();
     Status status = client_->status(run_.empty() ? 0 : before.status.metrics.size());
     const bool fresh = status.run != run_;

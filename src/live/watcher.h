@@ -53,6 +53,8 @@ class Client {
     std::optional<TaggedSplats> splats(const std::string& tag);
     /// Sends a command to the trainer. name: pause, resume or save.
     void command(const std::string& name);
+    /// Sends an edit of the splats, and waits until the trainer has done it. body: at most kMostEdit bytes (server.h).
+    EditReply edit(const std::string& body);
 
   private:
     class Http;
@@ -86,9 +88,12 @@ struct Update {
     Status status;                            // with all metrics
     std::shared_ptr<const Gaussians> splats;  // the newest; null if there are none yet
     int splats_step = -1;
-    uint64_t number = 0;     // grows with every change
-    bool connected = false;  // to the trainer, not only to its files
-    std::string problem;     // why there is nothing new; one line, or empty
+    uint64_t number = 0;                 // grows with every change
+    bool connected = false;              // to the trainer, not only to its files
+    std::string problem;                 // why there is nothing new; one line, or empty
+    uint64_t edits = 0;                  // of this watcher that were answered
+    std::optional<EditReply> last_edit;  // the answer to the last one; empty if it was refused
+    std::string edit_refusal;            // why; one line, or empty
 };
 
 class Watcher {
@@ -102,6 +107,8 @@ class Watcher {
     /// name: pause, resume or save. update().problem has the reason of a refusal. A pause lasts while this watcher exists, and 10
     /// seconds longer.
     void command(const std::string& name);
+    /// Edits the splats of the training. update().edits grows when the answer has come.
+    void edit(const std::string& body);
 
   private:
     void work();
@@ -110,7 +117,14 @@ class Watcher {
     void look_at_files();
     void read_metrics();
     void change(const std::function<void(Update&)>& change);
-    std::optional<std::string> next_command();
+    struct Command {
+        std::string name;
+        std::optional<std::string> edit = {};  // its body, in place of a name
+    };
+    void add(Command command);
+    std::optional<Command> next_command();
+    void send(const Command& command);
+    void note_edit(const std::optional<EditReply>& reply, const std::string& refusal);
 
     const WhatToWatch what_;
     std::function<void()> on_news_;
@@ -123,7 +137,7 @@ class Watcher {
     mutable std::mutex mutex_;
     std::condition_variable wake_;
     Update update_;
-    std::vector<std::string> commands_;
+    std::vector<Command> commands_;
     std::atomic<bool> stop_ = false;
     std::thread thread_;
 };

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the tests of live have in common.
 #pragma once
+#include <atomic>
 #include <chrono>
 #include <string>
 #include <thread>
 
+#include "ewa/error.h"
 #include "live/server.h"
 #include "live/watcher.h"
 
@@ -38,6 +40,34 @@ inline Status status_at(int step, int steps = 10) {
 inline Client client_of(const Server& server, const std::string& token = "") {
     return Client({"127.0.0.1", server.port()}, token);
 }
+
+/// Takes a server's edits on a thread of its own, as a training does after step 7.
+class Editing {
+  public:
+    explicit Editing(Server& server)
+        : thread_([this, &server] {
+              while (!stop_) {
+                  server.perform_edits([this](const std::string& body) {
+                      last = body;
+                      if (body == "bad") throw InputError("--dance\nis no edit");
+                      return EditReply{7, 90, {10, 3, 1}};
+                  });
+                  std::this_thread::sleep_for(std::chrono::milliseconds(5));
+              }
+          }) {}
+    ~Editing() {
+        stop_ = true;
+        thread_.join();
+    }
+    Editing(const Editing&) = delete;
+    Editing& operator=(const Editing&) = delete;
+
+    std::string last;  // body; read it after its answer has come
+
+  private:
+    std::atomic<bool> stop_ = false;
+    std::thread thread_;
+};
 
 /// Until it holds, at most a minute.
 template <class Holds>

@@ -186,25 +186,25 @@ TEST(LiveScenes, LeaveTimeToTheTraining) {
     Scenes scenes;
     const Gaussians splats = test::storable_splats(1, 20000, 0);  // slow enough for a rest that is seen
     EXPECT_FALSE(scenes.kept(true, true)) << "there is none";
-    const auto first = scenes.of(1, splats, {}, true, true);
+    const auto first = scenes.of({1, 0}, splats, {}, true, true);
     EXPECT_EQ(scenes.kept(true, true), first);
     EXPECT_EQ(scenes.kept(false, true), first);
-    EXPECT_EQ(scenes.of(2, splats, {}, true, true), first) << "asked for while it was made";
+    EXPECT_EQ(scenes.of({2, 0}, splats, {}, true, true), first) << "asked for while it was made";
     EXPECT_FALSE(scenes.kept(true, false)) << "a paused training has time";
-    EXPECT_EQ(scenes.of(1, splats, {}, true, false), first) << "it is of this step";
+    EXPECT_EQ(scenes.of({1, 0}, splats, {}, true, false), first) << "it is of this step";
     EXPECT_TRUE(soon([&] { return !scenes.kept(true, true); })) << "the rest has no end";
 }
 
 TEST(LiveScenes, StrangersHoldOne) {
     Scenes scenes;
     const Gaussians splats = test::storable_splats(1, 10, 0);
-    auto held = scenes.of(1, splats, {}, false, false);
-    EXPECT_EQ(scenes.of(2, splats, {}, true, false)->step, 2);
+    auto held = scenes.of({1, 0}, splats, {}, false, false);
+    EXPECT_EQ(scenes.of({2, 0}, splats, {}, true, false)->step, 2);
     EXPECT_EQ(scenes.kept(false, false), held) << "a second scene is kept for strangers";
     EXPECT_FALSE(scenes.kept(true, false));
     held.reset();
     EXPECT_FALSE(scenes.kept(false, false));
-    EXPECT_EQ(scenes.of(2, splats, {}, false, false)->step, 2);
+    EXPECT_EQ(scenes.of({2, 0}, splats, {}, false, false)->step, 2);
 }
 
 TEST(LiveServer, TakesCommandsFromWhoHasTheToken) {
@@ -238,6 +238,104 @@ TEST(LiveServer, TakesCommandsFromWhoHasTheToken) {
     for (const char* token : {"x", "Bearer "})
         EXPECT_THROW(client_of(open, token).command("pause"), InputError) << "without a token: no commands";
     EXPECT_EQ(status_code(ask(open, "POST /pause", "Authorization: Bearer \r\n")), 401);
+}
+
+/// The answer to POST /edit with these headers and this body.
+std::string ask_edit(const Server& server, const std::string& headers, const std::string& body = "") {
+    const RawSocket socket(server.port());
+    socket.send(std::string("POST /edit HTTP/1.1\r\n") + kHost + headers + "\r\n" + body);
+    return socket.receive();
+}
+
+std::string length_of(const std::string& body) {
+    return "Content-Length: " + std::to_string(body.size()) + "\r\n";
+}
+
+TEST(LiveServer, TakesEditsFromWhoHasTheToken) {
+    Server server("127.0.0.1", 0, "secret");
+    Editing editing(server);
+    Client owner = client_of(server, "secret");
+    const EditReply reply = owner.edit("{\"edits\": []}");
+    EXPECT_EQ(editing.last, "{\"edits\": []}");
+    EXPECT_EQ(reply.step, 7);
+    EXPECT_EQ(reply.splats, 90u);
+    EXPECT_EQ(reply.counts.removed, 10u);
+    EXPECT_EQ(reply.counts.frozen, 3u);
+    EXPECT_EQ(reply.counts.unfrozen, 1u);
+    const std::string longest(kMostEdit, 'x');
+    owner.edit(longest);
+    EXPECT_TRUE(editing.last == longest);
+    test::expect_error<InputError>([&] { owner.edit("bad"); }, {"the trainer refuses: --dance is no edit"});
+    owner.command("pause");
+    EXPECT_EQ(owner.edit("{}").step, 7) << "also during a pause";
+
+    EXPECT_EQ(status_code(ask_edit(server, kToken + length_of("again"), "again")), 200);
+    EXPECT_EQ(editing.last, "again");
+    EXPECT_EQ(status_code(ask_edit(server, kToken + length_of("bad"), "bad")), 400);
+    EXPECT_EQ(status_code(ask_edit(server, length_of("no"), "no")), 401);
+    EXPECT_EQ(status_code(ask_edit(server, "Authorization: Bearer secreT\r\n" + length_of("no"), "no")), 401);
+    EXPECT_EQ(
+        status_code(ask_edit(server, kToken + "Origin: http://evil.example\r\n" + length_of("no"), "no")),
+        403);
+    EXPECT_EQ(status_code(ask(server, "GET /edit", kToken)), 404);
+    server.report({.step = 10, .steps = 10, .state = State::done});
+    EXPECT_EQ(status_code(ask_edit(server, kToken + length_of("no"), "no")), 409);
+    EXPECT_NE(editing.last, "no");
+}
+
+TEST(LiveServer, EditsAreSmallAndWhole) {
+    Server server("127.0.0.1", 0, "secret", kLease, 300ms);
+    const Editing editing(server);
+    for (const char* headers : {"", "Content-Length: 0\r\n", "Content-Length: x\r\n",
+                                "Content-Length: -1\r\n", "Transfer-Encoding: chunked\r\n"})
+        EXPECT_EQ(status_code(ask_edit(server, kToken + headers)), 411) << headers;
+    for (const size_t bytes : {kMostEdit + 1, size_t(1) << 40}) {
+        const std::string length = "Content-Length: " + std::to_string(bytes) + "\r\n";
+        EXPECT_EQ(status_code(ask_edit(server, kToken + length)), 413) << bytes;
+    }
+    EXPECT_EQ(status_code(ask_edit(server, kToken + "Content-Length: 9\r\n", "half")), 408);
+    EXPECT_EQ(editing.last, "");
+    EXPECT_EQ(client_of(server, "secret").edit("x").step, 7) << "it still answers";
+}
+
+TEST(LiveServer, AnEditThatNobodyTakesIsWithdrawn) {
+    auto server = std::make_unique<Server>("127.0.0.1", 0, "secret", kLease, kRequestPatience, 200ms);
+    Client owner = client_of(*server, "secret");
+    test::expect_error<InputError>([&] { owner.edit("late"); }, {"nothing was changed"});
+    EXPECT_FALSE(server->perform_edits([](const std::string&) { return EditReply{}; }));
+
+    server = std::make_unique<Server>("127.0.0.1", 0, "secret", kLease, kRequestPatience, 1h);
+    Client other = client_of(*server, "secret");
+    std::thread waits([&] { EXPECT_ANY_THROW(other.edit("never")); });
+    std::this_thread::sleep_for(100ms);
+    server.reset();  // the training ends
+    waits.join();
+}
+
+/// Splats of the same step are others after an edit.
+TEST(LiveServer, AnEditMakesNewSplats) {
+    Server server("127.0.0.1", 0, "secret");
+    Client owner = client_of(server, "secret");
+    server.report(status_at(7));
+    owner.splats("");
+    server.offer({7, some_splats(4)}, 0);
+    const auto before = owner.splats("");
+    ASSERT_TRUE(before);
+    EXPECT_FALSE(owner.splats(before->tag));
+    {
+        Editing editing(server);
+        owner.edit("x");
+        EXPECT_ANY_THROW(owner.edit("bad"));
+    }
+    EXPECT_FALSE(owner.splats(before->tag)) << "none are there yet";
+    EXPECT_TRUE(soon([&] { return server.wants_splats(7); }));
+    server.offer({7, some_splats(3)}, 0);
+    const auto after = owner.splats(before->tag);
+    ASSERT_TRUE(after);
+    EXPECT_EQ(after->gaussians.size(), 3u);
+    EXPECT_EQ(after->step, 7);
+    EXPECT_FALSE(owner.splats(after->tag));
+    EXPECT_FALSE(server.wants_splats(7));
 }
 
 TEST(LiveServer, APauseEndsSomeTimeAfterItsOwnerHasGone) {

@@ -109,6 +109,30 @@ TEST(LiveWatcher, FollowsARunByItsConnection) {
     EXPECT_TRUE(soon([&] { return watcher.update().connected; })) << "it connects again";
 }
 
+TEST(LiveWatcher, EditsTheSplats) {
+    Server server("127.0.0.1", 0, "secret");
+    Editing editing(server);
+    Watcher watcher({{}, Address{"127.0.0.1", server.port()}, "secret"}, [] {});
+    EXPECT_EQ(watcher.update().edits, 0u);
+    watcher.edit("x");
+    ASSERT_TRUE(soon([&] { return watcher.update().edits == 1; }));
+    const Update done = watcher.update();
+    ASSERT_TRUE(done.last_edit);
+    EXPECT_EQ(done.last_edit->counts.removed, 10u);
+    EXPECT_EQ(done.edit_refusal, "");
+    watcher.edit("bad");
+    ASSERT_TRUE(soon([&] { return watcher.update().edits == 2; }));
+    EXPECT_FALSE(watcher.update().last_edit);
+    EXPECT_EQ(watcher.update().edit_refusal, "the trainer refuses: --dance is no edit");
+    EXPECT_TRUE(soon([&] { return watcher.update().connected; }));
+
+    const TempFolder folder;
+    Watcher of_files({folder.path(), {}, {}}, [] {});
+    of_files.edit("x");
+    ASSERT_TRUE(soon([&] { return of_files.update().edits == 1; }));
+    EXPECT_NE(of_files.update().edit_refusal.find("--serve"), std::string::npos);
+}
+
 /// A pause lasts while the window is there, and ends after it has gone.
 TEST(LiveWatcher, HoldsAPauseWhileItLives) {
     Server server("127.0.0.1", 0, "secret", std::chrono::seconds(1));

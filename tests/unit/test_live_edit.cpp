@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// The edits that a client sends to a training.
+#include "cli/live_edit.h"
+
+#include <gtest/gtest.h>
+
+#include "ewa/error.h"
+#include "support/temp_folder.h"
+
+namespace ewa::test {
+namespace {
+
+/// Splats at 0, 1, 2, 3, 4 along x.
+Gaussians splats_in_a_row() {
+    Gaussians splats;
+    splats.resize(5);
+    for (size_t i = 0; i < 5; ++i) {
+        splats.means[3 * i] = float(i);
+        splats.quaternions[4 * i] = 1;
+    }
+    return splats;
+}
+
+TEST(LiveEdit, RemovesWhatItsFiltersRemove) {
+    const auto removed = [](const std::string& edits) {
+        const SplatEdit edit = cli::live_edit(splats_in_a_row(), "{\"edits\": " + edits + "}");
+        EXPECT_TRUE(edit.freeze.empty() && edit.unfreeze.empty());
+        return edit.remove;
+    };
+    EXPECT_EQ(removed(R"([["where", "sphere=0,0,0,1.5"]])"), (std::vector<uint32_t>{2, 3, 4}));
+    EXPECT_EQ(removed(R"([["where", "x=1.."], ["where", "x=..3"]])"), (std::vector<uint32_t>{0, 4}));
+    EXPECT_EQ(removed(R"([["remove-invalid", ""]])"), std::vector<uint32_t>{});
+}
+
+TEST(LiveEdit, RefusesOtherTexts) {
+    for (const auto& [body, part] : std::vector<std::pair<std::string, std::string>>{
+             {"", "the edit"},
+             {"{}", "edits"},
+             {R"({"edits": []})", "edits"},
+             {R"({"edits": [["where"]]})", "edits"},
+             {R"({"edits": [["where", 3]]})", "edits"},
+             {R"({"edits": [["dance", ""]]})", "--dance"},
+             {R"({"edits": [["where", "x"]]})", "--where"},
+             {R"({"edits": [["where", "views=2.."]]})", "views"},
+             {R"({"edits": [["decimate", "50%"]]})", "--decimate"},
+             {R"({"edits": [["transform", "move=1,0,0"]]})", "--transform"}})
+        expect_error<InputError>([&] { cli::live_edit(splats_in_a_row(), body); }, {part});
+}
+
+}  // namespace
+}  // namespace ewa::test
