@@ -35,7 +35,8 @@ struct SplatEdit {
     std::vector<uint32_t> remove = {};
     /// A frozen splat is drawn, but no step changes it, and no refinement copies, moves or removes it.
     std::vector<uint32_t> freeze = {};
-    std::vector<uint32_t> unfreeze = {};  // such a splat learns again, from moments of zero; `freeze` wins
+    std::vector<uint32_t> unfreeze =
+        {};  // such a splat learns again, from moments of zero; `freeze` and `remove` win
 };
 
 /// Owns the model and the cached training images on the device. A cached image takes 4 bytes a pixel if its

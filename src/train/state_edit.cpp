@@ -92,11 +92,14 @@ uint32_t count_frozen(std::span<const std::byte> moments, uint32_t planes) {
 EditCounts apply_edit(const SplatEdit& edit, TrainerState& state) {
     uint32_t& splats = state.report.splats;
     const uint32_t planes = pipeline::parameter_planes(state.sh_degree);
-    const std::vector<bool> removed = flags_of(edit.remove, splats), frozen = flags_of(edit.freeze, splats),
-                            freed = flags_of(edit.unfreeze, splats);
+    const std::vector<bool> removed = flags_of(edit.remove, splats);
+    std::vector<bool> frozen = flags_of(edit.freeze, splats), freed = flags_of(edit.unfreeze, splats);
     std::vector<uint32_t> kept;
-    for (uint32_t i = 0; i < splats; ++i)
+    for (uint32_t i = 0; i < splats; ++i) {
         if (!removed[i]) kept.push_back(i);
+        frozen[i] = frozen[i] && !removed[i];
+        freed[i] = freed[i] && !removed[i] && !frozen[i];
+    }
     if (kept.empty())
         throw InputError("the edit would remove all " + std::to_string(splats) +
                          " splats, and a training needs one");

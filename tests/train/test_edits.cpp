@@ -63,7 +63,7 @@ void expect_same_arrays(const TrainerState& a, const TrainerState& b) {
 }
 
 /// Every n-th of the first 200 splats, from `first` on.
-std::vector<uint32_t> every(uint32_t n, uint32_t first) {
+std::vector<uint32_t> every_nth(uint32_t n, uint32_t first) {
     std::vector<uint32_t> indices;
     for (uint32_t i = first; i < 200; i += n) indices.push_back(i);
     return indices;
@@ -97,7 +97,7 @@ TEST_P(Edits, LeaveTheOthersAsTheyAre) {
     train_until(*trainer, 15);
     const TrainerState before = trainer->state();
     Gaussians expected = trainer->gaussians();
-    std::vector<uint32_t> removed = every(4, 1), kept;
+    std::vector<uint32_t> removed = every_nth(4, 1), kept;
     const std::set<uint32_t> gone(removed.begin(), removed.end());
     for (uint32_t i = 0; i < before.report.splats; ++i)
         if (!gone.contains(i)) kept.push_back(i);
@@ -137,9 +137,9 @@ TEST_P(Edits, LeaveTheOthersAsTheyAre) {
 TEST_P(Edits, FrozenSplatsKeepTheirBytes) {
     const auto trainer = edited_trainer(options());
     train_until(*trainer, 12);
-    const EditCounts counts = trainer->edit({.remove = {0}, .freeze = every(3, 1)});
+    const EditCounts counts = trainer->edit({.remove = {0}, .freeze = every_nth(3, 1)});
     EXPECT_EQ(counts.removed, 1u);
-    EXPECT_EQ(counts.frozen, every(3, 1).size());
+    EXPECT_EQ(counts.frozen, every_nth(3, 1).size());
     EXPECT_EQ(trainer->frozen_splats(), counts.frozen);
     const TrainerState begin = trainer->state();
     const uint32_t planes = pipeline::parameter_planes(begin.sh_degree);
@@ -168,14 +168,14 @@ TEST_P(Edits, FrozenSplatsKeepTheirBytes) {
 TEST(EditedTrainer, UnfrozenSplatsLearnAgain) {
     const auto trainer = edited_trainer(busy(Strategy::none, 1));
     train_until(*trainer, 5);
-    const std::vector<uint32_t> some = every(2, 0);
+    const std::vector<uint32_t> some = every_nth(2, 0);
     EXPECT_EQ(trainer->edit({.freeze = some}).frozen, some.size());
     EXPECT_EQ(trainer->edit({.freeze = some}).frozen, 0u) << "they are already";
     train_until(*trainer, 10);
     const TrainerState frozen = trainer->state();
     const EditCounts counts = trainer->edit({.freeze = {4}, .unfreeze = {2, 4, 6, 7}});
-    EXPECT_EQ(counts.unfrozen, 3u);
-    EXPECT_EQ(counts.frozen, 1u) << "freeze wins";
+    EXPECT_EQ(counts.unfrozen, 2u) << "7 is not frozen, and 4 stays so";
+    EXPECT_EQ(counts.frozen, 0u);
     EXPECT_EQ(trainer->frozen_splats(), some.size() - 2);
     EXPECT_EQ(texels_of(trainer->state(), "moments1", 2), Bytes(texels_of(frozen, "moments1", 2).size()));
     train_until(*trainer, 20);
@@ -228,7 +228,7 @@ TEST(EditedTrainer, FinalSplatsKeepsFrozenOnes) {
 }
 
 /// An edit after step 14, of a training that is divided or not.
-const EditAt kDividedEdit{14, {.remove = every(4, 1), .freeze = every(3, 0)}};
+const EditAt kDividedEdit{14, {.remove = every_nth(4, 1), .freeze = every_nth(3, 0)}};
 
 TEST(EditsByRanks, HaveTheBytesOfOneRank) {
     for (const Strategy strategy : {Strategy::adc, Strategy::mcmc}) {
@@ -246,7 +246,8 @@ TEST(EditsByRanks, HaveTheBytesOfOneRank) {
 TEST(EditsByChunks, HaveTheBytesOfOneThatFits) {
     for (const Strategy strategy : {Strategy::adc, Strategy::mcmc}) {
         const TrainOptions options = busy_chunks(strategy, 2);
-        const Gaussians start = tall_scene(20000);
+        // One chunk holds all that mcmc adds until the chunks are level.
+        const Gaussians start = tall_scene(strategy == Strategy::mcmc ? 26500 : 20000);
         const auto run = [&](uint64_t limit) {
             return train_divided(options, start, {.limit = limit}, options.steps, seven_views().dataset,
                                  nullptr, &kDividedEdit);
