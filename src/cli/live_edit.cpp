@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/live_edit.h"
 
-#include <algorithm>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "core/json_field.h"
+#include "edit/edited_splats.h"
 #include "edit/edits.h"
 #include "ewa/error.h"
 
@@ -14,35 +17,69 @@ namespace {
 
 constexpr size_t kMostEditsOfBody = 1000;
 
-/// The edits of [NAME, VALUE] pairs.
-std::vector<edit::Edit> parsed_edits(const std::string& body) {
+/// What a training can do: remove splats, and freeze them, which is --lock.
+bool changes_states(const std::string& name) {
+    for (const char* known : {"select", "delete", "lock", "unlock", "hide", "unhide"})
+        if (name == known) return true;
+    return false;
+}
+
+struct NamedEdit {
+    std::string name;
+    edit::Edit edit;
+};
+
+/// The edits of [NAME, VALUE] pairs. An edit without a value may be [NAME].
+std::vector<NamedEdit> parsed_edits(const std::string& body) {
     const auto field = core::JsonField::of_text(body, "the edit");
     const auto pairs = field.items("edits");
     if (pairs.empty() || pairs.size() > kMostEditsOfBody)
         field.fail("\"edits\" needs 1 to " + std::to_string(kMostEditsOfBody) + " edits");
-    std::vector<edit::Edit> edits;
+    std::vector<NamedEdit> edits;
     for (const core::JsonField& pair : pairs) {
         const nlohmann::json& texts = pair.list(nullptr);
-        if (texts.size() != 2 || !texts[0].is_string() || !texts[1].is_string())
+        if (texts.empty() || texts.size() > 2 || !texts.front().is_string() || !texts.back().is_string())
             pair.fail("is not a name and a value, which are texts");
-        const auto& name = texts[0].get_ref<const std::string&>();
-        edits.push_back(edit::parse(name, texts[1].get_ref<const std::string&>()));
-        if (!edits.back().filter)
+        const auto& name = texts.front().get_ref<const std::string&>();
+        edits.push_back(
+            {name, edit::parse(name, texts.size() == 2 ? texts.back().get_ref<const std::string&>() : "")});
+        if (!edits.back().edit.filter && !changes_states(name))
             throw InputError("--" + name +
-                             " changes splats; a training that runs takes edits that remove splats");
+                             " changes splats; a training that runs takes edits that remove or lock splats");
     }
     return edits;
 }
 
+void remove_others(edit::EditedSplats& splats, const edit::Filter& filter) {
+    const std::vector<bool> stay = filter(*splats.splats(), {});
+    std::vector<uint8_t> states = splats.states();
+    for (size_t i = 0; i < states.size(); ++i)
+        if (!stay[i]) states[i] |= edit::kDeleted;
+    splats.set_states(std::move(states));
+}
+
 }  // namespace
 
-SplatEdit live_edit(const Gaussians& splats, const std::string& body) {
-    const std::vector<edit::Edit> edits = parsed_edits(body);
-    Gaussians edited = splats;
-    const edit::Applied applied = edit::apply(edited, edits);
+SplatEdit live_edit(const Gaussians& gaussians, const std::string& body) {
+    edit::EditedSplats splats(std::make_shared<const Gaussians>(gaussians));
+    bool unlocks = false;
+    for (const auto& [name, edit] : parsed_edits(body)) {
+        if (edit.filter)
+            remove_others(splats, edit.filter);
+        else
+            edit::perform_on(splats, edit);
+        unlocks = unlocks || name == "unlock";
+    }
     SplatEdit result;
-    for (uint32_t i = 0; i < splats.size(); ++i)
-        if (!std::ranges::binary_search(applied.left, i)) result.remove.push_back(i);
+    for (uint32_t i = 0; i < splats.size(); ++i) {
+        const uint8_t state = splats.states()[i];
+        if ((state & edit::kDeleted) != 0)
+            result.remove.push_back(i);
+        else if ((state & edit::kLocked) != 0)
+            result.freeze.push_back(i);
+        else if (unlocks)
+            result.unfreeze.push_back(i);
+    }
     return result;
 }
 

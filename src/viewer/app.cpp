@@ -10,8 +10,14 @@
 #include <cmath>
 #include <utility>
 
+#include <nlohmann/json.hpp>
+
+#include "core/folders.h"
+#include "core/process.h"
 #include "ewa/error.h"
+#include "folders/run_folder.h"
 #include "viewer/editor/offers.h"
+#include "viewer/editor/toolbar.h"
 
 namespace ewa::viewer {
 namespace {
@@ -32,7 +38,10 @@ App::App(const Startup& startup)
     : state_(startup),
       navigation_(state_),
       shown_(state_, navigation_),
-      session_(state_, navigation_, shown_) {
+      session_(state_, navigation_, shown_),
+      editor_(core::own_program().parent_path() / "ewa", state_.wake, startup.budget),
+      tools_(state_, navigation_, shown_, editor_),
+      dialogs_(editor_, session_.dialog, state_.wake, [this](const std::string& note) { state_.say(note); }) {
     change_text();
     state_.loop.last_frame = Clock::now();
     state_.message.hint();
@@ -58,7 +67,13 @@ KeptSettings App::kept() const {
 
 void App::run() {
     Loop& loop = state_.loop;
-    while (!loop.done && !state_.window.closed()) {
+    while (!loop.done) {
+        if (state_.window.closed()) {
+            if (state_.scripted() || dialogs_.open()) break;
+            state_.window.stay();
+            dialogs_.leave([&loop] { loop.done = true; });
+            state_.redraw(Loop::kRedraws);
+        }
         const auto keys = state_.window.wait(patience());
         const auto now = Clock::now();
         const double seconds = std::chrono::duration<double>(now - loop.last_frame).count();
@@ -69,8 +84,9 @@ void App::run() {
             for (const KeyPress& key : keys) handle_key(key);
             navigation_.move(std::min(seconds, 0.1));
             if (const auto dropped = state_.window.take_dropped(); !dropped.empty())
-                session_.open(dropped, state_.scene);
-            session_.take_chosen();
+                open(dropped, state_.scene);
+            dialogs_.take();
+            if (const auto chosen = session_.take_chosen(); !chosen.empty()) open(chosen, {});
             change_text();
         }
         session_.take_opened();
@@ -79,6 +95,7 @@ void App::run() {
         shown_.take_comparison(screen_->presenter);
         session_.take_saved();
         session_.take_live();
+        if (!state_.scripted()) sync_editor();
         if (navigation_.film) navigation_.continue_film(shown_.renders);
         if (loop.redraws > 0) draw();
         shown_.ask();
@@ -93,7 +110,8 @@ void App::run() {
 /// How long to wait for input, in seconds.
 double App::patience() const {
     if (state_.loop.redraws > 0 || navigation_.flying() || state_.settings.turntable) return 1.0 / 60;
-    return shown_.renders.reduced() || session_.waiting() ? kPollSeconds : 1.0;
+    const bool waits = shown_.renders.reduced() || session_.waiting() || editor_.busy() || editor_.saving();
+    return waits || dialogs_.open() ? kPollSeconds : 1.0;
 }
 
 /// Opens the screen, also with another size of the text or another theme.
@@ -113,7 +131,9 @@ void App::handle_key(const KeyPress& press) {
     const int key = press.key;
     PanelSettings& settings = state_.settings;
     // A text field does not use these keys, so they act while one is edited. The other keys belong to the field.
+    if (dialogs_.open()) return;
     if (key == GLFW_KEY_Q && press.control) return state_.window.close();
+    if (key == GLFW_KEY_S && press.control) return press.shift ? dialogs_.save_as() : dialogs_.save();
     if (key == GLFW_KEY_O && press.control)
         return session_.dialog.ask(press.shift ? Wanted::folder : Wanted::file);
     if (key == GLFW_KEY_ESCAPE && std::exchange(state_.help, false)) return;
@@ -124,6 +144,13 @@ void App::handle_key(const KeyPress& press) {
     if (key == GLFW_KEY_F12 && press.shift) shown_.write_exr();
     if (key == GLFW_KEY_F12 && !press.shift) state_.loop.capture = true;
     if (ImGui::GetIO().WantTextInput) return;
+    if (key == GLFW_KEY_TAB && editor_.scenes() > 0) {
+        settings.tab = settings.tab == PanelTab::edit ? PanelTab::view : PanelTab::edit;
+        if (settings.tab == PanelTab::view) editor_.settings.tool = Tool::view;
+        return;
+    }
+    const bool undoes = press.control && (key == GLFW_KEY_Z || key == GLFW_KEY_Y);
+    if ((editing() || undoes) && tools_.handle_key(press)) return state_.redraw(Loop::kRedraws);
     float& scale = settings.look.splat_scale;
     if (key == GLFW_KEY_MINUS || key == GLFW_KEY_KP_SUBTRACT)
         scale = std::max(kLeastScale, scale / kScaleStep);
@@ -137,6 +164,7 @@ void App::handle_key(const KeyPress& press) {
 void App::handle_mouse() {
     const ImGuiIO& io = ImGui::GetIO();
     if (io.WantCaptureMouse || state_.scripted()) return;
+    if (editor_.scenes() > 0 && tools_.handle_mouse()) return;
     const Arrangement places = shown_.arrangement();
     const bool at_wipe = shown_.wiping() && over_wipe(places.image, state_.settings.wipe);
     if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) dragging_wipe_ = at_wipe;
@@ -188,7 +216,12 @@ void App::panel() {
         .width = float(state_.panel_width()) / std::max(1e-3f, ImGui::GetIO().DisplayFramebufferScale.x),
         .over_picture = !state_.panel_fits(),
     };
-    obey(draw_panel(facts, state_.settings));
+    std::function<void()> rows = [this] {
+        edit_panel_.draw(editor_, live());
+        if (edit_panel_.take_redraw()) state_.redraw();
+    };
+    if (editor_.scenes() == 0) rows = nullptr;
+    obey(draw_panel(facts, state_.settings, rows));
 }
 
 void App::obey(const PanelActions& actions) {
@@ -210,6 +243,7 @@ void App::draw_overlays() {
             draw_cameras({*scene.dataset, scene.supports, shown_.camera(), places.rendering,
                           navigation_.camera_size, navigation_.at_camera});
     shown_.set_measuring(settings.measure);
+    if (editor_.scenes() > 0) tools_.draw();
     draw_measurement(shown_.measurement, shown_.camera(), places.rendering);
     if (shown_.comparing()) draw_comparison(settings.comparison, places, settings.wipe);
     const Rectangle area = state_.picture_area();
@@ -219,7 +253,7 @@ void App::draw_overlays() {
     if (empty && !state_.help) {
         const Welcome chosen = draw_welcome(area);
         if (chosen.wanted) session_.dialog.ask(*chosen.wanted);
-        if (chosen.file) session_.open({*chosen.file}, {});
+        if (chosen.file) open({*chosen.file}, {});
     }
     if (session_.search.running() && draw_search(session_.search.progress(), area)) session_.search.cancel();
     if (session_.offers_training() && !state_.help)
@@ -239,6 +273,7 @@ void App::draw() {
     const Comparison before = state_.settings.comparison;
     screen_->gui.begin_frame();
     if (!state_.scripted()) draw_overlays();
+    if (!state_.scripted()) draw_editor();
     if (state_.panel_shown()) panel();
     if (state_.help) draw_help(state_.help);
     if (!state_.scripted() && state_.message.noting(Clock::now()))
@@ -258,7 +293,98 @@ void App::draw() {
         return;
     }
     loop.times.count(shown_.renders.shown());
-    if (capture) session_.save(without_left(image, state_.picture_area().x));
+    if (capture) session_.save(part_of(image, state_.picture_area()));
+}
+
+bool App::editing() const {
+    return editor_.scenes() > 0 &&
+           (state_.settings.tab == PanelTab::edit || editor_.settings.tool != Tool::view);
+}
+
+bool App::live() const {
+    const live::Update* run = session_.live_run.update();
+    return run && run->status.state != live::State::done && run->connected;
+}
+
+void App::open(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown) {
+    dialogs_.leave([this, paths, shown] { session_.open(paths, shown); });
+}
+
+/// The scene that the window shows becomes the one that is edited.
+void App::enter_scene() {
+    const OpenedScene& scene = state_.scene;
+    entered_ = drawn_ = scene.gaussians;
+    marked_ = false;
+    if (scene.points || entered_->size() == 0) return editor_.clear();
+    const std::filesystem::path file = scene.run.empty() ? scene.path : scene.run / folders::kSplatsFile;
+    const bool is_file = core::is_file(file), journaled = is_file && !live();
+    edit::Cameras cameras;
+    if (scene.dataset && !scene.run.empty())
+        cameras = [dataset = scene.dataset] {
+            std::vector<Camera> all;
+            for (const Frame& frame : dataset->frames) all.push_back(frame.camera);
+            return all;
+        };
+    editor_.enter(scene.title, is_file ? file : std::filesystem::path(), entered_, cameras, journaled);
+    if (journaled) dialogs_.offer_journal(file, entered_->size());
+}
+
+/// Lets the editor know of a new scene, and the render thread of edits.
+void App::sync_editor() {
+    const OpenedScene& scene = state_.scene;
+    if (!scene.path.empty() && scene.path != opened_) remember_file(opened_ = scene.path);
+    if (scene.gaussians != entered_) enter_scene();
+    const Editor::News news = editor_.take();
+    if (news.any) state_.redraw(Loop::kRedraws);
+    if (!news.note.empty()) state_.say(news.note);
+    if (live()) send_edits(news.done);
+    if (editor_.scenes() == 0 || !news.marks) return;
+    if (editor_.splats() != drawn_) {
+        drawn_ = editor_.splats();
+        marked_ = false;
+        shown_.renders.set_scene(drawn_, drawn_ == entered_ ? scene.coarse : nullptr);
+    }
+    const auto& marks = *editor_.marks();
+    const bool any = std::ranges::any_of(marks, [](uint8_t mark) { return mark != 0; });
+    if (any || marked_) shown_.renders.set_marks(editor_.marks(), drawn_->size() > state_.startup.budget);
+    marked_ = any;
+}
+
+/// A training gets all edits since its splats were shown, once one of them removes or freezes splats.
+void App::send_edits(const std::vector<edit::Step>& done) {
+    const auto changes = [](const edit::Words& words) { return words.name == "delete" || words.name.ends_with("lock"); };
+    if (std::ranges::none_of(done, [&](const edit::Step& step) { return std::ranges::any_of(step.edits, changes); }))
+        return;
+    nlohmann::json edits = nlohmann::json::array();
+    const EditSnapshot& snapshot = editor_.snapshot();
+    for (size_t i = 0; i < snapshot.done; ++i)
+        for (const edit::Words& words : snapshot.steps[i].edits) edits.push_back({words.name, words.value});
+    session_.live_run.edit(nlohmann::json{{"edits", std::move(edits)}}.dump());
+}
+
+/// The bars and the dialogs.
+void App::draw_editor() {
+    dialogs_.draw();
+    if (editor_.settings.tool != last_tool_ && editor_.settings.tool != Tool::view) state_.settings.tab = PanelTab::edit;
+    last_tool_ = editor_.settings.tool;
+    if (!state_.bars_shown()) return;
+    BarFacts facts{.film_shown = false,
+                   .panel_shown = state_.panel_shown(),
+                   .can_save = editor_.scenes() > 0,
+                   .live = live(),
+                   .status = state_.device_name};
+    const BarActions actions = draw_bars(editor_, facts, state_.frame_area());
+    if (actions.open) session_.dialog.ask(Wanted::file);
+    if (actions.save) dialogs_.save();
+    if (actions.save_as) dialogs_.save_as();
+    if (actions.publish) dialogs_.publish();
+    if (actions.picture) state_.loop.capture = true;
+    if (actions.help) toggle(state_.help);
+    if (actions.panel) toggle(state_.panel_fits() ? state_.panel_beside : state_.panel_over);
+    if (!actions.clean) return;
+    (state_.panel_fits() ? state_.panel_beside : state_.panel_over) = true;
+    state_.settings.tab = PanelTab::edit;
+    edit_panel_.show_cleaning();
 }
 
 bool App::present(ImDrawData* drawn, Image* capture) {

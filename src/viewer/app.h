@@ -3,6 +3,10 @@
 #pragma once
 #include <memory>
 
+#include "viewer/editor/dialogs.h"
+#include "viewer/editor/edit_panel.h"
+#include "viewer/editor/editor.h"
+#include "viewer/editor/tools.h"
 #include "viewer/kept_settings.h"
 #include "viewer/navigation.h"
 #include "viewer/screen.h"
@@ -36,6 +40,15 @@ class App {
     bool present(ImDrawData* drawn, Image* capture);
     void panel();
     void draw_overlays();
+    void draw_editor();
+
+    // The editor.
+    bool editing() const;  // the keys are those of the tools
+    bool live() const;     // edits go to a training
+    void sync_editor();
+    void enter_scene();
+    void send_edits(const std::vector<edit::Step>& done);
+    void open(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown);
 
     ViewState state_;
     std::unique_ptr<Screen> screen_;
@@ -45,6 +58,14 @@ class App {
     Navigation navigation_;
     Shown shown_;
     ViewSession session_;
+    Editor editor_;
+    Tools tools_;
+    EditPanel edit_panel_;
+    Dialogs dialogs_;
+    std::shared_ptr<const Gaussians> entered_, drawn_;  // the scene that is edited, and what of it the render thread has
+    std::filesystem::path opened_;                      // the last file that was remembered
+    bool marked_ = false;                               // the render thread has marks
+    Tool last_tool_ = Tool::view;
 };
 
 }  // namespace ewa::viewer

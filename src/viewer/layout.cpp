@@ -47,13 +47,14 @@ Size window_size(Size picture, int panel, Size desktop, double scale) {
             std::max(1, int(std::lround(height)))};
 }
 
-Image without_left(const Image& image, int left) {
-    left = std::clamp(left, 0, image.width - 1);
-    if (left == 0) return image;
-    Image part(image.width - left, image.height, image.channels);
-    for (int y = 0; y < image.height; ++y)
-        std::copy_n(image.at(left, y), size_t(part.width) * size_t(image.channels), part.at(0, y));
-    return part;
+Image part_of(const Image& image, const Rectangle& part) {
+    const int left = std::clamp(part.x, 0, image.width - 1), top = std::clamp(part.y, 0, image.height - 1);
+    const int right = std::clamp(part.x + part.width, left + 1, image.width),
+              bottom = std::clamp(part.y + part.height, top + 1, image.height);
+    Image result(right - left, bottom - top, image.channels);
+    for (int y = top; y < bottom; ++y)
+        std::copy_n(image.at(left, y), size_t(result.width) * size_t(image.channels), result.at(0, y - top));
+    return result;
 }
 
 }  // namespace ewa::viewer

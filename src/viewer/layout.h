@@ -37,7 +37,7 @@ Arrangement arrange(Comparison comparison, const Rectangle& area, Size image);
 /// times `scale`, larger for a wide picture, and never larger than most of the desktop. desktop: zero if unknown.
 Size window_size(Size picture, int panel, Size desktop, double scale);
 
-/// The part of an image right of the first `left` columns.
-Image without_left(const Image& image, int left);
+/// A part of an image. It is cut to what the image has of it.
+Image part_of(const Image& image, const Rectangle& part);
 
 }  // namespace ewa::viewer

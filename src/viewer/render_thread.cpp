@@ -60,6 +60,11 @@ class RenderThread::Scene {
         scene_ = std::move(scene);
         coarse_ = std::move(coarse);
         is_up_ = false;
+        marks_ = nullptr;
+    }
+    void mark(std::shared_ptr<const std::vector<uint8_t>> marks) {
+        marks_ = std::move(marks);
+        marks_are_up_ = false;
     }
     /// Whether the device was not open before.
     bool open();
@@ -75,13 +80,15 @@ class RenderThread::Scene {
 
   private:
     void upload(bool densities);
+    void put_marks();
     void fit_to(const Look& look);
 
     OpenDevice open_;
     std::shared_ptr<gpu::Device> device_;
     std::optional<Renderer> renderer_, coarse_renderer_;
     std::shared_ptr<const Gaussians> scene_, coarse_;
-    bool is_up_ = false;
+    std::shared_ptr<const std::vector<uint8_t>> marks_;  // of scene_; null: none
+    bool is_up_ = false, marks_are_up_ = true;
     bool densities_are_up_ = false;  // the scene has opacities of Footprint::density
 };
 
@@ -120,13 +127,21 @@ void RenderThread::Scene::upload(bool densities) {
     put(*scene_, renderer_);
     if (coarse_) put(*coarse_, coarse_renderer_);
     is_up_ = true;
+    marks_are_up_ = !marks_;
     densities_are_up_ = densities;
+}
+
+void RenderThread::Scene::put_marks() {
+    if (std::exchange(marks_are_up_, true)) return;
+    renderer_->mark(marks_ && marks_->size() == scene_->size() ? std::span<const uint8_t>(*marks_)
+                                                               : std::span<const uint8_t>());
 }
 
 /// Opacities are those of the kernel, so that a scene looks about the same with all kernels.
 void RenderThread::Scene::fit_to(const Look& look) {
     const bool densities = look.kernel == Footprint::density;
     if (!look.points && densities != densities_are_up_) upload(densities);
+    put_marks();
 }
 
 std::shared_ptr<const RenderedFrame> RenderThread::Scene::draw(const RenderRequest& request, uint64_t scene) {
@@ -135,7 +150,9 @@ std::shared_ptr<const RenderedFrame> RenderThread::Scene::draw(const RenderReque
     const Camera camera = downscale(request.camera, request.divisor);
     fit_to(look);
     Renderer& renderer = request.coarse && coarse_renderer_ ? *coarse_renderer_ : *renderer_;
-    const DrawOptions options{options_of(look), drawing_for(look.mode), double(look.splat_scale)};
+    DrawOptions options{options_of(look), drawing_for(look.mode), double(look.splat_scale)};
+    options.draft = request.coarse;
+    options.plain_colors = !request.file.empty();
     auto finished = std::make_shared<RenderedFrame>();
     finished->request = request;
     finished->scene = scene;
@@ -161,6 +178,7 @@ std::optional<glm::dvec3> RenderThread::Scene::point_at(const Probe& probe) {
     const int divisor =
         probe.use == PointUse::look_at ? std::max(1, std::min(full.width, full.height) / kProbeSide) : 1;
     const Camera camera = downscale(full, divisor);
+    put_marks();
     DrawOptions options{{}, Drawing::median_depth, 1};
     if (densities_are_up_) options.render.kernel = Footprint::density;
     const Image depth = renderer_->render(camera, options).median_depth;
@@ -172,7 +190,8 @@ std::optional<glm::dvec3> RenderThread::Scene::point_at(const Probe& probe) {
 
 Image RenderThread::Scene::color(const Full& full) {
     fit_to(full.look);
-    const DrawOptions options{options_of(full.look), Drawing::color, double(full.look.splat_scale)};
+    DrawOptions options{options_of(full.look), Drawing::color, double(full.look.splat_scale)};
+    options.plain_colors = true;
     return renderer_->render(full.camera, options).color;
 }
 
@@ -188,8 +207,15 @@ uint64_t RenderThread::set_scene(std::shared_ptr<const Gaussians> gaussians,
     const std::lock_guard lock(mutex_);
     next_.scene = std::move(gaussians);
     next_.coarse = std::move(coarse);
+    next_.marks.reset();
     wake_.notify_one();
     return ++next_.scene_number;
+}
+
+void RenderThread::set_marks(std::shared_ptr<const std::vector<uint8_t>> marks) {
+    const std::lock_guard lock(mutex_);
+    next_.marks = std::move(marks);
+    wake_.notify_one();
 }
 
 void RenderThread::ask(const RenderRequest& request) {
@@ -239,10 +265,11 @@ void RenderThread::report(const std::function<void(News&)>& change) {
 bool RenderThread::next(const std::stop_token& stop, Work& work) {
     std::unique_lock lock(mutex_);
     wake_.wait(lock, stop,
-               [this] { return !probes_waiting_.empty() || next_.full || !waiting_.empty() || next_.scene; });
+               [this] { return !probes_waiting_.empty() || next_.full || !waiting_.empty() || next_.scene || next_.marks; });
     if (stop.stop_requested()) return false;
     work.scene = std::exchange(next_.scene, nullptr);
     work.coarse = std::exchange(next_.coarse, nullptr);
+    work.marks = std::exchange(next_.marks, std::nullopt);
     work.scene_number = next_.scene_number;
     if (!probes_waiting_.empty()) {
         work.probe = probes_waiting_.front();
@@ -263,6 +290,7 @@ void RenderThread::answer(const Probe& probe, const std::optional<glm::dvec3>& p
 
 void RenderThread::carry_out(Work& work) {
     if (work.scene) scene_->set(work.scene, work.coarse);
+    if (work.marks) scene_->mark(*work.marks);
     if (scene_->open()) report([&](News& news) { news.device = scene_->device(); });
     if (!scene_->bring_up()) return;
     if (work.probe) {

@@ -33,7 +33,7 @@ struct RenderRequest {
     Camera camera;  // of the size at which the frame is shown
     Look look;
     int divisor = 1;      // the frame has 1/divisor of that size
-    bool coarse = false;  // of the coarse scene, if there is one
+    bool coarse = false;  // of the coarse scene, if there is one; else without the splats that are marked kMarkFine
     uint64_t serial = 0;
     std::filesystem::path file;  // written as by `ewa render` with this extension; empty: no file
 };
@@ -78,6 +78,8 @@ class RenderThread {
     /// none. Returns the number that RenderedFrame::scene will have.
     uint64_t set_scene(std::shared_ptr<const Gaussians> gaussians,
                        std::shared_ptr<const Gaussians> coarse = nullptr);
+    /// Sets the marks of the scene's splats (Renderer::mark), until the next set_scene(). A file has no tints. null: none.
+    void set_marks(std::shared_ptr<const std::vector<uint8_t>> marks);
     /// Replaces a waiting request that has no file. The frame that is being rendered is finished first.
     void ask(const RenderRequest& request);
     /// Requests the surface point at a pixel, by its median depth. News::points has it with the returned number. Each request with
@@ -120,7 +122,8 @@ class RenderThread {
         std::optional<RenderRequest> request;
         std::optional<Probe> probe;
         std::optional<Full> full;
-        uint64_t scene_number = 0;  // of the last set_scene()
+        std::optional<std::shared_ptr<const std::vector<uint8_t>>> marks;  // empty: as before
+        uint64_t scene_number = 0;                                         // of the last set_scene()
     };
     void work(const std::stop_token& stop);
     bool next(const std::stop_token& stop, Work& work);

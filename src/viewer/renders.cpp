@@ -103,12 +103,20 @@ void SessionTimes::print(const RenderedFrame* last) const {
 
 void Renders::set_scene(std::shared_ptr<const Gaussians> gaussians, std::shared_ptr<const Gaussians> coarse) {
     has_coarse_ = coarse != nullptr;
+    has_draft_ = false;
     scene_ = thread_.set_scene(std::move(gaussians), std::move(coarse));
+}
+
+void Renders::set_marks(std::shared_ptr<const std::vector<uint8_t>> marks, bool draft) {
+    has_draft_ = draft;
+    ++marks_;
+    thread_.set_marks(std::move(marks));
 }
 
 void Renders::send(const RenderRequest& request) {
     asked_ = request;
     asked_scene_ = scene_;
+    asked_marks_ = marks_;
     thread_.ask(asked_);
 }
 
@@ -116,10 +124,10 @@ void Renders::ask(const Camera& camera, const Look& look, bool full) {
     RenderRequest request{camera, look, 1, false, asked_.serial + 1, {}};
     const auto now = Clock::now();
     const bool first = asked_.serial == 0;
-    if (first || asked_scene_ != scene_ || !same_view(request, asked_)) {
+    if (first || asked_scene_ != scene_ || asked_marks_ != marks_ || !same_view(request, asked_)) {
         changed_ = now;
         request.divisor = full ? 1 : first ? kFirstDivisor : pace_.divisor();
-        request.coarse = has_coarse_ && !full;
+        request.coarse = (has_coarse_ || has_draft_) && !full;
     } else if (!reduced() || now - changed_ < std::chrono::duration<double>(kRestSeconds)) {
         // A full frame takes long: a moving camera should not wait for it, and a resting one needs it once.
         return;
@@ -156,7 +164,7 @@ Renders::News Renders::take() {
 
 bool Renders::settled() const {
     return shown_ && shown_->request.serial == asked_.serial && shown_->request.divisor == 1 &&
-           !shown_->request.coarse && shown_->scene == scene_ &&
+           !shown_->request.coarse && shown_->scene == scene_ && asked_marks_ == marks_ &&
            std::max(points_, points_forgotten_) == points_asked_;
 }
 

@@ -87,6 +87,10 @@ void LiveRun::command(const std::string& command) {
     if (watcher_) watcher_->command(command);
 }
 
+void LiveRun::edit(const std::string& body) {
+    if (watcher_) watcher_->edit(body);
+}
+
 std::optional<int> LiveRun::failure() const {
     if (!trainer_ || update_.status.state == live::State::done) return std::nullopt;
     const std::optional<int> status = trainer_->status();

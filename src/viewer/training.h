@@ -61,6 +61,7 @@ class LiveRun {
     News take();
     const std::filesystem::path& folder() const { return folder_; }  // may be empty
     void command(const std::string& command);
+    void edit(const std::string& body);  // as Watcher::edit
     /// The exit status of a trainer that failed before the run was done.
     std::optional<int> failure() const;
 

@@ -83,13 +83,14 @@ void ViewSession::take_opened() {
     }
 }
 
-void ViewSession::take_chosen() {
-    if (dialog.wanted() == Wanted::save) return;  // the dialogs of the editor take it
+std::vector<std::filesystem::path> ViewSession::take_chosen() {
+    if (dialog.wanted() == Wanted::save) return {};  // the dialogs of the editor take it
     try {
-        if (const auto path = dialog.take()) open({*path}, {});
+        if (const auto path = dialog.take()) return {*path};
     } catch (const std::exception& error) {
         state_.say(error.what());
     }
+    return {};
 }
 
 void ViewSession::find_cameras(const std::filesystem::path& photos) {

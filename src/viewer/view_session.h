@@ -33,7 +33,7 @@ class ViewSession {
     /// Writes a screenshot.
     void save(Image&& image);
 
-    void take_chosen();  // opens the path that the user chose in the file dialog
+    std::vector<std::filesystem::path> take_chosen();  // that the user chose in the file dialog; empty: none
     void take_opened();
     void take_found();
     void take_saved();

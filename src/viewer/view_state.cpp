@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "viewer/view_state.h"
 
+#include "viewer/editor/toolbar.h"
+
 #include <cmath>
 
 namespace ewa::viewer {
@@ -76,8 +78,25 @@ bool ViewState::panel_fits() const {
     return free_area(window.framebuffer(), panel_width()).x > 0;
 }
 
-Rectangle ViewState::picture_area() const {
+Rectangle ViewState::frame_area() const {
     return free_area(window.framebuffer(), panel_shown() ? panel_width() : 0);
+}
+
+bool ViewState::bars_shown() const {
+    constexpr double kLeast = 22;  // heights of the text: of a window that has room for bars
+    const Rectangle area = frame_area();
+    return !scripted() && !empty() && std::min(area.width, area.height) >= kLeast * text_height();
+}
+
+Rectangle ViewState::picture_area() const {
+    Rectangle area = frame_area();
+    if (!bars_shown()) return area;
+    const BarSizes bars = bar_sizes(text_height());
+    area.x += bars.left;
+    area.y += bars.top;
+    area.width = std::max(1, area.width - bars.left);
+    area.height = std::max(1, area.height - bars.top - bars.bottom - strip_height);
+    return area;
 }
 
 }  // namespace ewa::viewer

@@ -87,7 +87,11 @@ struct ViewState {
     bool panel_fits() const;     // the window has room for the panel beside the picture
     bool empty() const { return scene.title.empty() && !scene.dataset && scene.gaussians->size() == 0; }
     bool panel_shown() const { return !scripted() && !empty() && (panel_fits() ? panel_beside : panel_over); }
-    /// The part of the window that the panel leaves to the pictures.
+    /// Whether the bars of the editor frame the picture: not in a small window.
+    bool bars_shown() const;
+    /// The part of the window beside the panel, with the bars.
+    Rectangle frame_area() const;
+    /// The part of the window that the panel and the bars leave to the pictures.
     Rectangle picture_area() const;
 
     const Startup& startup;
@@ -104,6 +108,7 @@ struct ViewState {
     bool panel_beside = true;  // in a window with room for the panel
     bool panel_over = false;   // in a narrow window, where the panel lies over the picture
     bool help = false;
+    int strip_height = 0;  // px of the framebuffer, of the film's strip above the status line
 };
 
 }  // namespace ewa::viewer

@@ -150,6 +150,10 @@ void Window::close() {
     glfwSetWindowShouldClose(window_, GLFW_TRUE);
 }
 
+void Window::stay() {
+    glfwSetWindowShouldClose(window_, GLFW_FALSE);
+}
+
 bool Window::held(int key) const {
     return glfwGetKey(window_, key) == GLFW_PRESS;
 }

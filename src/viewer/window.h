@@ -53,6 +53,7 @@ class Window {
     float density() const;     // px of the framebuffer per unit of the window's size
     bool closed() const;
     void close();
+    void stay();  // closed() is false again
     bool held(int key) const;
 
     /// Waits for input, at most so many seconds (0: no wait). Returns the keys pressed since the last call.

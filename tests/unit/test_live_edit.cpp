@@ -32,12 +32,25 @@ TEST(LiveEdit, RemovesWhatItsFiltersRemove) {
     EXPECT_EQ(removed(R"([["remove-invalid", ""]])"), std::vector<uint32_t>{});
 }
 
+TEST(LiveEdit, DeletesAndLocksSelections) {
+    const auto edit = [](const std::string& edits) {
+        return cli::live_edit(splats_in_a_row(), "{\"edits\": " + edits + "}");
+    };
+    const SplatEdit deleted = edit(R"([["select", "x=2.."], ["select", "remove:x=4.."], ["delete"]])");
+    EXPECT_EQ(deleted.remove, (std::vector<uint32_t>{2, 3}));
+    const SplatEdit locked = edit(R"([["select", "x=..1"], ["lock"], ["select", "invert"], ["delete", ""]])");
+    EXPECT_EQ(locked.freeze, (std::vector<uint32_t>{0, 1}));
+    EXPECT_EQ(locked.remove, (std::vector<uint32_t>{2, 3, 4}));
+    EXPECT_EQ(edit(R"([["unlock"], ["select", "x=..0"], ["lock"]])").unfreeze, (std::vector<uint32_t>{1, 2, 3, 4}));
+}
+
 TEST(LiveEdit, RefusesOtherTexts) {
     for (const auto& [body, part] : std::vector<std::pair<std::string, std::string>>{
              {"", "the edit"},
              {"{}", "edits"},
              {R"({"edits": []})", "edits"},
-             {R"({"edits": [["where"]]})", "edits"},
+             {R"({"edits": [["where"]]})", "--where"},
+             {R"({"edits": [["adjust", "opacity=0.5"]]})", "--adjust"},
              {R"({"edits": [["where", 3]]})", "edits"},
              {R"({"edits": [["dance", ""]]})", "--dance"},
              {R"({"edits": [["where", "x"]]})", "--where"},

@@ -60,9 +60,10 @@ TEST(Layout, ANewWindowHasRoomForThePanelAndThePicture) {
 TEST(Layout, AnImageWithoutItsLeftColumns) {
     Image image(3, 2, 1);
     image.pixels = {1, 2, 3, 4, 5, 6};
-    EXPECT_EQ(without_left(image, 0).pixels, image.pixels);
-    EXPECT_EQ(without_left(image, 1).pixels, (std::vector<float>{2, 3, 5, 6}));
-    EXPECT_EQ(without_left(image, 9).pixels, (std::vector<float>{3, 6}));
+    EXPECT_EQ(part_of(image, {0, 0, 3, 2}).pixels, image.pixels);
+    EXPECT_EQ(part_of(image, {1, 0, 2, 2}).pixels, (std::vector<float>{2, 3, 5, 6}));
+    EXPECT_EQ(part_of(image, {0, 1, 9, 1}).pixels, (std::vector<float>{4, 5, 6}));
+    EXPECT_EQ(part_of(image, {9, 0, 5, 2}).pixels, (std::vector<float>{3, 6}));
 }
 
 TEST(KeptSettings, ComeBack) {

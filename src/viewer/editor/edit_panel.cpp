@@ -62,9 +62,7 @@ void perform_on_selection(Editor& editor, const char* title, std::vector<edit::W
 }
 
 edit::Cameras cameras_of(const Editor& editor) {
-    if (editor.active() >= editor.scenes()) return {};
-    const auto& history = editor.scene(editor.active()).history;
-    return history ? history->splats().cameras() : edit::Cameras();
+    return editor.snapshot().cameras;
 }
 
 }  // namespace ewa::viewer

@@ -144,10 +144,12 @@ void Editor::separate() {
 /// The journal of a scene's file, from its first edit on. A folder that cannot be written is said once.
 void Editor::open_journal(EditedScene& scene, bool go_on) {
     if (!scene.journaled || scene.journal) return;
+    const fs::path file = edit::journal_of(scene.file);
+    std::error_code none;
+    if (!go_on && core::is_file(file)) fs::rename(file, file.string() + ".before", none);  // of an earlier session
     try {
         scene.journal = std::make_shared<edit::Journal>(
-            edit::journal_of(scene.file),
-            edit::JournalHead{scene.file.filename().string(), snapshot_->states ? snapshot_->states->size() : 0}, go_on);
+            file, edit::JournalHead{scene.file.filename().string(), snapshot_->states ? snapshot_->states->size() : 0}, go_on);
     } catch (const std::exception& error) {
         scene.journaled = false;
         note_ = std::string("edits are not kept in a journal: ") + error.what();

@@ -54,7 +54,7 @@ void change_states(Editor& editor, bool live) {
         const int clicked =
             ui::button_line({{say::kDelete, any, ui::ButtonLook::danger}, {say::kFreeze, any}});
         if (clicked == 0) editor.perform({say::kDelete.name, {{"delete", ""}}});
-        if (clicked == 1) editor.perform({say::kFreeze.name, {{"freeze", ""}}});
+        if (clicked == 1) editor.perform({say::kFreeze.name, {{"lock", ""}}});
         return;
     }
     switch (ui::button_line({{say::kLock, any}, {say::kUnlock, now.locked > 0}})) {
@@ -70,7 +70,7 @@ void change_states(Editor& editor, bool live) {
             editor.perform({say::kHide.name, {{"hide", ""}}});
             break;
         case 1:
-            editor.perform({say::kShow.name, {{"show", ""}}});
+            editor.perform({say::kShow.name, {{"unhide", ""}}});
             break;
     }
     switch (ui::button_line({{say::kDelete, any, ui::ButtonLook::danger}, {say::kDuplicate, any}})) {
