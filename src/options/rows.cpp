@@ -175,8 +175,8 @@ std::vector<Option> from_a_to_o() {
             kInput, kUsual),
         row("film", "ewa-view", kOutput, "DIR",
             "Write a film through the saved views, one PNG per frame, and exit"),
-        row("film-seconds", "ewa-view", kOutput, "S", "Duration of the film from view to view (2)",
-            within(0.04, 3600)),
+        row("film-seconds", "ewa-view", kOutput, "S",
+            "Duration of the film from view to view [the times in the file, or 2]", within(0.04, 3600)),
         row("film-seconds", "render", kData, "S",
             "With --views: seconds from view to view [the times in the file, or 2]. A folder gets the frames "
             "of "

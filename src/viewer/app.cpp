@@ -41,6 +41,7 @@ App::App(const Startup& startup)
       session_(state_, navigation_, shown_),
       editor_(core::own_program().parent_path() / "ewa", state_.wake, startup.budget),
       tools_(state_, navigation_, shown_, editor_),
+      film_(state_, navigation_, shown_),
       dialogs_(editor_, session_.dialog, state_.wake, [this](const std::string& note) { state_.say(note); }) {
     change_text();
     state_.loop.last_frame = Clock::now();
@@ -83,6 +84,7 @@ void App::run() {
         if (!state_.scripted()) {
             for (const KeyPress& key : keys) handle_key(key);
             navigation_.move(std::min(seconds, 0.1));
+            film_.advance(seconds);
             if (const auto dropped = state_.window.take_dropped(); !dropped.empty())
                 open(dropped, state_.scene);
             dialogs_.take();
@@ -96,20 +98,20 @@ void App::run() {
         session_.take_saved();
         session_.take_live();
         if (!state_.scripted()) sync_editor();
-        if (navigation_.film) navigation_.continue_film(shown_.renders);
+        film_.take();
         if (loop.redraws > 0) draw();
         shown_.ask();
     }
     const Startup& startup = state_.startup;
     if (startup.verbose) loop.times.print(shown_.renders.shown().get());
     if (state_.scripted() && !loop.done)
-        throw RunError("the window was closed before " +
-                       startup.picture.value_or(startup.film.value_or("")).string() + " was written");
+        throw RunError("the window was closed before " + startup.picture->string() + " was written");
 }
 
 /// How long to wait for input, in seconds.
 double App::patience() const {
-    if (state_.loop.redraws > 0 || navigation_.flying() || state_.settings.turntable) return 1.0 / 60;
+    if (state_.loop.redraws > 0 || navigation_.flying() || state_.settings.turntable || film_.playing())
+        return 1.0 / 60;
     const bool waits = shown_.renders.reduced() || session_.waiting() || editor_.busy() || editor_.saving();
     return waits || dialogs_.open() ? kPollSeconds : 1.0;
 }
@@ -158,7 +160,7 @@ void App::handle_key(const KeyPress& press) {
     if (key == GLFW_KEY_C) toggle(settings.cameras);
     if (key == GLFW_KEY_M) toggle(settings.measure);
     if (key == GLFW_KEY_V) shown_.change_comparison();
-    navigation_.handle_key(press);
+    if (!film_.handle_key(press)) navigation_.handle_key(press);
 }
 
 void App::handle_mouse() {
@@ -196,7 +198,6 @@ void App::handle_mouse() {
 }
 
 void App::panel() {
-    const std::optional<Film>& film = navigation_.film;
     const PanelFacts facts{
         .scene = state_.scene,
         .device = state_.device_name,
@@ -210,7 +211,6 @@ void App::panel() {
         .image_failure = shown_.image_failure(),
         .psnr = shown_.psnr(),
         .times = state_.loop.times,
-        .film = film ? std::optional(float(film->next) / float(film->frames)) : std::nullopt,
         .up = navigation_.view.up(),
         .at_camera = navigation_.at_camera,
         .width = float(state_.panel_width()) / std::max(1e-3f, ImGui::GetIO().DisplayFramebufferScale.x),
@@ -230,6 +230,7 @@ void App::obey(const PanelActions& actions) {
     if (actions.open) session_.dialog.ask(*actions.open);
     if (actions.train) session_.train();
     if (actions.command) session_.live_run.command(*actions.command);
+    if (actions.film) toggle(film_.shown);
     navigation_.obey(actions);
 }
 
@@ -246,7 +247,7 @@ void App::draw_overlays() {
     if (editor_.scenes() > 0) tools_.draw();
     draw_measurement(shown_.measurement, shown_.camera(), places.rendering);
     if (shown_.comparing()) draw_comparison(settings.comparison, places, settings.wipe);
-    const Rectangle area = state_.picture_area();
+    const Rectangle area = film_.area_above();
     const std::optional<Headline> words = session_.headline();
     if (words && !state_.help) draw_headline(*words, area);
     const bool empty = session_.empty();
@@ -275,16 +276,17 @@ void App::draw() {
     if (!state_.scripted()) draw_overlays();
     if (!state_.scripted()) draw_editor();
     if (state_.panel_shown()) panel();
+    if (!state_.scripted()) film_.draw();
     if (state_.help) draw_help(state_.help);
     if (!state_.scripted() && state_.message.noting(Clock::now()))
-        draw_note(state_.message.note, state_.picture_area());
+        draw_note(state_.message.note, film_.area_above());
     handle_mouse();
     ImDrawData* drawn = screen_->gui.end_frame();
     if (state_.settings.comparison != before) state_.redraw(Loop::kRedraws);
     shown_.choose_picture(screen_->presenter);
     shown_.measure_view();
 
-    const bool capture = loop.capture && shown_.complete() && !navigation_.film && !session_.saving();
+    const bool capture = loop.capture && shown_.complete() && !session_.saving();
     Image image;
     if (!present(drawn, capture ? &image : nullptr)) {
         // A minimised window shows nothing. Otherwise the window is changing: try again soon.
@@ -368,7 +370,7 @@ void App::draw_editor() {
     if (editor_.settings.tool != last_tool_ && editor_.settings.tool != Tool::view) state_.settings.tab = PanelTab::edit;
     last_tool_ = editor_.settings.tool;
     if (!state_.bars_shown()) return;
-    BarFacts facts{.film_shown = false,
+    const BarFacts facts{.film_shown = film_.shown,
                    .panel_shown = state_.panel_shown(),
                    .can_save = editor_.scenes() > 0,
                    .live = live(),
@@ -378,7 +380,8 @@ void App::draw_editor() {
     if (actions.save) dialogs_.save();
     if (actions.save_as) dialogs_.save_as();
     if (actions.publish) dialogs_.publish();
-    if (actions.picture) state_.loop.capture = true;
+    if (actions.film) toggle(film_.shown);
+    if (actions.picture) film_.open_picture();
     if (actions.help) toggle(state_.help);
     if (actions.panel) toggle(state_.panel_fits() ? state_.panel_beside : state_.panel_over);
     if (!actions.clean) return;

@@ -7,6 +7,7 @@
 #include "viewer/editor/edit_panel.h"
 #include "viewer/editor/editor.h"
 #include "viewer/editor/tools.h"
+#include "viewer/editor/timeline.h"
 #include "viewer/kept_settings.h"
 #include "viewer/navigation.h"
 #include "viewer/screen.h"
@@ -61,6 +62,7 @@ class App {
     Editor editor_;
     Tools tools_;
     EditPanel edit_panel_;
+    FilmStrip film_;
     Dialogs dialogs_;
     std::shared_ptr<const Gaussians> entered_, drawn_;  // the scene that is edited, and what of it the render thread has
     std::filesystem::path opened_;                      // the last file that was remembered

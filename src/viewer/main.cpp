@@ -29,6 +29,7 @@
 #include "scene/looks.h"
 #include "scene/names.h"
 #include "viewer/app.h"
+#include "viewer/editor/film.h"
 #include "viewer/kept_settings.h"
 #include "viewer/offscreen.h"
 
@@ -48,8 +49,8 @@ struct Arguments {
         std::filesystem::path token_file;
     } connect;
     std::string size, background, frame, mode, comparison;
-    bool train = false;
-    std::string kernel;  // empty: that of the scene
+    bool train = false, evenly = false;  // evenly: --film-seconds is given
+    std::string kernel;                  // empty: that of the scene
     std::vector<std::string> train_options;
     DeviceOptions device{.selector = {}, .own_queue = false};  // the window shows what this queue renders
     Startup startup;
@@ -167,8 +168,9 @@ OpenedScene open_what(const Arguments& arguments, Startup& startup) {
 void prepare_outputs(const CLI::App& command, const Startup& startup) {
     auto [written, read] = options::typed_files(command);
     if (startup.film) {
-        Film film(startup.views, *startup.film, {}, double(startup.settings.film_seconds));
-        for (; !film.finished(); ++film.next) written.push_back({"--film", film.file()});
+        const FilmPath film(startup.views, double(startup.settings.film_seconds));
+        for (int i = 0; i < film.frames(image::kFilmRate); ++i)
+            written.push_back({"--film", frame_file(*startup.film, i)});
     }
     if (written.empty()) return;
     if (startup.scene.dataset) {
@@ -194,6 +196,8 @@ Startup open(const Arguments& arguments) {
         startup.picture = arguments.picture;
     }
     if (!arguments.views.empty()) startup.views = io::read_views(arguments.views);
+    for (io::NamedView& view : startup.views)
+        if (arguments.evenly) view.time.reset();
     if (!arguments.film.empty()) {
         if (startup.views.empty())
             throw InputError("--film needs --views FILE with the views to pass through");
@@ -221,13 +225,14 @@ Startup open(const Arguments& arguments) {
 void take_settings(const CLI::App& app, Arguments& arguments) {
     Startup& startup = arguments.startup;
     startup.settings.train_steps = RunOptions().train.steps;
+    arguments.evenly = app.count("--film-seconds") > 0;
     if (!arguments.picture.empty() || !arguments.film.empty()) return;
     const KeptSettings kept = read_settings(settings_file());
     startup.last_size = kept.window;
     startup.settings.text_scale = kept.text_scale;
     startup.settings.gain = kept.gain;
     startup.settings.light = kept.light;
-    if (app.count("--film-seconds") == 0) startup.settings.film_seconds = kept.film_seconds;
+    if (!arguments.evenly) startup.settings.film_seconds = kept.film_seconds;
 }
 
 /// --help and --version: what CLI11 prints.
@@ -266,7 +271,7 @@ void add_options(CLI::App& app, Arguments& arguments) {
 
 /// Shows the window, and remembers its settings for the next session.
 void show(Startup& startup) {
-    if (startup.picture || startup.film) return App(startup).run();
+    if (startup.picture) return App(startup).run();
     App app(startup);
     app.run();
     KeptSettings kept = app.kept();
@@ -295,7 +300,7 @@ int run(const CLI::App& app, const Arguments& arguments) {
         startup.open_device = [options = arguments.device, first] {
             return *first ? std::exchange(*first, nullptr) : open_device(options);
         };
-        if ((startup.picture || startup.film) && !has_desktop())
+        if (startup.film || (startup.picture && !has_desktop()))
             write_without_window(startup);
         else
             show(startup);

@@ -6,13 +6,10 @@
 #include <imgui.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <string>
-#include <utility>
 
-#include "core/folders.h"
 #include "ewa/error.h"
-#include "scene/camera.h"
+#include "viewer/editor/film.h"
 
 namespace ewa::viewer {
 namespace {
@@ -22,23 +19,6 @@ constexpr double kFlySpeed = 0.8;        // distances to the pivot per second
 constexpr double kTurntableSpeed = 0.4;  // radians per second
 
 }  // namespace
-
-Film::Film(const std::vector<io::NamedView>& views, const std::filesystem::path& into, Size frame_size,
-           double seconds)
-    : folder(into), size(frame_size) {
-    for (const io::NamedView& view : views) keys.push_back(view.camera);
-    frames = int((double(keys.size()) - 1) * kRate * seconds + 0.5) + 1;
-}
-
-Camera Film::camera() const {
-    return along_path(keys, frames > 1 ? double(next) * double(keys.size() - 1) / (frames - 1) : 0);
-}
-
-std::filesystem::path Film::file() const {
-    char name[32];
-    std::snprintf(name, sizeof(name), "%05d.png", next);
-    return folder / name;
-}
 
 Navigation::Navigation(ViewState& state)
     : view(start_view(state.startup.scene, state.startup.frame, state.startup.size.value_or(kUsualSize))),
@@ -92,16 +72,10 @@ void Navigation::obey(const PanelActions& actions) {
     if (actions.whole_scene) show_whole_scene();
     if (actions.frame) go_to_camera(*actions.frame);
     if (actions.up) view.set_up(*actions.up);
-    if (actions.save_view) {
-        size_t free = 1;
-        while (find(free) != views.end()) ++free;
-        save_view(free);
-    }
+    if (actions.save_view) add_view({});
     if (actions.view && *actions.view < views.size()) go_to(views[*actions.view]);
     if (actions.forget && *actions.forget < views.size())
         views.erase(views.begin() + std::ptrdiff_t(*actions.forget));
-    if (actions.film && views.size() >= 2) start_film();
-    if (actions.stop_film) film.reset();
     if (actions.write_views) write_views();
 }
 
@@ -198,58 +172,42 @@ void Navigation::go_to(const io::NamedView& saved) {
     leave_camera();
 }
 
-void Navigation::save_view(size_t number) {
+io::NamedView Navigation::here() const {
     const Size size = state_.picture_area().size();
+    return {{}, view.camera(size.width, size.height), view.pivot()};
+}
+
+void Navigation::add_view(std::optional<double> time) {
+    size_t free = 1;
+    while (find(free) != views.end()) ++free;
+    save_view(free);
+    views.back().time = time;
+}
+
+void Navigation::save_view(size_t number) {
     const std::string name = std::to_string(number);
-    const io::NamedView saved{name, view.camera(size.width, size.height), view.pivot()};
-    if (const auto same = find(number); same != views.end())
+    io::NamedView saved = here();
+    saved.name = name;
+    if (const auto same = find(number); same != views.end()) {
+        saved.time = same->time;
         *same = saved;
-    else
+    } else {
         views.push_back(saved);
+    }
     state_.say("view " + name + " is saved; Shift + " + name + " goes to it");
 }
 
 void Navigation::write_views() {
     try {
         const std::filesystem::path file = free_name("ewa-views", ".json");
+        if (std::ranges::any_of(views, [](const io::NamedView& saved) { return saved.time.has_value(); }))
+            give_times(views, double(state_.settings.film_seconds));
         io::write_views(file, views);
-        state_.say("wrote " + std::filesystem::absolute(file).string() + "; --views opens it");
+        state_.say("wrote " + std::filesystem::absolute(file).string() +
+                   "; --views opens it, and with ewa convert it makes a page play the film");
     } catch (const RunError& error) {
         state_.say(error.what());
     }
-}
-
-void Navigation::start_film() {
-    const auto& asked = state_.startup.film;
-    Film planned(views, asked.value_or(free_name("ewa-film", "")), state_.picture_area().size(),
-                 double(state_.settings.film_seconds));
-    try {
-        core::make_folder(planned.folder);
-    } catch (const RunError& error) {
-        if (asked) throw;
-        return state_.say(error.what());
-    }
-    state_.settings.turntable = false;
-    leave_camera();
-    film = std::move(planned);
-}
-
-void Navigation::continue_film(Renders& renders) {
-    if (film->waits_for != 0) {
-        if (!renders.shown() || renders.shown()->request.serial < film->waits_for) return;
-        ++film->next;
-        state_.redraw();
-    }
-    if (film->finished()) {
-        state_.say("wrote " + std::to_string(film->frames) + " pictures to " +
-                   std::filesystem::absolute(film->folder).string());
-        film.reset();
-        state_.loop.done = state_.startup.film.has_value();
-        return;
-    }
-    view.stand({film->camera(), view.pivot(), view.up(), view.radius()});
-    film->waits_for =
-        renders.write(view.camera(film->size.width, film->size.height), state_.settings.look, film->file());
 }
 
 }  // namespace ewa::viewer

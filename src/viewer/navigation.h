@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The camera of the window, the keys that move it, and saved views.
 #pragma once
-#include <cstdint>
-#include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "io/datasets/view_list.h"
@@ -13,24 +12,6 @@
 namespace ewa::viewer {
 
 inline constexpr float kStillPixels = 4;  // a shorter drag is a click
-
-/// A film that is being written: frames along the path through saved views, one file each.
-struct Film {
-    static constexpr int kRate = 30;  // frames per second
-
-    std::filesystem::path folder;
-    std::vector<Camera> keys;  // at least one
-    Size size;                 // of every frame, also if the window changes
-    int frames = 0, next = 0;
-    uint64_t waits_for = 0;  // serial of the frame that is being written; 0: none
-
-    /// Two neighbouring views are kRate * seconds frames apart. The first and the last view are frames of the film.
-    Film(const std::vector<io::NamedView>& views, const std::filesystem::path& folder, Size size,
-         double seconds);
-    bool finished() const { return next >= frames; }
-    Camera camera() const;
-    std::filesystem::path file() const;
-};
 
 class Navigation {
   public:
@@ -54,9 +35,16 @@ class Navigation {
     /// The frame of `at_camera`, if that is set.
     const Frame& frame() const { return state_.scene.dataset->frames[size_t(*at_camera)]; }
 
-    void start_film();
-    /// Requests the render of the film's next frame once the previous frame is written.
-    void continue_film(Renders& renders);
+    /// Moves the camera, and stops the turntable.
+    void stand(const Viewpoint& place);
+    /// Shows a saved view.
+    void go_to(const io::NamedView& saved);
+    /// The present view, without a name.
+    io::NamedView here() const;
+    /// Saves the present view under the first free number. time: of a key of a film, or empty.
+    void add_view(std::optional<double> time);
+    /// Writes the saved views into a file with a free name, with their times if any of them has one.
+    void write_views();
 
     ViewCamera view;
     std::optional<int> at_camera;       // the frame of the dataset whose camera the view is at
@@ -64,18 +52,14 @@ class Navigation {
     double camera_size = 1;             // size of a drawn camera's frustum, world units
     bool framed = false;                // the first view was chosen from splats, not before any were there
     std::vector<io::NamedView> views;   // saved views; the name of each is the number of its key
-    std::optional<Film> film;
 
   private:
     void handle_number(size_t number, const KeyPress& press);
-    void stand(const Viewpoint& place);
     void step_camera(int step);
     void reset();
     void show_whole_scene();
     std::vector<io::NamedView>::iterator find(size_t number);
-    void go_to(const io::NamedView& saved);
     void save_view(size_t number);
-    void write_views();
 
     ViewState& state_;
     std::optional<int> start_frame_;  // the frame that reset() returns to

@@ -7,6 +7,7 @@
 
 #include "core/folders.h"
 #include "ewa/error.h"
+#include "viewer/editor/film.h"
 
 namespace ewa::viewer {
 namespace {
@@ -56,18 +57,21 @@ bool has_desktop() {
 }
 
 void write_without_window(const Startup& startup) {
-    if (startup.settings.comparison != Comparison::none)
+    if (startup.picture && startup.settings.comparison != Comparison::none)
         throw InputError("--compare needs a desktop session; ewa render and ewa compare do not");
     const Size size = startup.size.value_or(camera_size_or_usual(startup));
     Writer writer(startup);
     if (startup.picture) {
         const ViewCamera view(start_view(startup.scene, startup.frame, startup.size.value_or(kUsualSize)));
-        return writer.write(view.camera(size.width, size.height), *startup.picture);
+        writer.write(view.camera(size.width, size.height), *startup.picture);
     }
-    Film film(startup.views, *startup.film, size, double(startup.settings.film_seconds));
-    core::make_folder(film.folder);
-    for (; !film.finished(); ++film.next)
-        writer.write(scene::fitted(film.camera(), size.width, size.height), film.file());
+    if (!startup.film) return;
+    const FilmPath film(startup.views, double(startup.settings.film_seconds));
+    const int frames = film.frames(image::kFilmRate);
+    core::make_folder(*startup.film);
+    for (int i = 0; i < frames; ++i)
+        writer.write(scene::fitted(film.frame(i, frames), size.width, size.height),
+                     frame_file(*startup.film, i));
 }
 
 }  // namespace ewa::viewer

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Screenshots and films where no window can be opened.
+// Films that a command line asks for, and screenshots where no window can be opened.
 #pragma once
-#include "viewer/navigation.h"
+#include "viewer/view_state.h"
 
 namespace ewa::viewer {
 

@@ -140,7 +140,7 @@ void edit_cameras(const PanelFacts& facts, PanelSettings& settings, PanelActions
     draw_text_box("comparison", comparison_text(facts, settings), 2, 2);
 }
 
-void edit_views(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
+void edit_views(const PanelFacts& facts, PanelActions& actions) {
     if (ImGui::Button("Save this view")) actions.save_view = true;
     for (size_t i = 0; i < facts.views.size(); ++i) {
         ImGui::PushID(int(i));
@@ -151,14 +151,8 @@ void edit_views(const PanelFacts& facts, PanelSettings& settings, PanelActions& 
     }
     if (facts.views.empty()) return;
     if (ImGui::Button("Write to a file")) actions.write_views = true;
-    if (facts.views.size() < 2) return;
-    ImGui::SliderFloat("s per view", &settings.film_seconds, 0.2f, 10, "%.1f", ImGuiSliderFlags_AlwaysClamp);
-    if (facts.film) {
-        ImGui::ProgressBar(*facts.film);
-        actions.stop_film = ImGui::Button("Stop film");
-    } else {
-        actions.film = ImGui::Button("Write film");
-    }
+    ImGui::SameLine();
+    actions.film = ImGui::Button("Film");
 }
 
 void cells(const char* name, const char* format, double value) {
@@ -227,7 +221,7 @@ void draw_rows(const PanelFacts& facts, PanelSettings& settings, PanelActions& a
     if ((facts.run || trainable) && draw_section(texts::kTraining, true))
         draw_training(facts, settings, actions);
     if (facts.scene.dataset && draw_section(texts::kCameras, true)) edit_cameras(facts, settings, actions);
-    if (draw_section(texts::kSavedViews, false)) edit_views(facts, settings, actions);
+    if (draw_section(texts::kSavedViews, false)) edit_views(facts, actions);
     if (draw_section(texts::kDetails, false)) show_details(facts, settings, actions);
     if (draw_section(texts::kWindow, false)) choose_window(settings);
     ImGui::PopItemWidth();

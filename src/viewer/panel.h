@@ -30,7 +30,6 @@ struct PanelFacts {
     std::string image_failure;         // why the camera's image cannot be shown
     std::optional<double> psnr;        // of this view against the image
     const SessionTimes& times;
-    std::optional<float> film;  // share of the film that is written; empty: no film
     glm::dvec3 up;
     std::optional<int> at_camera;  // the camera that the view is at
     float width;                   // of the panel, in ImGui's coordinates
@@ -49,7 +48,7 @@ struct PanelSettings {
     bool cameras = false, turntable = false;
     bool parallel = false;   // orthographic projection
     bool measure = false;    // clicks choose points, whose distance is shown
-    float film_seconds = 2;  // from one view to the next
+    float film_seconds = 2;  // from one key of a film to the next
     float text_scale = 1;    // times the size that the monitor asks for
     bool light = false;      // the light theme
     PanelTab tab = PanelTab::view;
@@ -60,7 +59,7 @@ struct PanelSettings {
 /// What the user asked for in the panel.
 struct PanelActions {
     bool screenshot = false, exr = false, reset = false, whole_scene = false, save_view = false, film = false,
-         stop_film = false, write_views = false, train = false;
+         write_views = false, train = false;
     std::optional<int> frame;
     std::optional<size_t> view, forget;
     std::optional<glm::dvec3> up;

@@ -76,6 +76,8 @@ class RenderThread::Scene {
 
     std::shared_ptr<const RenderedFrame> draw(const RenderRequest& request, uint64_t scene);
     Image color(const Full& full);
+    /// Returns why the render could not be written or taken, or null.
+    std::exception_ptr draw_extra(const ExtraRequest& request);
     std::optional<glm::dvec3> point_at(const Probe& probe);
 
   private:
@@ -195,6 +197,28 @@ Image RenderThread::Scene::color(const Full& full) {
     return renderer_->render(full.camera, options).color;
 }
 
+std::exception_ptr RenderThread::Scene::draw_extra(const ExtraRequest& request) {
+    const Look& look = request.look;
+    fit_to(look);
+    const DrawOptions options{options_of(look), drawing_for(look.mode), double(look.splat_scale)};
+    const bool bytes_do = request.file.empty() && (look.mode == Mode::color || look.mode == Mode::ellipsoids);
+    std::optional<Rendering> rendering;
+    ByteImage picture;
+    if (bytes_do)
+        picture.rgba = renderer_->render_bytes(request.camera, options);
+    else
+        picture = picture_of(rendering.emplace(renderer_->render(request.camera, options)), look.mode);
+    try {
+        if (request.file.empty())
+            request.take(picture.rgba);
+        else
+            save(request.file, *rendering, picture, look.mode);
+    } catch (const std::exception&) {
+        return std::current_exception();  // the device is not to blame
+    }
+    return nullptr;
+}
+
 RenderThread::RenderThread(OpenDevice open, std::function<void()> on_news)
     : on_news_(std::move(on_news)),
       scene_(std::make_unique<Scene>(std::move(open))),
@@ -246,11 +270,20 @@ uint64_t RenderThread::ask_full(const Camera& camera, const Look& look) {
     return fulls_;
 }
 
+uint64_t RenderThread::ask_extra(ExtraRequest request) {
+    const std::lock_guard lock(mutex_);
+    request.number = ++extras_;
+    extras_waiting_.push_back(std::move(request));
+    wake_.notify_one();
+    return extras_;
+}
+
 RenderThread::News RenderThread::take_news() {
     const std::lock_guard lock(mutex_);
     News news = news_;
     news_.written.clear();
     news_.points.clear();
+    news_.extras.clear();
     return news;
 }
 
@@ -264,8 +297,10 @@ void RenderThread::report(const std::function<void(News&)>& change) {
 
 bool RenderThread::next(const std::stop_token& stop, Work& work) {
     std::unique_lock lock(mutex_);
-    wake_.wait(lock, stop,
-               [this] { return !probes_waiting_.empty() || next_.full || !waiting_.empty() || next_.scene || next_.marks; });
+    wake_.wait(lock, stop, [this] {
+        return !probes_waiting_.empty() || next_.full || !waiting_.empty() || !extras_waiting_.empty() ||
+               next_.scene || next_.marks;
+    });
     if (stop.stop_requested()) return false;
     work.scene = std::exchange(next_.scene, nullptr);
     work.coarse = std::exchange(next_.coarse, nullptr);
@@ -280,6 +315,10 @@ bool RenderThread::next(const std::stop_token& stop, Work& work) {
         waiting_.erase(waiting_.begin());
     } else {
         work.full = std::exchange(next_.full, std::nullopt);  // what the window shows comes first
+    }
+    if (!extras_waiting_.empty()) {
+        work.extra = std::move(extras_waiting_.front());
+        extras_waiting_.erase(extras_waiting_.begin());
     }
     return true;
 }
@@ -302,18 +341,30 @@ void RenderThread::carry_out(Work& work) {
             std::make_shared<const FullRender>(FullRender{work.full->number, scene_->color(*work.full)});
         report([&](News& news) { news.full = full; });
     }
-    if (!work.request) return;
-    const auto finished = scene_->draw(*work.request, work.scene_number);
-    report([&](News& news) {
-        news.picture = finished;
-        news.failure = nullptr;
-        if (!work.request->file.empty()) news.written.push_back(work.request->file);
-    });
+    if (work.request) {
+        const auto finished = scene_->draw(*work.request, work.scene_number);
+        report([&](News& news) {
+            news.picture = finished;
+            news.failure = nullptr;
+            if (!work.request->file.empty()) news.written.push_back(work.request->file);
+        });
+        work.request.reset();
+    }
+    if (!work.extra) return;
+    const std::exception_ptr failure = scene_->draw_extra(*work.extra);
+    report([&](News& news) { news.extras.push_back({work.extra->number, failure}); });
 }
 
 /// Reports the exception that is being handled.
-void RenderThread::fail(const Work& work) {
-    report([&](News& news) { news.failure = std::current_exception(); });
+void RenderThread::fail(Work& work) {
+    if (work.extra && (work.request || work.probe)) {
+        const std::lock_guard lock(mutex_);  // its own turn comes next
+        extras_waiting_.insert(extras_waiting_.begin(), *std::exchange(work.extra, std::nullopt));
+    }
+    report([&](News& news) {
+        news.failure = std::current_exception();
+        if (work.extra) news.extras.push_back({work.extra->number, news.failure});
+    });
     if (work.probe) answer(*work.probe, std::nullopt);
 }
 

@@ -64,6 +64,20 @@ struct FullRender {
     Image color;
 };
 
+/// A render beside those that are shown: a frame of a film, or a picture of any size.
+struct ExtraRequest {
+    Camera camera;  // of the size of the render
+    Look look = {};
+    std::filesystem::path file = {};  // as RenderRequest::file; empty: `take` gets the render
+    /// Gets RGBA on the render thread, and may throw.
+    std::function<void(const std::vector<uint8_t>&)> take = {};
+    uint64_t number = 0;
+};
+struct ExtraDone {
+    uint64_t number = 0;         // that ask_extra() returned
+    std::exception_ptr failure;  // null: it is written
+};
+
 /// Opens the device that renders. The render thread calls it.
 using OpenDevice = std::function<std::shared_ptr<gpu::Device>()>;
 
@@ -94,6 +108,10 @@ class RenderThread {
     /// request replaces one that waits.
     uint64_t ask_full(const Camera& camera, const Look& look);
 
+    /// Requests a render that leaves News::picture alone. News::extras has its end. Such renders are made in order. While both wait,
+    /// each takes its turn with the frames that are shown.
+    uint64_t ask_extra(ExtraRequest request);
+
     struct News {
         std::shared_ptr<const RenderedFrame> picture;  // the last complete frame, or null
         std::exception_ptr failure;                    // why the last request failed, if it did
@@ -101,6 +119,7 @@ class RenderThread {
         std::vector<SurfacePoint> points;              // in order, since the last take_news()
         std::shared_ptr<const FullRender> full;        // the last one, or null
         std::vector<std::filesystem::path> written;    // files, since the last take_news()
+        std::vector<ExtraDone> extras;                 // in order, since the last take_news()
     };
     News take_news();
 
@@ -122,13 +141,14 @@ class RenderThread {
         std::optional<RenderRequest> request;
         std::optional<Probe> probe;
         std::optional<Full> full;
+        std::optional<ExtraRequest> extra;
         std::optional<std::shared_ptr<const std::vector<uint8_t>>> marks;  // empty: as before
         uint64_t scene_number = 0;                                         // of the last set_scene()
     };
     void work(const std::stop_token& stop);
     bool next(const std::stop_token& stop, Work& work);
     void carry_out(Work& work);
-    void fail(const Work& work);
+    void fail(Work& work);
     void answer(const Probe& probe, const std::optional<glm::dvec3>& place);
     void report(const std::function<void(News&)>& change);
 
@@ -137,10 +157,11 @@ class RenderThread {
 
     mutable std::mutex mutex_;
     std::condition_variable_any wake_;
-    std::vector<RenderRequest> waiting_;  // in order; only the last may have no file
-    std::vector<Probe> probes_waiting_;   // in order
-    Work next_;                           // but for `request` and `probe`
-    uint64_t probes_ = 0, fulls_ = 0;
+    std::vector<RenderRequest> waiting_;        // in order; only the last may have no file
+    std::vector<Probe> probes_waiting_;         // in order
+    std::vector<ExtraRequest> extras_waiting_;  // in order
+    Work next_;                                 // but for `request`, `probe` and `extra`
+    uint64_t probes_ = 0, fulls_ = 0, extras_ = 0;
     News news_;
     std::jthread thread_;
 };

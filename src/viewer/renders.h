@@ -95,6 +95,8 @@ class Renders {
 
     /// Asks for the colours of a camera at its own size, as RenderThread::ask_full().
     uint64_t ask_full(const Camera& camera, const Look& look) { return thread_.ask_full(camera, look); }
+    /// Asks for a render beside those that are shown, as RenderThread::ask_extra(); News::extras has its end.
+    uint64_t ask_extra(ExtraRequest request) { return thread_.ask_extra(std::move(request)); }
     /// The number of the present scene.
     uint64_t scene() const { return scene_; }
 

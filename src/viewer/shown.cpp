@@ -42,12 +42,11 @@ void Shown::take_renders() {
     }
     if (news.failure) {
         if (state_.scripted() || !renders.shown()) std::rethrow_exception(news.failure);
-        navigation_.film.reset();
         if (state_.message.note != reason(news.failure)) state_.say(reason(news.failure));
     }
     for (const SurfacePoint& point : news.points) take_point(point);
-    for (const auto& file : news.written)
-        if (!navigation_.film) state_.say("wrote " + std::filesystem::absolute(file).string());
+    for (const auto& file : news.written) state_.say("wrote " + std::filesystem::absolute(file).string());
+    extras.insert(extras.end(), news.extras.begin(), news.extras.end());
     quality_.take(news.full);
     if (news.frame) state_.redraw();
 }
@@ -99,7 +98,7 @@ void Shown::take_comparison(Presenter& presenter) {
 
 std::optional<Camera> Shown::requested_camera() const {
     const Size size = state_.window.framebuffer();
-    if (size.width == 0 || size.height == 0 || navigation_.film) return std::nullopt;
+    if (size.width == 0 || size.height == 0) return std::nullopt;
     return camera();
 }
 
@@ -121,9 +120,8 @@ Arrangement Shown::arrangement() const {
     return arrange(comparison(), state_.picture_area(), image);
 }
 
-Camera Shown::camera() const {
-    const Rectangle place = arrangement().rendering;
-    const Camera camera = navigation_.view.camera(place.width, place.height);
+Camera Shown::camera(Size size) const {
+    const Camera camera = navigation_.view.camera(size.width, size.height);
     const PanelSettings& settings = state_.settings;
     // Spheres are drawn through pinholes only.
     if (!settings.parallel || comparing() || settings.look.points) return camera;

@@ -25,7 +25,7 @@ class Shown {
     /// Takes the results of the render thread. Throws its errors if a command line writes a file, and for the first frame.
     void take_renders();
     void take_comparison(Presenter& presenter);
-    /// Asks for a render of the view, unless the window is minimised, or a film sets the cameras.
+    /// Asks for a render of the view, unless the window is minimised.
     void ask();
     /// Requests the surface point at a pixel, to turn the view to it, to add it to `measurement`, or for `take_edit_point`.
     void ask_point(const glm::dvec2& pixel, PointUse use);
@@ -53,13 +53,15 @@ class Shown {
     bool wiping() const { return comparing() && state_.settings.comparison == Comparison::wipe; }
     void change_comparison();
     Arrangement arrangement() const;
-    Camera camera() const;  // of the size of the render's place
+    Camera camera() const { return camera(arrangement().rendering.size()); }  // of the render's place
+    Camera camera(Size size) const;
     /// The look of the settings. If the camera's lens has distortion, splats are not drawn as points.
     Look look_for(const Camera& camera) const;
     std::string image_failure() const;    // why the camera has no image; else empty
     const std::optional<double>& psnr();  // for the panel, dB
 
     Renders renders;
+    std::vector<ExtraDone> extras;  // that take_renders() has brought; who has asked for them takes them out
     Measurement measurement;
     std::function<void(const SurfacePoint&)> take_edit_point;  // gets the answers to PointUse::edit
 

@@ -25,7 +25,6 @@ void ViewSession::start() {
     const Startup& startup = state_.startup;
     adopt(startup.scene, startup.frame);
     state_.settings.look = startup.settings.look;
-    if (startup.film) navigation_.start_film();
     if (startup.watch) watch(*startup.watch, startup.trainer);
     if (!startup.scene.photos.empty()) find_cameras(startup.scene.photos);
 }

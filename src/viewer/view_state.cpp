@@ -12,7 +12,7 @@ namespace {
 Size initial_size(const Startup& startup, const WindowSystem& system) {
     if (startup.size) return *startup.size;
     const Size picture = camera_size_or_usual(startup);
-    if (startup.picture || startup.film) return picture;
+    if (startup.picture) return picture;
     const Size desktop = system.work_area();
     const double scale = double(system.scale());
     if (startup.last_size) {
@@ -95,7 +95,7 @@ Rectangle ViewState::picture_area() const {
     area.x += bars.left;
     area.y += bars.top;
     area.width = std::max(1, area.width - bars.left);
-    area.height = std::max(1, area.height - bars.top - bars.bottom - strip_height);
+    area.height = std::max(1, area.height - bars.top - bars.bottom);
     return area;
 }
 

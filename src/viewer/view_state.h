@@ -38,7 +38,8 @@ struct Startup {
     std::optional<Size> size;                      // of the window, px
     std::optional<Size> last_size;                 // of the last session's window, as KeptSettings::window
     std::optional<std::filesystem::path> picture;  // write this screenshot, then exit
-    std::optional<std::filesystem::path> film;     // write a film through `views` into this folder, then exit
+    std::optional<std::filesystem::path>
+        film;  // write a film through `views` into this folder, without a window
     std::vector<io::NamedView> views;
     size_t budget = kUsualBudget;  // as of open_scene(), for what is dropped on the window
     PanelSettings settings;
@@ -79,7 +80,7 @@ struct ViewState {
     ViewState(const ViewState&) = delete;
     ViewState& operator=(const ViewState&) = delete;
 
-    bool scripted() const { return startup.picture || startup.film; }
+    bool scripted() const { return startup.picture.has_value(); }
     void redraw(int frames = 1) { loop.redraws = std::max(loop.redraws, frames); }
     void say(const std::string& note);
     double text_height() const;  // px of the framebuffer
@@ -108,7 +109,6 @@ struct ViewState {
     bool panel_beside = true;  // in a window with room for the panel
     bool panel_over = false;   // in a narrow window, where the panel lies over the picture
     bool help = false;
-    int strip_height = 0;  // px of the framebuffer, of the film's strip above the status line
 };
 
 }  // namespace ewa::viewer

@@ -95,6 +95,34 @@ TEST(RenderThread, DrawsTheSceneItWasGivenLast) {
     EXPECT_GT(x[0], 2 * x[1]);
 }
 
+/// Frames of a film leave alone what the window shows, also where they cannot be written.
+TEST(RenderThread, ExtraRendersAreNotShown) {
+    RenderThread thread([] { return open_device({}); }, [] {});
+    thread.set_scene(red_splat());
+    thread.ask(request(1));
+    ASSERT_TRUE(soon([&] { return thread.take_news().picture != nullptr; }));
+    std::vector<uint8_t> taken;
+    ExtraRequest extra{.camera = request(0).camera};
+    extra.take = [&](const std::vector<uint8_t>& rgba) { taken = rgba; };
+    EXPECT_EQ(thread.ask_extra(extra), 1u);
+    extra.take = [](const std::vector<uint8_t>&) { throw RunError("ffmpeg has ended"); };
+    EXPECT_EQ(thread.ask_extra(extra), 2u);
+    extra.take = {};
+    extra.file = "/nowhere/frame.png";
+    EXPECT_EQ(thread.ask_extra(extra), 3u);
+    std::vector<ExtraDone> done;
+    ASSERT_TRUE(soon([&] {
+        for (const ExtraDone& one : thread.take_news().extras) done.push_back(one);
+        return done.size() == 3;
+    }));
+    EXPECT_EQ(taken, thread.take_news().picture->picture.rgba);
+    EXPECT_FALSE(done[0].failure);
+    EXPECT_TRUE(done[1].failure && done[2].failure);
+    for (size_t i = 0; i < done.size(); ++i) EXPECT_EQ(done[i].number, i + 1);
+    EXPECT_EQ(thread.take_news().picture->request.serial, 1u);
+    EXPECT_FALSE(thread.take_news().failure) << "the device is not to blame";
+}
+
 /// Clicks come faster than answers.
 TEST(RenderThread, AnswersAllPointsToMeasure) {
     std::promise<void> opened;
