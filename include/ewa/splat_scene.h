@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "ewa/camera.h"
 #include "ewa/gaussians.h"
 
 namespace ewa {
@@ -47,12 +48,20 @@ struct SplatScene {
 
 struct Dataset;
 
+/// A camera that a film passes, and when (s).
+struct FilmKey {
+    Camera camera;
+    double time = 0;
+};
+
 /// The contents of a page besides the scene.
 struct PageOptions {
     std::string title = {};  // empty: the name of the file
     bool unbundled = false;  // the scene is not in the page but beside it, in NAME-levels/lod-meta.json
     const Dataset* cameras = nullptr;  // the page offers these views, by name; null: none
     std::array<float, 3> background{};
+    std::vector<FilmKey> film =
+        {};  // that the page plays, in the order of times; empty: the views, or once round the scene
 };
 
 /// Options of save_splats. Each format uses its own.

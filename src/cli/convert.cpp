@@ -28,12 +28,14 @@
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
 #include "folders/run_folder.h"
+#include "io/datasets/view_list.h"
 #include "io/splats/format_table.h"
 #include "io/splats/output_options.h"
 #include "io/splats/place.h"
 #include "io/splats/prepare.h"
 #include "io/splats/scene_page.h"
 #include "options/command_options.h"
+#include "scene/framing.h"
 
 namespace ewa::cli {
 namespace {
@@ -50,7 +52,7 @@ struct ConvertArguments {
     EditArguments editing;
     io::OutputOptions output_options;
     int level = 0;  // of the inputs
-    fs::path json;
+    fs::path json, views;
     bool bake_sky = false, check = false, allow_empty = false, quiet = false;
     std::optional<folders::Run> run;  // that the only input is of
 };
@@ -288,11 +290,25 @@ void show_run(const folders::Run& run, Dataset& cameras, PageOptions& page,
     }
 }
 
+/// The film of saved views. Throws InputError if the output is no page, or there are no views.
+std::vector<FilmKey> film_of(const fs::path& file, const io::FormatRow& row) {
+    constexpr double kDistance = 2;  // s, of views without times, as in films of ewa render
+    if (row.format != SplatFormat::page) throw InputError("--views: only a page plays a film");
+    const std::vector<io::NamedView> views = io::read_views(file);
+    if (views.empty()) throw InputError(core::one_line(file.string()) + ": has no views");
+    const std::vector<double> times = io::times_of(views, kDistance);
+    std::vector<FilmKey> keys;
+    for (size_t i = 0; i < views.size(); ++i)
+        keys.push_back({scene::pinhole_at(views[i].camera), times[i] - times[0]});
+    return keys;
+}
+
 int run(const CLI::App& app, const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
     Work work;
     io::set_output_options(work.save, out, arguments.output_options);
     const io::FormatRow& row = io::row_to_write(out);
+    if (!arguments.views.empty()) work.save.page.film = film_of(arguments.views, row);
     if (arguments.check && !row.unchecked.empty()) throw InputError("--check: " + std::string(row.unchecked));
     // Report wrong use before the inputs are read: they may be large.
     const auto& [edits, picture] = arguments.editing;
@@ -355,6 +371,7 @@ Action add_convert(CLI::App& app) {
     options::add(app, "levels", output.levels);
     options::add(app, "unbundled", output.unbundled);
     options::add(app, "title", output.title);
+    options::add(app, "views", arguments->views);
     options::add(app, "geo", output.geo);
     options::add(app, "level", arguments->level);
     options::add(app, "bake-sky", arguments->bake_sky);

@@ -408,6 +408,8 @@ std::vector<Option> from_p_to_z() {
         row("verbose", "info", kOutput, "",
             "Also print the work that rendering and training skip, and each photo of a dataset"),
         row("verbose", "train", kOutput, "", "Print the plan: what this scene does not need"),
+        row("views", "convert", kOutput, "FILE",
+            "Keys of a film, in the format that ewa-view writes, which a page plays", kInput),
         row("views", "dataset", kData, "N",
             "Number of cameras on a dome over the scene; 0: the cameras of the file [those of the file if it "
             "has 8 or more, else 48]",

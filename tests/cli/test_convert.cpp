@@ -337,6 +337,27 @@ TEST(Convert, SaysWhatToWriteInstead) {
     EXPECT_EQ(files_below(folder / ""), Names{"s.ply"});
 }
 
+TEST(Convert, APagePlaysAFilm) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    const std::string view =
+        R"({"name": "a", "width": 48, "height": 32, "fx": 50, "fy": 50, "cx": 24, "cy": 16,
+            "rotation": [1, 0, 0, 0, 1, 0, 0, 0, 1], "translation": [0, 0, 4])";
+    const auto keys = [&](const std::string& first, const std::string& second) {
+        write_file(folder / "v.json", "{\"views\": [" + view + first + "}, " + view + second + "}]}");
+        expect_success(
+            run_ewa({"convert", folder / "s.ply", folder / "p.html", "--views", folder / "v.json"}));
+        return read_file(folder / "p.html");
+    };
+    EXPECT_NE(keys(R"(, "time": 1)", R"(, "time": 4.5)").find("\"time\":3.5"), std::string::npos);
+    EXPECT_NE(keys("", "").find("\"time\":2.0"), std::string::npos) << "views without times";
+    expect_failure(run_ewa({"convert", folder / "s.ply", folder / "c.spz", "--views", folder / "v.json"}), 2,
+                   "--views: only a page plays a film");
+    write_file(folder / "v.json", "{\"views\": []}");
+    expect_failure(run_ewa({"convert", folder / "s.ply", folder / "c.html", "--views", folder / "v.json"}), 2,
+                   "has no views");
+}
+
 TEST(Convert, WritesAPage) {
     const Folder folder;
     make_splats(folder / "s.ply");

@@ -18,11 +18,13 @@ TEST(ScenePage, HoldsTheSceneAndItsViews) {
     page.sog = "PK\3\4 scene";
     page.start = {4, 3, 5, 6, 2, 1.5};
     page.views = {{"</script>.jpg", page.start}};
+    page.film = {{page.start, 0}, {page.start, 2.5}};
     const std::string html = io::scene_page_html(page);
     EXPECT_NE(html.find("<title>a &lt;b&gt; &amp; @SCENE@</title>"), std::string::npos);
     EXPECT_NE(html.find(R"(id="scene">UEsDBCBzY2VuZQ==</script>)"), std::string::npos);
     EXPECT_NE(html.find(R"("name":"\u003c/script>.jpg")"), std::string::npos);
     EXPECT_NE(html.find(R"("fx":5.0,"fy":6.0)"), std::string::npos);
+    for (const char* part : {R"("film":[{)", R"("time":2.5)"}) EXPECT_NE(html.find(part), std::string::npos);
     for (const char* mark : {"@TITLE@", "@SETTINGS@", "@STYLE@", "@SCRIPT@"})
         EXPECT_EQ(html.find(mark), std::string::npos) << mark;
 }

@@ -1,7 +1,9 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """The page of `ewa convert`, in a real browser: test_page.py EWA SOURCE_FOLDER. Ends with 77 where there is no browser."""
+import json
 import pathlib
+import re
 import shutil
 import sys
 import time
@@ -108,6 +110,23 @@ class PageTest(BrowserTest):
         ActionChains(self.driver).send_keys(Keys.SPACE).perform()
         self.settled()
         self.assertEqual(self.driver.find_element(By.ID, "play").text, "▶")
+
+    def test_the_film_goes_through_its_keys(self):
+        page = (self.folder / "page.html").read_text()
+        settings = json.loads(re.search(r'id="settings">(.*?)</script>', page, re.S).group(1))
+        views = []
+        for i, camera in enumerate(settings["cameras"][:3]):
+            view = {name: camera[name] for name in ("name", "width", "height", "fx", "fy", "cx", "cy")}
+            view["rotation"] = sum(camera["rows"], [])
+            view["translation"] = [-sum(r * e for r, e in zip(row, camera["eye"])) for row in camera["rows"]]
+            views.append({**view, "time": i + 0.5})
+        (self.folder / "views.json").write_text(json.dumps({"views": views}))
+        run("convert", self.folder / "alone.ply", self.folder / "film.html", "--views", self.folder / "views.json", "--quiet")
+        run("render", self.folder / "alone.ply", "--views", self.folder / "views.json", "--film-seconds", 1, "-o",
+            self.folder / "frames", "--quiet")
+        for seconds, frame in ((0, 0), (0.5, 15), (1.2, 36), (2, 60)):
+            self.assertEqual(self.open("film.html", f"#film={seconds}"), "ready")
+            self.assertGreater(self.psnr(self.picture(), self.folder / "frames" / f"{frame:05}.png"), 40, seconds)
 
     def test_the_first_view_fills_a_high_window_as_a_wide_one(self):
         high = self.folder / "high.ply"

@@ -5,6 +5,7 @@ import {between, Camera} from "./camera.js";
 import {Controls} from "./controls.js";
 import {Live} from "./live.js";
 import {joined, LevelScene, openLevels} from "./levels.js";
+import {alongPath} from "./path.js";
 import {Renderer} from "./renderer.js";
 import {decodeSog} from "./sog.js";
 import {Sorter} from "./sorter.js";
@@ -105,13 +106,18 @@ class Page {
         }), kRest);
     }
 
-    /// The view that the address names: #camera=3, #camera=NAME, #light, #budget=N.
+    /// The view that the address names: #camera=3, #camera=NAME, #film=SECONDS, #light, #budget=N.
     jump() {
         const wanted = new URLSearchParams(location.hash.slice(1));
         this.light = wanted.has("light");
         if (this.levels) {
             this.levels.budget = this.budget();
             this.rest();
+        }
+        if (wanted.has("film") && this.settings.film) {
+            this.film = 0;
+            this.index = -1;
+            this.camera.show(alongPath(this.settings.film, Number(wanted.get("film")) || 0), this.settings.target);
         }
         if (!wanted.has("camera")) return;
         const name = wanted.get("camera"), found = this.settings.cameras.findIndex((one) => `/${one.name}`.endsWith(`/${name}`));
@@ -172,7 +178,7 @@ class Page {
         this.request();
     }
 
-    /// The views of the photos one after another, or once round the scene.
+    /// The film of the page, without one the views of the photos one after another, or else once round the scene.
     play() {
         this.film = this.film ? 0 : performance.now() - 1;
         this.from = {...this.camera.view, eye: this.camera.eye, rows: this.camera.rows};
@@ -180,8 +186,11 @@ class Page {
     }
 
     step() {
-        const seconds = (performance.now() - this.film) / 1000, {cameras, up, target} = this.settings;
-        if (cameras.length > 1) {
+        const seconds = (performance.now() - this.film) / 1000, {cameras, film, up, target} = this.settings;
+        if (film?.length > 1) {
+            this.index = -1;
+            this.camera.show(alongPath(film, seconds % film[film.length - 1].time), target);
+        } else if (cameras.length > 1) {
             const at = seconds / kSecondsAView, first = Math.floor(at) % cameras.length, t = at % 1;
             this.camera.show(between(cameras[first], cameras[(first + 1) % cameras.length], t * t * (3 - 2 * t)), target);
         } else {

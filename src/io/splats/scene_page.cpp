@@ -57,6 +57,11 @@ std::string settings_text(const ScenePage& page) {
         camera["name"] = view.name;
         settings["cameras"].push_back(std::move(camera));
     }
+    for (const FilmKey& key : page.film) {
+        PageJson camera = view_json(key.camera);
+        camera["time"] = key.time;
+        settings["film"].push_back(std::move(camera));
+    }
     std::string text = settings.dump(-1, ' ', true, PageJson::error_handler_t::replace);
     for (size_t at = 0; (at = text.find('<', at)) != std::string::npos;) text.replace(at, 1, "\\u003c");
     return text;
@@ -126,6 +131,7 @@ std::vector<std::string> write_page(const std::filesystem::path& path, Gaussians
     ScenePage page;
     page.title = options.page.title.empty() ? path.stem().string() : options.page.title;
     page.background = options.page.background;
+    page.film = options.page.film;
     core::AtomicFile file(path);
     set_views(page, gaussians, options.page.cameras);
     const bool unbundled = options.page.unbundled;

@@ -29,6 +29,7 @@ struct ScenePage {
     std::optional<Camera> portrait = {};  // that of a window which is higher than wide; empty: `start`
     glm::dvec3 up{0, -1, 0}, target{0};   // world: unit length; the point that the views turn about
     std::vector<PageView> views = {};     // those that the page can go to
+    std::vector<FilmKey> film = {};       // as PageOptions::film
 };
 
 /// The text of the file.
