@@ -106,7 +106,7 @@ std::string fake_ffmpeg(const test::Folder& folder) {
 }
 
 /// Renders the film to its end. Throws what the writer throws.
-void write(FilmWriter& writer, Renders& renders) {
+void write_film(FilmWriter& writer, Renders& renders) {
     double seconds = 0;
     EXPECT_TRUE(test::soon([&] { return writer.step(renders, renders.take().extras, seconds += 0.1); }));
 }
@@ -123,7 +123,7 @@ TEST(FilmWriter, GivesFfmpegItsFrames) {
     FilmOutput output{.file = folder / "film.mp4", .size = {32, 24}};
     FilmWriter writer(film, output, {}, [] {});
     EXPECT_FALSE(writer.left(0));
-    write(writer, renders);
+    write_film(writer, renders);
     EXPECT_EQ(writer.written(), 4);
     EXPECT_EQ(test::read_file(folder / "film.mp4").size(), size_t(4) * 32 * 24 * 4);
 
@@ -131,7 +131,7 @@ TEST(FilmWriter, GivesFfmpegItsFrames) {
     EXPECT_THROW(FilmWriter(film, output, {}, [] {}), RunError) << "this ffmpeg has no encoder for it";
     output.file = folder / "frames";
     FilmWriter frames(film, output, {}, [] {});
-    write(frames, renders);
+    write_film(frames, renders);
     EXPECT_EQ(test::files_below(folder / "frames").size(), 4u);
     EXPECT_EQ(load_image(folder / "frames/00003.png").width, 32);
     // A film that is stopped leaves nothing.

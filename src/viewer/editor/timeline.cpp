@@ -133,7 +133,8 @@ void FilmStrip::play(bool on) {
 }
 
 void FilmStrip::advance(double seconds) {
-    if (!playing_) return;
+    // A screenshot waits for the full frame of a view that stays.
+    if (!playing_ || state_.loop.capture) return;
     const Camera now = navigation_.view.camera(last_.width, last_.height);
     if (views().size() < 2 || now.rotation != last_.rotation || now.translation != last_.translation)
         return play(false);  // the user moves the camera
