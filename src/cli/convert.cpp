@@ -291,7 +291,7 @@ void show_run(const folders::Run& run, Dataset& cameras, PageOptions& page,
 }
 
 /// The film of saved views. Throws InputError if the output is no page, or there are no views.
-std::vector<FilmKey> film_of(const fs::path& file, const io::FormatRow& row) {
+std::vector<FilmKey> film_through(const fs::path& file, const io::FormatRow& row) {
     constexpr double kDistance = 2;  // s, of views without times, as in films of ewa render
     if (row.format != SplatFormat::page) throw InputError("--views: only a page plays a film");
     const std::vector<io::NamedView> views = io::read_views(file);
@@ -308,7 +308,7 @@ int run(const CLI::App& app, const ConvertArguments& arguments) {
     Work work;
     io::set_output_options(work.save, out, arguments.output_options);
     const io::FormatRow& row = io::row_to_write(out);
-    if (!arguments.views.empty()) work.save.page.film = film_of(arguments.views, row);
+    if (!arguments.views.empty()) work.save.page.film = film_through(arguments.views, row);
     if (arguments.check && !row.unchecked.empty()) throw InputError("--check: " + std::string(row.unchecked));
     // Report wrong use before the inputs are read: they may be large.
     const auto& [edits, picture] = arguments.editing;
