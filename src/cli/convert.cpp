@@ -255,7 +255,9 @@ bool edit_scene(const ConvertArguments& arguments, Work& work, std::optional<fol
     for (const edit::Outcome& outcome : applied.outcomes) {
         const std::string of = core::counted(outcome.before, "splat");
         if (!outcome.removes) {
-            work.lost.push_back(fmt::format("{} left {} of {}", outcome.text, outcome.after, of));
+            work.lost.push_back(outcome.after < outcome.before
+                                    ? fmt::format("{} left {} of {}", outcome.text, outcome.after, of)
+                                    : fmt::format("{} made {} of {}", outcome.text, outcome.after, of));
             continue;
         }
         const size_t removed = outcome.before - outcome.after;
@@ -311,9 +313,9 @@ int run(const CLI::App& app, const ConvertArguments& arguments) {
     if (!arguments.views.empty()) work.save.page.film = film_through(arguments.views, row);
     if (arguments.check && !row.unchecked.empty()) throw InputError("--check: " + std::string(row.unchecked));
     // Report wrong use before the inputs are read: they may be large.
-    const auto& [edits, picture] = arguments.editing;
+    const auto& [edits, journals, picture] = arguments.editing;
     if (!picture.empty() &&
-        std::ranges::none_of(edits, [](const edit::Edit& edit) { return bool(edit.filter); }))
+        std::ranges::none_of(edits, [](const edit::Edit& edit) { return edit.filter || edit.act; }))
         throw InputError("--dry-run: no option removes splats; see --where and others of ewa convert --help");
     check_files(app, arguments);
     read_all(arguments, work);
@@ -365,6 +367,7 @@ Action add_convert(CLI::App& app) {
     options::add(app, "FILES", arguments->files)->expected(1, -1);
     options::add(app, "output", arguments->output);
     for (const edit::Row& row : edit::rows()) options::add(app, row.name);
+    options::add(app, "edits", arguments->editing.journals);
     options::add(app, "dry-run", arguments->editing.picture);
     options::add(app, "spz-version", output.spz_version);
     options::add(app, "gltf-spz", output.gltf_spz);

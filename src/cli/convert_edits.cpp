@@ -5,6 +5,7 @@
 #include <map>
 
 #include "cli/run_inputs.h"
+#include "edit/journal.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "scene/framing.h"
@@ -14,12 +15,17 @@ namespace ewa::cli {
 std::vector<edit::Edit> typed_edits(const CLI::App& app) {
     std::vector<edit::Edit> edits;
     std::map<const CLI::Option*, size_t> used;  // values of an option so far
-    for (const CLI::Option* option : app.parse_order())
+    for (const CLI::Option* option : app.parse_order()) {
+        if (option->check_lname("edits")) {
+            const std::vector<edit::Edit> all = edit::edits_of_journal(option->results().at(used[option]++));
+            edits.insert(edits.end(), all.begin(), all.end());
+        }
         for (const edit::Row& row : edit::rows()) {
             if (!option->check_lname(row.name)) continue;
             const size_t value = used[option]++;
             edits.push_back(edit::parse(row.name, *row.value == 0 ? "" : option->results().at(value)));
         }
+    }
     return edits;
 }
 

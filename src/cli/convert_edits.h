@@ -16,6 +16,7 @@ namespace ewa::cli {
 
 struct EditArguments {
     std::vector<edit::Edit> edits;
+    std::vector<std::filesystem::path> journals;  // whose edits are among them
     std::filesystem::path picture;  // image of the splats that would be removed, with --dry-run; empty: none
 };
 

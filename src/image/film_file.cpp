@@ -126,7 +126,7 @@ std::string find_encoder(const std::string& codec, const fs::path& file) {
     std::string wanted;
     for (const Encoder& encoder : encoders()) {
         if (encoder.codec != codec) continue;
-        if (listed.find(" " + std::string(encoder.name) + " ") != std::string::npos)
+        if (listed.find(std::string(" ").append(encoder.name).append(" ")) != std::string::npos)
             return std::string(encoder.name);
         wanted.append(wanted.empty() ? "" : ", ").append(encoder.name);
     }

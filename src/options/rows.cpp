@@ -168,6 +168,9 @@ std::vector<Option> from_a_to_o() {
             "Write only this picture, in which all that would be removed is red. OUT may be left out, and is "
             "not written. Edits that merge or sort splats are left out then",
             kWritten),
+        row("edits", "convert", kEdits, "FILE",
+            "Replay a journal of edits, which ewa-view keeps beside the splats as FILE.edits", kInput,
+            [](Option& option) { option.repeats = true; }),
         row("exposure", "dataset", kData, "EV", "Exposure in stops, or auto", kUsual),
         row("exposures", "render eval", kData, "auto|none|FILE",
             "Appearance of training images, as ewa train --appearance writes it. auto: that of the run "

@@ -30,8 +30,6 @@ constexpr const char *kJournalTitle = "Edits of an earlier session", *kJournalRe
 constexpr const char* kSavingTitle = "Saving";
 constexpr float kFormatLines = 8;
 
-enum class DialogKind { none, save, publish, leave, journal, saving };
-
 /// The row for a copy of the file: its own format if ewa writes that, or else PLY.
 const io::FormatRow* first_row(const fs::path& file) {
     const io::FormatRow* row = io::row_of_name(file);
@@ -39,6 +37,8 @@ const io::FormatRow* first_row(const fs::path& file) {
 }
 
 }  // namespace
+
+enum class DialogKind { none, save, publish, leave, journal, saving };
 
 struct Dialogs::State {
     State(Editor& edited, FileDialog& dialog, std::function<void()> wake,

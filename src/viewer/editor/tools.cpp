@@ -63,7 +63,7 @@ struct Tools::State {
 
     Tool tool() const { return room.settings().tool; }
     bool idle() const {
-        return tool() == Tool::view || room.navigation.film.has_value() || room.state.scripted();
+        return tool() == Tool::view || room.state.scripted();
     }
     bool cancel() {
         // Each of them is asked.
