@@ -210,23 +210,26 @@ void EditedSplats::rewind(const Extent& to) {
         sources_.resize(to.splats - first_->size());
         if (!group_of_.empty()) group_of_.resize(to.splats);
     }
-    if (to.groups == groups_.size()) return;
+    if (to.groups < groups_.size()) take_back(to.groups);
+    if (!groups_.empty() || size() > first_->size()) return;
+    now_ = first_;
+    own_.reset();
+}
+
+/// Removes the last groups, with the values that they gave.
+void EditedSplats::take_back(size_t groups) {
     std::map<uint32_t, std::vector<uint32_t>> changed;  // by the group that they return to
     for (size_t i = 0; i < size(); ++i) {
         uint32_t group = group_of_[i];
-        if (group <= to.groups) continue;
-        while (group > to.groups) group = groups_[group - 1].parent;
+        if (group <= groups) continue;
+        while (group > groups) group = groups_[group - 1].parent;
         group_of_[i] = group;
         changed[group].push_back(uint32_t(i));
     }
-    groups_.resize(to.groups);
-    writable().origin = origin_of(uint32_t(to.groups));  // that of the last edit
+    groups_.resize(groups);
+    writable().origin = origin_of(uint32_t(groups));  // that of the last edit
     for (const auto& [group, indices] : changed) set_values(indices, values_of(group, indices));
-    if (!groups_.empty()) return;
-    group_of_.clear();
-    if (size() > first_->size()) return;
-    now_ = first_;
-    own_.reset();
+    if (groups_.empty()) group_of_.clear();
 }
 
 uint64_t EditedSplats::bytes() const {

@@ -90,6 +90,7 @@ class EditedSplats {
     Gaussians values_of(uint32_t group, const std::vector<uint32_t>& indices) const;
     void set_values(const std::vector<uint32_t>& indices, const Gaussians& values);
     Gaussians& writable();
+    void take_back(size_t groups);  // groups: that remain
 
     std::shared_ptr<const Gaussians> first_, now_;
     std::shared_ptr<Gaussians> own_;  // now_, once values have changed

@@ -130,7 +130,8 @@ uint64_t History::bytes() const {
     return bytes;
 }
 
-std::string command_line(const std::vector<Words>& edits, const std::string& input, const std::string& output) {
+std::string command_line(const std::vector<Words>& edits, const std::string& input,
+                         const std::string& output) {
     std::string line = fmt::format("ewa convert {} {}", quoted(input), quoted(output));
     for (const Words& words : edits) {
         line += fmt::format(" --{}", words.name);

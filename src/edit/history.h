@@ -36,8 +36,8 @@ class History {
 
     const EditedSplats& splats() const { return splats_; }
     const std::shared_ptr<const Gaussians>& first() const { return splats_.first(); }  // without any edit
-    const std::vector<Step>& steps() const { return steps_; }  // the undone ones too
-    size_t done() const { return done_; }                      // steps that are in effect
+    const std::vector<Step>& steps() const { return steps_; }                          // the undone ones too
+    size_t done() const { return done_; }  // steps that are in effect
     /// The edits in effect, in order.
     std::vector<Words> edits() const;
     /// Rises with every change. The number of values changes only if splats() has others.

@@ -2,21 +2,16 @@
 // Shapes of --select: which splats they take. A shape is evaluated on the host in float64, so that a journal selects the same
 // splats on every machine.
 #pragma once
-#include <functional>
-#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <string>
 #include <vector>
 
 #include "edit/edited_splats.h"
-#include "ewa/camera.h"
+#include "edit/view_shapes.h"
 
 namespace ewa::edit {
 
 enum class Operation { set, add, remove, intersect };
-
-/// For each splat, whether the shape takes it. Splats that are not selectable are left out by select().
-using Shape = std::function<std::vector<bool>(const EditedSplats&)>;
 
 /// A parsed --select.
 struct Selection {
@@ -40,13 +35,7 @@ struct Selection {
 /// before it, fx and fy are px per world unit of parallel rays.
 Selection parse_selection(const std::string& text, const std::string& what = "--select");
 
-/// The VIEW of a camera: a pinhole, or an orthographic lens as of the window. Other lenses give the pinhole with their focal length.
-std::string view_text(const Camera& camera);
-
-// What tools write.
-std::string rectangle_shape(const Camera& camera, const glm::dvec2& from, const glm::dvec2& to);
-std::string polygon_shape(const Camera& camera, const std::vector<glm::dvec2>& points);
-std::string brush_shape(const Camera& camera, double radius, const std::vector<glm::dvec2>& points);
+// What tools write; edit/view_shapes.h has the others.
 std::string box_shape(const glm::dvec3& low, const glm::dvec3& high);
 std::string sphere_shape(const glm::dvec3& center, double radius);
 

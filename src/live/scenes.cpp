@@ -32,14 +32,16 @@ std::shared_ptr<const Scene> Scenes::kept(bool trusted, bool busy) {
     return last_;
 }
 
-std::shared_ptr<const Scene> Scenes::of(const Version& version, const Gaussians& gaussians, const SaveOptions& options,
-                                        bool trusted, bool busy) {
+std::shared_ptr<const Scene> Scenes::of(const Version& version, const Gaussians& gaussians,
+                                        const SaveOptions& options, bool trusted, bool busy) {
     const std::lock_guard making(making_);
     // Another request may have made one in the meantime.
     if (const auto scene = kept(trusted, busy)) return scene;
-    const bool newer = !last_ || static_cast<const Version&>(*last_) < version;  // only who holds making_ changes it
+    const bool newer =
+        !last_ || static_cast<const Version&>(*last_) < version;  // only who holds making_ changes it
     const Clock::time_point start = Clock::now();
-    auto scene = newer ? std::make_shared<const Scene>(Scene{version, packed_scene(gaussians, options)}) : last_;
+    auto scene =
+        newer ? std::make_shared<const Scene>(Scene{version, packed_scene(gaussians, options)}) : last_;
     const std::lock_guard lock(mutex_);
     last_ = std::move(scene);
     if (newer) next_ = Clock::now() + kRest * (Clock::now() - start);

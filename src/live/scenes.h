@@ -31,8 +31,8 @@ class Scenes {
     /// most a fifth of the time.
     std::shared_ptr<const Scene> kept(bool trusted, bool busy);
     /// The scene of these splats, or of later ones. Returns late while another scene is made.
-    std::shared_ptr<const Scene> of(const Version& version, const Gaussians& gaussians, const SaveOptions& options,
-                                    bool trusted, bool busy);
+    std::shared_ptr<const Scene> of(const Version& version, const Gaussians& gaussians,
+                                    const SaveOptions& options, bool trusted, bool busy);
 
   private:
     using Clock = std::chrono::steady_clock;

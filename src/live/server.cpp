@@ -415,7 +415,8 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
         auto scene = server_.scenes_.kept(trusted, busy);
         if (!scene)
             if (const auto splats = splats_for(trusted, known.empty()))
-                scene = server_.scenes_.of({splats->step, splats->edits}, splats->gaussians, options, trusted, busy);
+                scene = server_.scenes_.of({splats->step, splats->edits}, splats->gaussians, options, trusted,
+                                           busy);
         if (!name_splats(known, response, scene ? scene->step : -1, scene ? scene->edits : 0)) return;
         give_bytes(response, {scene, &scene->sog}, "application/octet-stream", std::move(guest));
     }

@@ -40,8 +40,8 @@
 
 #include "ewa/gaussians.h"
 #include "ewa/splat_scene.h"
-#include "live/scenes.h"
 #include "live/edit_queue.h"
+#include "live/scenes.h"
 #include "live/status.h"
 
 namespace ewa::live {

@@ -354,8 +354,11 @@ void App::sync_editor() {
 
 /// A training gets all edits since its splats were shown, once one of them removes or freezes splats.
 void App::send_edits(const std::vector<edit::Step>& done) {
-    const auto changes = [](const edit::Words& words) { return words.name == "delete" || words.name.ends_with("lock"); };
-    if (std::ranges::none_of(done, [&](const edit::Step& step) { return std::ranges::any_of(step.edits, changes); }))
+    const auto changes = [](const edit::Words& words) {
+        return words.name == "delete" || words.name.ends_with("lock");
+    };
+    if (std::ranges::none_of(
+            done, [&](const edit::Step& step) { return std::ranges::any_of(step.edits, changes); }))
         return;
     nlohmann::json edits = nlohmann::json::array();
     const EditSnapshot& snapshot = editor_.snapshot();
@@ -367,14 +370,15 @@ void App::send_edits(const std::vector<edit::Step>& done) {
 /// The bars and the dialogs.
 void App::draw_editor() {
     dialogs_.draw();
-    if (editor_.settings.tool != last_tool_ && editor_.settings.tool != Tool::view) state_.settings.tab = PanelTab::edit;
+    if (editor_.settings.tool != last_tool_ && editor_.settings.tool != Tool::view)
+        state_.settings.tab = PanelTab::edit;
     last_tool_ = editor_.settings.tool;
     if (!state_.bars_shown()) return;
     const BarFacts facts{.film_shown = film_.shown,
-                   .panel_shown = state_.panel_shown(),
-                   .can_save = editor_.scenes() > 0,
-                   .live = live(),
-                   .status = state_.device_name};
+                         .panel_shown = state_.panel_shown(),
+                         .can_save = editor_.scenes() > 0,
+                         .live = live(),
+                         .status = state_.device_name};
     const BarActions actions = draw_bars(editor_, facts, state_.frame_area());
     if (actions.open) session_.dialog.ask(Wanted::file);
     if (actions.save) dialogs_.save();

@@ -6,8 +6,8 @@
 #include "viewer/editor/dialogs.h"
 #include "viewer/editor/edit_panel.h"
 #include "viewer/editor/editor.h"
-#include "viewer/editor/tools.h"
 #include "viewer/editor/timeline.h"
+#include "viewer/editor/tools.h"
 #include "viewer/kept_settings.h"
 #include "viewer/navigation.h"
 #include "viewer/screen.h"
@@ -64,9 +64,10 @@ class App {
     EditPanel edit_panel_;
     FilmStrip film_;
     Dialogs dialogs_;
-    std::shared_ptr<const Gaussians> entered_, drawn_;  // the scene that is edited, and what of it the render thread has
-    std::filesystem::path opened_;                      // the last file that was remembered
-    bool marked_ = false;                               // the render thread has marks
+    std::shared_ptr<const Gaussians> entered_,
+        drawn_;                     // the scene that is edited, and what of it the render thread has
+    std::filesystem::path opened_;  // the last file that was remembered
+    bool marked_ = false;           // the render thread has marks
     Tool last_tool_ = Tool::view;
 };
 

@@ -32,8 +32,9 @@ struct Look {
 struct RenderRequest {
     Camera camera;  // of the size at which the frame is shown
     Look look;
-    int divisor = 1;      // the frame has 1/divisor of that size
-    bool coarse = false;  // of the coarse scene, if there is one; else without the splats that are marked kMarkFine
+    int divisor = 1;  // the frame has 1/divisor of that size
+    bool coarse =
+        false;  // of the coarse scene, if there is one; else without the splats that are marked kMarkFine
     uint64_t serial = 0;
     std::filesystem::path file;  // written as by `ewa render` with this extension; empty: no file
 };

@@ -41,7 +41,8 @@ TEST(LiveEdit, DeletesAndLocksSelections) {
     const SplatEdit locked = edit(R"([["select", "x=..1"], ["lock"], ["select", "invert"], ["delete", ""]])");
     EXPECT_EQ(locked.freeze, (std::vector<uint32_t>{0, 1}));
     EXPECT_EQ(locked.remove, (std::vector<uint32_t>{2, 3, 4}));
-    EXPECT_EQ(edit(R"([["unlock"], ["select", "x=..0"], ["lock"]])").unfreeze, (std::vector<uint32_t>{1, 2, 3, 4}));
+    EXPECT_EQ(edit(R"([["unlock"], ["select", "x=..0"], ["lock"]])").unfreeze,
+              (std::vector<uint32_t>{1, 2, 3, 4}));
 }
 
 TEST(LiveEdit, RefusesOtherTexts) {

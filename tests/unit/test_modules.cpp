@@ -91,9 +91,9 @@ const std::vector<std::pair<std::string, Modules>> kLibraries = {
     {"pugixml", {"src/io/datasets"}},
     {"sqlite3.h", {"src/capture"}},
     {"zstd", {"src/io/splats"}},
-    {"zlib", {"src/image", "src/io/splats", "src/portions", "src/train"}},
+    {"zlib", {"src/edit", "src/image", "src/io/splats", "src/portions", "src/train"}},
     {"nlohmann/",
-     {"src/core", "src/folders", "src/image", "src/capture", "src/io/splats", "src/io/datasets",
+     {"src/core", "src/edit", "src/folders", "src/image", "src/capture", "src/io/splats", "src/io/datasets",
       "src/io/gltf", "src/pathtracer", "src/run", "src/report", "src/live", "check/bench", "src/cli",
       "src/viewer", "python/bindings"}},
     {"CLI/", {"src/options", "src/cli", "src/viewer", "check/bench"}}};

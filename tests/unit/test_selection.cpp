@@ -400,7 +400,7 @@ TEST(History, AnEditThatFailsChangesNothing) {
             history.perform(step({{"duplicate", ""}, {"transform", "scale=1e300"}}));
         },
         {""});
-    expect_error<InputError>([&] { history.perform(step({{"transform", "scale=1e300"}})); }, {"--transform"});
+    expect_error<InputError>([&] { history.perform(step({{"transform", "scale=1e300"}})); }, {"transform"});
     expect_error<InputError>(
         [&] {
             history.perform(step({{"decimate", "50%"}}));

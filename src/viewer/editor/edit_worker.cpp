@@ -91,8 +91,8 @@ void EditWorker::publish() {
     done_.snapshot = present;
     done_.splats = joined_;
     done_.marks = bits;
-    done_.preview_count = previewed_.empty() ? std::nullopt
-                                             : std::optional(size_t(std::ranges::count(previewed_, true)));
+    done_.preview_count =
+        previewed_.empty() ? std::nullopt : std::optional(size_t(std::ranges::count(previewed_, true)));
     for (edit::Step& step : steps_) done_.steps.push_back(std::move(step));
     steps_.clear();
     done_.changed.insert(done_.changed.end(), changed_.begin(), changed_.end());
@@ -294,8 +294,14 @@ std::future<EditWorker::State> EditWorker::state_of(uint64_t id) {
 
 EditWorker::Done EditWorker::take() {
     const std::lock_guard lock(mutex_);
-    return std::exchange(done_, Done{.snapshot = {}, .splats = {}, .marks = {}, .preview_count = done_.preview_count,
-                                     .steps = {}, .changed = {}, .note = {}, .any = false});
+    return std::exchange(done_, Done{.snapshot = {},
+                                     .splats = {},
+                                     .marks = {},
+                                     .preview_count = done_.preview_count,
+                                     .steps = {},
+                                     .changed = {},
+                                     .note = {},
+                                     .any = false});
 }
 
 }  // namespace ewa::viewer

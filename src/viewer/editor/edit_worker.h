@@ -84,12 +84,12 @@ class EditWorker {
     // Of the thread.
     std::map<uint64_t, Scene> scenes_;
     uint64_t active_ = 0;
-    std::string preview_;            // a selection; empty: none
-    std::vector<bool> previewed_;    // of the active scene's splats; empty: none
+    std::string preview_;          // a selection; empty: none
+    std::vector<bool> previewed_;  // of the active scene's splats; empty: none
     std::optional<glm::dmat4> drag_;
     std::shared_ptr<const Gaussians> joined_;
     std::vector<std::pair<uint64_t, uint64_t>> joined_of_;  // scenes, with the versions of their values
-    std::vector<bool> fine_;                                // of the joined splats: not in a draft; empty: all are
+    std::vector<bool> fine_;  // of the joined splats: not in a draft; empty: all are
     double milliseconds_ = 0;
     std::vector<edit::Step> steps_;
     std::vector<uint64_t> changed_;

@@ -35,7 +35,8 @@ void run_ewa_program(const fs::path& program, std::vector<std::string> arguments
         said += text;
         return true;
     });
-    if (ended != core::Ended::done) throw RunError(core::one_line(said.empty() ? "ewa convert failed" : said));
+    if (ended != core::Ended::done)
+        throw RunError(core::one_line(said.empty() ? "ewa convert failed" : said));
 }
 
 /// The arguments of ewa convert for one scene. folder: for temporary files.
@@ -49,7 +50,8 @@ std::vector<std::string> conversion(const Part& part, const EditWorker::State& s
     std::vector<std::string> words{"convert", file.string(), out.string(), "--quiet"};
     if (state.edits.empty()) return words;
     const fs::path journal = folder / (std::to_string(part.id) + ".edits");
-    edit::Journal(journal, {file.filename().string(), state.first->size()}, false).did({"Saved", state.edits});
+    edit::Journal(journal, {file.filename().string(), state.first->size()}, false)
+        .did({"Saved", state.edits});
     words.insert(words.end(), {"--edits", journal.string()});
     return words;
 }
@@ -72,7 +74,9 @@ void save_parts(const fs::path& program, std::vector<Part>& parts, const fs::pat
 }  // namespace
 
 Editor::Editor(fs::path program, std::function<void()> wake, size_t budget)
-    : program_(std::move(program)), wake_(std::move(wake)), worker_(std::make_unique<EditWorker>(wake_, budget)) {}
+    : program_(std::move(program)),
+      wake_(std::move(wake)),
+      worker_(std::make_unique<EditWorker>(wake_, budget)) {}
 
 Editor::~Editor() = default;
 
@@ -146,10 +150,14 @@ void Editor::open_journal(EditedScene& scene, bool go_on) {
     if (!scene.journaled || scene.journal) return;
     const fs::path file = edit::journal_of(scene.file);
     std::error_code none;
-    if (!go_on && core::is_file(file)) fs::rename(file, file.string() + ".before", none);  // of an earlier session
+    if (!go_on && core::is_file(file))
+        fs::rename(file, file.string() + ".before", none);  // of an earlier session
     try {
         scene.journal = std::make_shared<edit::Journal>(
-            file, edit::JournalHead{scene.file.filename().string(), snapshot_->states ? snapshot_->states->size() : 0}, go_on);
+            file,
+            edit::JournalHead{scene.file.filename().string(),
+                              snapshot_->states ? snapshot_->states->size() : 0},
+            go_on);
     } catch (const std::exception& error) {
         scene.journaled = false;
         note_ = std::string("edits are not kept in a journal: ") + error.what();
@@ -193,7 +201,11 @@ bool Editor::busy() const {
 
 Editor::News Editor::take() {
     EditWorker::Done done = worker_->take();
-    News news{.any = done.any, .splats = false, .marks = false, .note = std::exchange(note_, {}), .done = done.steps};
+    News news{.any = done.any,
+              .splats = false,
+              .marks = false,
+              .note = std::exchange(note_, {}),
+              .done = done.steps};
     if (!done.note.empty()) news.note = done.note;
     preview_count_ = done.preview_count;
     if (done.snapshot) {

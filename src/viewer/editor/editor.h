@@ -147,7 +147,8 @@ class Editor {
         std::vector<uint64_t> failed;  // scenes that are not saved
     };
     EditedScene& now() { return *scenes_[active_]; }
-    void insert(std::unique_ptr<EditedScene> scene, std::shared_ptr<const Gaussians> splats, edit::Cameras cameras);
+    void insert(std::unique_ptr<EditedScene> scene, std::shared_ptr<const Gaussians> splats,
+                edit::Cameras cameras);
     void open_journal(EditedScene& scene, bool go_on);
 
     std::filesystem::path program_;

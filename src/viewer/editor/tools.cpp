@@ -26,7 +26,7 @@ struct ToolKey {
 constexpr ToolKey kToolKeys[] = {
     {GLFW_KEY_R, false, Tool::rectangle},  {GLFW_KEY_L, false, Tool::lasso},
     {GLFW_KEY_P, false, Tool::polygon},    {GLFW_KEY_B, false, Tool::brush},
-    {GLFW_KEY_N, false, Tool::sphere},      {GLFW_KEY_X, false, Tool::box},
+    {GLFW_KEY_N, false, Tool::sphere},     {GLFW_KEY_X, false, Tool::box},
     {GLFW_KEY_O, false, Tool::flood},      {GLFW_KEY_1, false, Tool::move},
     {GLFW_KEY_I, false, Tool::eyedropper}, {GLFW_KEY_2, false, Tool::rotate},
     {GLFW_KEY_3, false, Tool::scale},      {GLFW_KEY_M, false, Tool::measure},
@@ -62,9 +62,7 @@ struct Tools::State {
     explicit State(const ToolRoom& parts) : room(parts) {}
 
     Tool tool() const { return room.settings().tool; }
-    bool idle() const {
-        return tool() == Tool::view || room.state.scripted();
-    }
+    bool idle() const { return tool() == Tool::view || room.state.scripted(); }
     bool cancel() {
         // Each of them is asked.
         const std::array any{select.cancel(), shapes.cancel(), gizmo.cancel(), picks.cancel()};

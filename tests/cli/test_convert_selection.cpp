@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// ewa convert with a selection, and with a journal of edits.
+#include "cli/expect.h"
+#include "ewa/splat_files.h"
+#include "support/temp_folder.h"
+
+namespace ewa::test {
+namespace {
+
+class ConvertSelection : public testing::Test {
+  protected:
+    void SetUp() override { make_splats(splats_, 200, 1); }
+    Gaussians converted(const std::vector<std::string>& edits) {
+        std::vector<std::string> arguments{"convert", splats_, out_, "--quiet"};
+        arguments.insert(arguments.end(), edits.begin(), edits.end());
+        expect_success(run_ewa(arguments));
+        return read_splats(out_).gaussians;
+    }
+    Folder folder_;
+    const std::string splats_ = folder_ / "splats.ply", out_ = folder_ / "out.ply";
+};
+
+TEST_F(ConvertSelection, ChangesTheSelectedSplatsAlone) {
+    const Gaussians before = read_splats(splats_).gaussians;
+    const Gaussians moved = converted({"--select", "x=0..", "--transform", "move=0,0,7"});
+    ASSERT_EQ(moved.size(), before.size());
+    size_t far = 0;
+    for (size_t i = 0; i < before.size(); ++i) {
+        const bool selected = before.means[3 * i] >= 0;
+        far += selected;
+        EXPECT_EQ(moved.means[3 * i + 2], selected ? float(double(before.means[3 * i + 2]) + 7) : before.means[3 * i + 2]);
+    }
+    EXPECT_GT(far, 10u);
+    EXPECT_EQ(converted({"--select", "x=0..", "--delete"}).size(), before.size() - far);
+    EXPECT_EQ(converted({"--select", "x=0..", "--duplicate"}).size(), before.size() + far);
+    EXPECT_EQ(converted({"--select", "x=0..", "--lock", "--select", "all", "--delete", "--unlock"}).size(), far);
+    EXPECT_EQ(converted({"--select", "x=0..", "--hide", "--select", "all", "--delete", "--unhide"}).size(), far);
+    EXPECT_EQ(converted({"--select", "x=0..", "--adjust", "tint=0,1,1;opacity=0.5", "--reset"}).sh, before.sh);
+    EXPECT_NE(converted({"--select", "x=0..", "--adjust", "tint=0,1,1;opacity=0.5"}).sh, before.sh);
+}
+
+TEST_F(ConvertSelection, ReplaysAJournal) {
+    const std::string journal = folder_ / "splats.ply.edits";
+    write_file(journal,
+               "{\"ewa_edits\":1,\"file\":\"splats.ply\",\"splats\":200}\n"
+               "{\"step\":\"Select\",\"edits\":[[\"select\",\"x=0..\"]]}\n"
+               "{\"step\":\"Delete\",\"edits\":[[\"delete\"]]}\n"
+               "{\"undo\":1}\n"
+               "{\"step\":\"Tint\",\"edits\":[[\"adjust\",\"tint=0,1,1\"]]}\n");
+    const Gaussians replayed = converted({"--edits", journal});
+    EXPECT_EQ(replayed.sh, converted({"--select", "x=0..", "--adjust", "tint=0,1,1"}).sh);
+    EXPECT_EQ(replayed.size(), 200u);
+    write_file(journal, "{\"ewa_edits\":1,\"file\":\"splats.ply\",\"splats\":200}\n{\"redo\":1}\n");
+    expect_failure(run_ewa({"convert", splats_, out_, "--edits", journal}), 2, "line 2: there is nothing to redo");
+}
+
+TEST_F(ConvertSelection, NamesTheShapeThatItCannotRead) {
+    expect_failure(run_ewa({"convert", splats_, out_, "--select", "everything"}), 2, "--select: 'everything' is not all");
+    expect_failure(run_ewa({"convert", splats_, out_, "--select", "all", "--adjust", "glow=2"}), 2, "--adjust: 'glow=2'");
+}
+
+}  // namespace
+}  // namespace ewa::test

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// The editor of the window under real key and mouse events.
+#include "support/temp_folder.h"
+#include "viewer/session.h"
+
+namespace ewa::test {
+namespace {
+
+class Editor : public SessionTest {
+  protected:
+    void SetUp() override {
+        SessionTest::SetUp();
+        std::filesystem::create_directories(folder_ / "scene");
+        if (!IsSkipped()) make_splats(scene_, 400, 2);
+    }
+    /// Waits until the journal has so many lines. The first one names the file.
+    bool journal_has(size_t lines) const {
+        const auto count = [&] {
+            const std::string text = file_bytes(journal_);
+            return size_t(std::count(text.begin(), text.end(), '\n'));
+        };
+        soon([&] { return count() >= lines; }, kSessionPatience);
+        return count() == lines;
+    }
+    /// Selects the left half of the picture, and deletes it.
+    void delete_half(Session& session) {
+        session.send("key Tab key r mousemove 370 60 mousedown 1");
+        for (const char* at : {"420 100", "500 300", "620 560"}) session.send(std::string("mousemove ") + at);
+        session.send("mouseup 1");
+        EXPECT_TRUE(journal_has(2)) << "no selection";
+        session.send("key Delete");
+        EXPECT_TRUE(journal_has(3)) << "nothing was deleted";
+    }
+    /// Saves under a name, by the dialog. Returns the file's bytes.
+    std::string saved(Session& session, const std::string& file) {
+        session.send("key ctrl+shift+s sleep 1 key ctrl+a type --delay 20 " + file);
+        session.send("sleep 1 key Return");
+        EXPECT_TRUE(session.awaited(file)) << "nothing was saved";
+        return file_bytes(file);
+    }
+    std::string replayed() {
+        expect_success(run_ewa({"convert", scene_, folder_ / "replayed.ply", "--edits", journal_, "--quiet"}));
+        return file_bytes(folder_ / "replayed.ply");
+    }
+    std::vector<std::string> arguments() const { return {scene_, "--size", "900x600"}; }
+
+    const std::string scene_ = folder_ / "scene/splats.ply", journal_ = scene_ + ".edits";
+};
+
+TEST_F(Editor, DeletesWhatTheMouseSelectsAndUndoesIt) {
+    const std::string original = file_bytes(scene_);
+    Session session(shots_, arguments());
+    ASSERT_TRUE(session.found());
+    const Image first = screenshot(session);
+    EXPECT_LT(first.height, 600) << "no bars";
+    delete_half(session);
+    EXPECT_GT(largest_difference(screenshot(session), first), 0.2f);
+    const std::string half = saved(session, folder_ / "half.ply");
+    EXPECT_LT(half.size(), original.size());
+    EXPECT_EQ(half, replayed());
+
+    session.send("key ctrl+z key ctrl+z");
+    EXPECT_TRUE(journal_has(5));
+    EXPECT_EQ(largest_difference(screenshot(session), first), 0);
+    session.send("key ctrl+shift+z key ctrl+y");
+    EXPECT_TRUE(journal_has(7));
+    EXPECT_EQ(replayed(), half);
+    EXPECT_EQ(file_bytes(scene_), original);
+
+    // There are edits since the last save. Esc stays, Return saves.
+    session.send("key ctrl+q sleep 1 key Escape sleep 1");
+    EXPECT_FALSE(session.ended());
+    std::filesystem::remove(folder_ / "half.ply");
+    session.send("key ctrl+q sleep 1 key Return");
+    expect_success(session.quit());
+    EXPECT_EQ(file_bytes(folder_ / "half.ply"), half);
+}
+
+TEST_F(Editor, RestoresTheEditsOfASessionThatWasKilled) {
+    {
+        Session session(shots_, arguments());
+        ASSERT_TRUE(session.found());
+        screenshot(session);
+        delete_half(session);
+    }
+    const std::string half = replayed();
+    Session session(shots_ + "/..", arguments());
+    ASSERT_TRUE(session.found());
+    session.send("sleep 2 key Return sleep 1");  // the dialog's first button restores
+    EXPECT_EQ(saved(session, folder_ / "restored.ply"), half);
+    EXPECT_TRUE(journal_has(3));
+    session.send("key ctrl+z");
+    EXPECT_TRUE(journal_has(4));
+    EXPECT_NE(replayed(), half);
+}
+
+TEST_F(Editor, MovesTheSelectionAndCleansByTheCommandLine) {
+    Session session(shots_, arguments());
+    ASSERT_TRUE(session.found());
+    screenshot(session);
+    session.send("key Tab key ctrl+a");
+    EXPECT_TRUE(journal_has(2));
+    session.send("key ctrl+i");
+    EXPECT_TRUE(journal_has(3));
+    session.send("key ctrl+i");
+    EXPECT_TRUE(journal_has(4));
+    session.send("key h");  // locks all
+    EXPECT_TRUE(journal_has(5));
+    session.send("key ctrl+a key Delete key shift+h key ctrl+a");
+    EXPECT_TRUE(journal_has(7)) << "locked splats were changed";
+}
+
+}  // namespace
+}  // namespace ewa::test
