@@ -2,6 +2,7 @@
 // The options of a render: all that an image depends on besides the splats and the camera.
 #pragma once
 #include <array>
+#include <cstdint>
 #include <memory>
 
 namespace ewa {
@@ -48,6 +49,16 @@ enum class Drawing {
     median_depth,
     /// Rendering::normal in place of the colour. For Integrator::splat without `points`.
     normal
+};
+
+/// Bits of a splat's mark, see Renderer::mark.
+enum Mark : uint8_t {
+    kMarkSelected = 1,  // drawn in the selection's colour
+    kMarkLocked = 2,    // drawn darker
+    kMarkHidden = 4,    // not drawn
+    kMarkDeleted = 8,   // not drawn
+    kMarkPreview = 16,  // drawn red: what a cleaning rule would remove
+    kMarkFine = 128,    // not drawn in a draft
 };
 
 /// The options that may differ from one image of a scene to the next.

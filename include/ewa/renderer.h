@@ -35,16 +35,6 @@ struct Rendering {
     Image normal{};
 };
 
-/// Bits of a splat's mark, see Renderer::mark.
-enum Mark : uint8_t {
-    kMarkSelected = 1,  // drawn in the selection's colour
-    kMarkLocked = 2,    // drawn darker
-    kMarkHidden = 4,    // not drawn
-    kMarkDeleted = 8,   // not drawn
-    kMarkPreview = 16,  // drawn red: what a cleaning rule would remove
-    kMarkFine = 128,    // not drawn in a draft
-};
-
 /// Holds a scene on a device and renders it. One thread at a time may use it.
 class Renderer {
   public:

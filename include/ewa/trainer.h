@@ -17,6 +17,7 @@
 #include "ewa/ranks.h"
 #include "ewa/renderer.h"
 #include "ewa/sky_map.h"
+#include "ewa/splat_edit_request.h"
 #include "ewa/step_report.h"
 #include "ewa/summary.h"
 #include "ewa/train_options.h"
@@ -29,15 +30,6 @@ class StateWriter;
 class StateReader;
 class Training;
 }  // namespace train
-
-/// An edit of the splats that are trained. Indices count the splats of Trainer::gaussians, in any order.
-struct SplatEdit {
-    std::vector<uint32_t> remove = {};
-    /// A frozen splat is drawn, but no step changes it, and no refinement copies, moves or removes it.
-    std::vector<uint32_t> freeze = {};
-    std::vector<uint32_t> unfreeze =
-        {};  // such a splat learns again, from moments of zero; `freeze` and `remove` win
-};
 
 /// Owns the model and the cached training images on the device. A cached image takes 4 bytes a pixel if its
 /// file has at most 256 levels, else 16. Each step is one submission. On a GPU, step() may return before the device is done;

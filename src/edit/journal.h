@@ -23,7 +23,7 @@ struct ReadJournal {
     std::vector<Step> steps;  // without those that were undone or dropped
 };
 
-/// Reads a journal. A last line that is cut off, as after a crash, is left out. Throws InputError with the number of the line.
+/// Reads a journal. A last line that is cut off, as after a crash, is skipped. Throws InputError with the number of the line.
 ReadJournal read_journal(const std::filesystem::path& file);
 
 /// The edits of a journal, parsed, for apply(). Throws InputError with the file's name.
@@ -35,7 +35,7 @@ std::filesystem::path journal_of(const std::filesystem::path& file);
 /// Appends to a journal. Every line is on the disk (flushed to the kernel) when the call returns.
 class Journal {
   public:
-    /// Creates the file with its first line, or goes on with one that has the same head. Throws RunError.
+    /// Creates the file with its first line, or continues one that has the same head. Throws RunError.
     Journal(std::filesystem::path file, const JournalHead& head, bool go_on);
     ~Journal();
     void did(const Step& step);

@@ -11,7 +11,7 @@
 
 namespace ewa::edit {
 
-/// For each splat, whether the shape takes it. Splats that are not selectable are left out by select().
+/// For each splat, whether the shape takes it. Splats that are not selectable are skipped by select().
 using Shape = std::function<std::vector<bool>(const EditedSplats&)>;
 
 /// Parses polygon=... and brush=... of parse_selection() (edit/shapes.h). Throws InputError that begins with `what`.

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "ewa/error.h"
-#include "ewa/renderer.h"
+#include "ewa/render_options.h"
 #include "pipeline/model.h"
 #include "scene/looks.h"
 #include "shared/layouts.h"

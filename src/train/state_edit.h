@@ -8,8 +8,9 @@
 #include <cstdint>
 #include <span>
 
+#include "ewa/splat_edit_request.h"
 #include "ewa/step_report.h"
-#include "ewa/trainer.h"
+#include "ewa/summary.h"
 
 namespace ewa::train {
 

@@ -81,7 +81,7 @@ class Renders {
     /// coarse: the same with fewer splats, which is shown while the view changes; null: none.
     void set_scene(std::shared_ptr<const Gaussians> gaussians,
                    std::shared_ptr<const Gaussians> coarse = nullptr);
-    /// Sets the marks of the scene's splats, as RenderThread::set_marks(). draft: some of them are left out while the view changes.
+    /// Sets the marks of the scene's splats, as RenderThread::set_marks(). draft: some of them are skipped while the view changes.
     void set_marks(std::shared_ptr<const std::vector<uint8_t>> marks, bool draft);
     /// Asks for the view if it changed, or in full resolution once it has rested. full: always in full
     /// resolution.

@@ -28,14 +28,18 @@ TEST_F(ConvertSelection, ChangesTheSelectedSplatsAlone) {
     for (size_t i = 0; i < before.size(); ++i) {
         const bool selected = before.means[3 * i] >= 0;
         far += selected;
-        EXPECT_EQ(moved.means[3 * i + 2], selected ? float(double(before.means[3 * i + 2]) + 7) : before.means[3 * i + 2]);
+        EXPECT_EQ(moved.means[3 * i + 2],
+                  selected ? float(double(before.means[3 * i + 2]) + 7) : before.means[3 * i + 2]);
     }
     EXPECT_GT(far, 10u);
     EXPECT_EQ(converted({"--select", "x=0..", "--delete"}).size(), before.size() - far);
     EXPECT_EQ(converted({"--select", "x=0..", "--duplicate"}).size(), before.size() + far);
-    EXPECT_EQ(converted({"--select", "x=0..", "--lock", "--select", "all", "--delete", "--unlock"}).size(), far);
-    EXPECT_EQ(converted({"--select", "x=0..", "--hide", "--select", "all", "--delete", "--unhide"}).size(), far);
-    EXPECT_EQ(converted({"--select", "x=0..", "--adjust", "tint=0,1,1;opacity=0.5", "--reset"}).sh, before.sh);
+    EXPECT_EQ(converted({"--select", "x=0..", "--lock", "--select", "all", "--delete", "--unlock"}).size(),
+              far);
+    EXPECT_EQ(converted({"--select", "x=0..", "--hide", "--select", "all", "--delete", "--unhide"}).size(),
+              far);
+    EXPECT_EQ(converted({"--select", "x=0..", "--adjust", "tint=0,1,1;opacity=0.5", "--reset"}).sh,
+              before.sh);
     EXPECT_NE(converted({"--select", "x=0..", "--adjust", "tint=0,1,1;opacity=0.5"}).sh, before.sh);
 }
 
@@ -51,12 +55,15 @@ TEST_F(ConvertSelection, ReplaysAJournal) {
     EXPECT_EQ(replayed.sh, converted({"--select", "x=0..", "--adjust", "tint=0,1,1"}).sh);
     EXPECT_EQ(replayed.size(), 200u);
     write_file(journal, "{\"ewa_edits\":1,\"file\":\"splats.ply\",\"splats\":200}\n{\"redo\":1}\n");
-    expect_failure(run_ewa({"convert", splats_, out_, "--edits", journal}), 2, "line 2: there is nothing to redo");
+    expect_failure(run_ewa({"convert", splats_, out_, "--edits", journal}), 2,
+                   "line 2: there is nothing to redo");
 }
 
 TEST_F(ConvertSelection, NamesTheShapeThatItCannotRead) {
-    expect_failure(run_ewa({"convert", splats_, out_, "--select", "everything"}), 2, "--select: 'everything' is not all");
-    expect_failure(run_ewa({"convert", splats_, out_, "--select", "all", "--adjust", "glow=2"}), 2, "--adjust: 'glow=2'");
+    expect_failure(run_ewa({"convert", splats_, out_, "--select", "everything"}), 2,
+                   "--select: 'everything' is not all");
+    expect_failure(run_ewa({"convert", splats_, out_, "--select", "all", "--adjust", "glow=2"}), 2,
+                   "--adjust: 'glow=2'");
 }
 
 }  // namespace

@@ -39,7 +39,8 @@ class Editor : public SessionTest {
         return file_bytes(file);
     }
     std::string replayed() {
-        expect_success(run_ewa({"convert", scene_, folder_ / "replayed.ply", "--edits", journal_, "--quiet"}));
+        expect_success(
+            run_ewa({"convert", scene_, folder_ / "replayed.ply", "--edits", journal_, "--quiet"}));
         return file_bytes(folder_ / "replayed.ply");
     }
     std::vector<std::string> arguments() const { return {scene_, "--size", "900x600"}; }

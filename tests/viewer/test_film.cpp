@@ -149,7 +149,7 @@ namespace {
 
 using Input = SessionTest;
 
-/// Two keys, a fifth of a second apart.
+/// Two keys, half a second apart.
 void film_two_keys(Session& session, const std::string& shots) {
     session.send("key k");
     session.screenshot();
@@ -163,12 +163,12 @@ void film_two_keys(Session& session, const std::string& shots) {
 
 TEST_F(Input, TwoKeysMakeAFilm) {
     std::filesystem::create_directories(config_ + "/ewa");
-    write_file(config_ + "/ewa/view.json", "{\"film_seconds\": 0.2}");
+    write_file(config_ + "/ewa/view.json", "{\"film_seconds\": 0.5}");
     Session session(shots_, {splats_, "--cameras", cameras_, "--size", "640x480"},
                     {{"PATH", viewer::fake_ffmpeg(folder_)}});
     ASSERT_TRUE(session.found());
     film_two_keys(session, shots_);
-    EXPECT_EQ(read_file(shots_ + "/ewa-film-1.mp4").size(), size_t(7) * 1920 * 1080 * 4);
+    EXPECT_EQ(read_file(shots_ + "/ewa-film-1.mp4").size(), size_t(16) * 1920 * 1080 * 4);
     expect_silent(session.quit());
 }
 
@@ -176,7 +176,7 @@ TEST_F(Input, FfmpegItselfMakesAFilmOfTwoKeys) {
     for (const char* program : {"/usr/bin/ffmpeg", "/usr/bin/ffprobe"})
         if (!std::filesystem::exists(program)) GTEST_SKIP() << "ffmpeg is not installed";
     std::filesystem::create_directories(config_ + "/ewa");
-    write_file(config_ + "/ewa/view.json", "{\"film_seconds\": 0.2}");
+    write_file(config_ + "/ewa/view.json", "{\"film_seconds\": 0.5}");
     Session session(shots_, {splats_, "--cameras", cameras_, "--size", "640x480"});
     ASSERT_TRUE(session.found());
     film_two_keys(session, shots_);
@@ -186,7 +186,7 @@ TEST_F(Input, FfmpegItselfMakesAFilmOfTwoKeys) {
                            shots_ + "/ewa-film-1.mp4' > '" + count + "'")
                               .c_str()),
               0);
-    EXPECT_EQ(std::stoi(read_file(count)), 7);
+    EXPECT_EQ(std::stoi(read_file(count)), 16);
     expect_silent(session.quit());
 }
 

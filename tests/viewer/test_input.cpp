@@ -65,7 +65,7 @@ TEST_F(Input, ADenseDisplayHasLargerText) {
     int widths[2] = {};
     for (const int dense : {0, 1}) {
         if (dense) display.set_resources("Xft.dpi:\t192\n");
-        Session session(shots_, {splats_, "--cameras", cameras_, "--size", "1260x600"});
+        Session session(shots_, {splats_, "--cameras", cameras_, "--size", "1260x340"});
         ASSERT_TRUE(session.found());
         widths[dense] = 1260 - screenshot(session).width;
         std::filesystem::remove_all(shots_);
@@ -73,7 +73,7 @@ TEST_F(Input, ADenseDisplayHasLargerText) {
         const auto window = display.window_titled("ewa");
         ASSERT_TRUE(window);
         const Image shown = display.pixels_at_rest(*window);
-        EXPECT_GT(largest_difference(part(shown, 0, widths[dense]), Image(widths[dense], 600, 3)), 0.5f)
+        EXPECT_GT(largest_difference(part(shown, 0, widths[dense]), Image(widths[dense], 340, 3)), 0.5f)
             << "no text";
         expect_silent(session.quit());
     }

@@ -69,7 +69,7 @@ TEST_F(Photos, BecomeADatasetThatCanBeTrained) {
     ASSERT_TRUE(session.awaited(dataset_ + "/sparse/0")) << "no cameras were found";
     EXPECT_TRUE(titled("photos"));
     EXPECT_TRUE(soon([&] { return range_of(screenshot(session)) > 0.3f; })) << "neither points nor cameras";
-    act(session, {"mousemove 60 367", "click 1"});
+    act(session, {"mousemove 60 330", "click 1"});
     ASSERT_TRUE(session.awaited(shots_ + "/out/photos/live.json")) << "no training has started";
     EXPECT_EQ(read_json(shots_ + "/out/photos/config.json")["dataset"], photos_);
     EXPECT_FALSE(fs::exists(shots_ + "/out/photos-2"));

@@ -99,7 +99,7 @@ TEST_F(Training, StartsByAButtonInAFolderOfItsOwn) {
     Session session(shots_, {cameras_, "--size", "900x800"});
     ASSERT_TRUE(session.found());
     session.screenshot();
-    act(session, {"mousemove 60 367", "click 1"});
+    act(session, {"mousemove 60 330", "click 1"});
     ASSERT_TRUE(session.awaited(earlier + "-2/live.json")) << "no training has started";
     EXPECT_EQ(read_json(earlier + "-2/config.json")["steps"], 30000);
     EXPECT_TRUE(changes(session)) << "the picture stays as it is";

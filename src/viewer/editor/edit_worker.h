@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <deque>
 #include <functional>
+#include <future>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -13,7 +14,9 @@
 #include <thread>
 #include <vector>
 
-#include "viewer/editor/editor.h"
+#include "edit/journal.h"
+#include "edit/shapes.h"
+#include "viewer/editor/edit_snapshot.h"
 
 namespace ewa::viewer {
 
@@ -81,7 +84,7 @@ class EditWorker {
     std::function<void()> wake_;
     size_t budget_;
 
-    // Of the thread.
+    // The thread alone uses these.
     std::map<uint64_t, Scene> scenes_;
     uint64_t active_ = 0;
     std::string preview_;          // a selection; empty: none

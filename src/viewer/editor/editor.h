@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The editor of the window: scenes with their histories, and the edits that tools and panels ask for. Edits run on a thread of their
-// own, one after another, so that the window goes on while a large scene is edited.
+// own, one after another, so that the window answers while a large scene is edited.
 #pragma once
 #include <array>
 #include <filesystem>
@@ -14,6 +14,7 @@
 #include "edit/history.h"
 #include "edit/journal.h"
 #include "edit/shapes.h"
+#include "viewer/editor/edit_snapshot.h"
 
 namespace ewa::viewer {
 
@@ -58,21 +59,6 @@ struct EditedScene {
     std::shared_ptr<edit::Journal> journal;  // null: there are no edits, or the folder cannot be written
     bool shown = true;
     bool unsaved = false;
-};
-
-/// What the window shows of a scene after the last finished edit. It never changes.
-struct EditSnapshot {
-    std::shared_ptr<const Gaussians> splats;
-    std::shared_ptr<const std::vector<uint8_t>> states;
-    edit::Cameras cameras;  // of the splats' run, while no splat has moved
-    size_t left = 0, selected = 0, locked = 0, hidden = 0;
-    /// Of the selection: its lowest and highest corner, world.
-    std::optional<std::array<glm::dvec3, 2>> bounds;
-    glm::dvec3 middle{0};  // of the selection: the mean of the means
-    std::vector<edit::Step> steps;
-    size_t done = 0;
-    uint64_t version = 0, values_version = 0, history_bytes = 0;
-    double milliseconds = 0;  // of the last edit
 };
 
 class EditWorker;
@@ -121,9 +107,9 @@ class Editor {
         std::vector<edit::Step> done;                     // steps that have changed something
     };
     News take();
-    /// Of the active scene.
+    /// The state of the active scene.
     const EditSnapshot& snapshot() const { return *snapshot_; }
-    /// Of all scenes that are shown, joined: what the render thread gets.
+    /// The splats of all scenes that are shown, joined: what the render thread gets.
     std::shared_ptr<const Gaussians> splats() const { return drawn_; }
     /// ewa::Mark bits of splats(); null: none.
     std::shared_ptr<const std::vector<uint8_t>> marks() const { return marks_; }

@@ -11,7 +11,6 @@
 
 #include "core/text.h"
 #include "viewer/editor/theme.h"
-#include "viewer/editor/toolbar.h"
 
 namespace ewa::viewer {
 namespace {
@@ -189,10 +188,6 @@ void show_tooltip(const std::string& text) {
 
 void draw_icon(Icon icon, const ImVec2& center, float size, unsigned color) {
     Pen(*ImGui::GetWindowDrawList(), center, size, color).draw(kShapes[size_t(icon)]);
-}
-
-void draw_tool_icon(Tool tool, float x, float y, float size, unsigned color) {
-    draw_icon(Icon(tool), {x, y}, size, color);
 }
 
 bool icon_button(Icon icon, const char* tooltip, bool active, bool enabled, float side) {

@@ -30,7 +30,6 @@ struct ToolRoom {
     /// Transforms the selection; without one, or with `all`, every splat.
     void transform(const char* title, const std::string& value, bool all) const;
     /// Whether a selection exists, or may exist after the edits that are being done.
-    bool some_selected() const { return editor.snapshot().selected > 0 || editor.busy(); }
     /// Moves the view with the splats. matrix: rotation, translation and one scale.
     void move_view(const glm::dmat4& matrix) const;
     /// Whether shapes in the image can select in this view. If not, says so and changes to a pinhole.

@@ -29,7 +29,4 @@ struct BarFacts {
 /// area: the part of the window beside the panel, with the bars, px of the framebuffer.
 BarActions draw_bars(Editor& editor, const BarFacts& facts, const Rectangle& area);
 
-/// The icon of a tool, drawn from lines. center and size in ImGui's coordinates.
-void draw_tool_icon(Tool tool, float x, float y, float size, unsigned color);
-
 }  // namespace ewa::viewer

@@ -190,7 +190,7 @@ bool Tools::State::edit_key(const KeyPress& press) {
         if (!is_shape(tool())) return false;
         shapes.select(room.operation());
     } else if (key == GLFW_KEY_DELETE || key == GLFW_KEY_BACKSPACE) {
-        if (room.some_selected()) room.perform("Delete", "delete");
+        room.perform("Delete", "delete");
     } else if (key == GLFW_KEY_H) {
         room.perform(press.shift ? "Unlock" : "Lock", press.shift ? "unlock" : "lock");
     } else if (key == GLFW_KEY_F && !press.shift) {

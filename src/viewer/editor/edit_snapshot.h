@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the window knows of the scene that is edited.
+#pragma once
+#include <array>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "edit/history.h"
+
+namespace ewa::viewer {
+
+/// What the window shows of a scene after the last finished edit. It never changes.
+struct EditSnapshot {
+    std::shared_ptr<const Gaussians> splats;
+    std::shared_ptr<const std::vector<uint8_t>> states;
+    edit::Cameras cameras;  // of the splats' run, while no splat has moved
+    size_t left = 0, selected = 0, locked = 0, hidden = 0;
+    /// The bounds of the selection: its lowest and highest corner, world.
+    std::optional<std::array<glm::dvec3, 2>> bounds;
+    glm::dvec3 middle{0};  // of the selection: the mean of the means
+    std::vector<edit::Step> steps;
+    size_t done = 0;
+    uint64_t version = 0, values_version = 0, history_bytes = 0;
+    double milliseconds = 0;  // of the last edit
+};
+
+}  // namespace ewa::viewer
