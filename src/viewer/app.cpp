@@ -83,7 +83,7 @@ void App::run() {
         if (state_.message.expire(now)) state_.redraw();
         if (!state_.scripted()) {
             for (const KeyPress& key : keys) handle_key(key);
-            navigation_.move(std::min(seconds, 0.1));
+            if (!dialogs_.open()) navigation_.move(std::min(seconds, 0.1));
             film_.advance(seconds);
             if (const auto dropped = state_.window.take_dropped(); !dropped.empty())
                 open(dropped, state_.scene);
@@ -280,6 +280,8 @@ void App::draw() {
     if (state_.help) draw_help(state_.help);
     if (!state_.scripted() && state_.message.noting(Clock::now()))
         draw_note(state_.message.note, film_.area_above());
+    // Last: no window may appear behind a modal one.
+    if (!state_.scripted()) dialogs_.draw();
     handle_mouse();
     ImDrawData* drawn = screen_->gui.end_frame();
     if (state_.settings.comparison != before) state_.redraw(Loop::kRedraws);
@@ -367,9 +369,8 @@ void App::send_edits(const std::vector<edit::Step>& done) {
     session_.live_run.edit(nlohmann::json{{"edits", std::move(edits)}}.dump());
 }
 
-/// The bars and the dialogs.
+/// The bars.
 void App::draw_editor() {
-    dialogs_.draw();
     if (editor_.settings.tool != last_tool_ && editor_.settings.tool != Tool::view)
         state_.settings.tab = PanelTab::edit;
     last_tool_ = editor_.settings.tool;

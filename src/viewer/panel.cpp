@@ -331,7 +331,8 @@ PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings,
     ImGui::SetNextWindowSize(ImVec2(facts.width, height));
     ImGui::SetNextWindowBgAlpha(facts.over_picture ? 0.93f : 1.0f);
     constexpr auto kFlags = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
-                            ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus;
+                            ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus |
+                            ImGuiWindowFlags_NoFocusOnAppearing;
     ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0);
     ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
     const bool open = ImGui::Begin("panel", nullptr, kFlags);
