@@ -200,7 +200,8 @@ Image RenderThread::Scene::color(const Full& full) {
 std::exception_ptr RenderThread::Scene::draw_extra(const ExtraRequest& request) {
     const Look& look = request.look;
     fit_to(look);
-    const DrawOptions options{options_of(look), drawing_for(look.mode), double(look.splat_scale)};
+    DrawOptions options{options_of(look), drawing_for(look.mode), double(look.splat_scale)};
+    options.plain_colors = true;
     const bool bytes_do = request.file.empty() && (look.mode == Mode::color || look.mode == Mode::ellipsoids);
     std::optional<Rendering> rendering;
     ByteImage picture;
