@@ -26,6 +26,9 @@ layout(push_constant, scalar) uniform Push { DensifyPush push; };
 
 const uint PLANES = (PARAM_SH + 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1) + 3) / 4;
 
+// The first of the next generation that is splat i's.
+uint offset_of(uint i) { return totals[i / push.scan_block] + prefix[i]; }
+
 void main() {
     const uint i = item_index();
     if (i >= push.splats) return;
@@ -33,8 +36,9 @@ void main() {
     [[unroll]] for (uint plane = 0; plane < 3; ++plane)
         p[plane] = fetch(params, param_texel(PLANES, plane, i));
     const vec4 p0 = p[0], p1 = p[1], p2 = p[2];
-    const uint action = action_of(push, p0, p1, p2, statistics[i], is_frozen(fetch(moments, param_texel(PLANES, 0u, i))));
-    const uint first = totals[i / push.scan_block] + prefix[i];
+    const uint first = offset_of(i), end = i + 1u < push.splats ? offset_of(i + 1u) : push.new_capacity;
+    // A frozen splat has one output, whatever it is like. The moments that say so may be those of the next generation already.
+    const uint action = end - first == 1u ? ACTION_KEEP : action_of(push, p0, p1, p2, statistics[i], false);
     [[unroll]] for (uint child = 0; child < 2; ++child) {
         const uint to = first + child;
         const bool written = child < outputs_of(action) && to < push.new_capacity;

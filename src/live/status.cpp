@@ -48,7 +48,7 @@ Status decode_status(const std::string& text) {
     status.splats = uint32_t(field.whole("splats", UINT32_MAX));
     status.loss = report::number_or_nan(field, "loss");
     status.seconds = field.number("seconds", 0);
-    const std::string state = field.text("state");
+    const std::string& state = field.text("state");
     status.state = state == "paused" ? State::paused : state == "done" ? State::done : State::running;
     status.commands = field.flag("commands");
     if (field.list("metrics").size() > kMostLines)
