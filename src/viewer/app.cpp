@@ -133,8 +133,9 @@ void App::handle_key(const KeyPress& press) {
     const int key = press.key;
     PanelSettings& settings = state_.settings;
     // A text field does not use these keys, so they act while one is edited. The other keys belong to the field.
-    if (dialogs_.open()) return;
+    // Asked again while the dialog of unsaved edits is open, the window closes. The journal has the edits.
     if (key == GLFW_KEY_Q && press.control) return state_.window.close();
+    if (dialogs_.open()) return;
     if (key == GLFW_KEY_S && press.control) return press.shift ? dialogs_.save_as() : dialogs_.save();
     if (key == GLFW_KEY_O && press.control)
         return session_.dialog.ask(press.shift ? Wanted::folder : Wanted::file);
