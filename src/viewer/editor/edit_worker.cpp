@@ -235,7 +235,9 @@ void EditWorker::change(uint64_t id, const std::shared_ptr<edit::Journal>& journ
         const uint64_t before = found->second.history->version();
         edit(found->second);
         if (found->second.history->version() == before) return;
-        changed_.push_back(id);
+        // A selection alone is no work to save.
+        const auto changes = [](const edit::Words& words) { return words.name != "select"; };
+        if (std::ranges::any_of(found->second.history->edits(), changes)) changed_.push_back(id);
         if (!previewed_.empty()) find_preview();
     });
 }
