@@ -58,7 +58,6 @@ enum Mark : uint8_t {
     kMarkHidden = 4,    // not drawn
     kMarkDeleted = 8,   // not drawn
     kMarkPreview = 16,  // drawn red: what a cleaning rule would remove
-    kMarkFine = 128,    // not drawn in a draft
 };
 
 /// The options that may differ from one image of a scene to the next.
@@ -66,7 +65,6 @@ struct DrawOptions {
     RenderOptions render;
     Drawing drawing = Drawing::color;
     double splat_scale = 1;     // factor of every splat's scales, above 0
-    bool draft = false;         // splats with kMarkFine are not drawn (Renderer::mark)
     bool plain_colors = false;  // marks hide splats, but do not tint them (for pictures and films)
 };
 

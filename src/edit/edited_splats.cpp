@@ -15,17 +15,6 @@
 namespace ewa::edit {
 namespace {
 
-/// Some splats of a scene, in this order.
-Gaussians picked(const Gaussians& all, const std::vector<uint32_t>& indices) {
-    Gaussians some;
-    some.sh_degree = all.sh_degree;
-    some.origin = all.origin;
-    some.density = all.density;
-    some.resize(indices.size());
-    for (size_t k = 0; k < indices.size(); ++k) scene::copy_splats(all, indices[k], 1, some, k);
-    return some;
-}
-
 /// Transforms splats. The means are relative to `origin` afterwards. Each splat gets the same values whatever others are with it.
 void transform_about(Gaussians& splats, const glm::dmat4& matrix, const glm::dvec3& origin) {
     std::vector<float> means(3 * splats.size());
@@ -88,7 +77,7 @@ Gaussians EditedSplats::result() const {
     std::vector<uint32_t> left;
     for (size_t i = 0; i < size(); ++i)
         if ((states_[i] & kDeleted) == 0) left.push_back(uint32_t(i));
-    return left.size() == size() ? *now_ : picked(*now_, left);
+    return left.size() == size() ? *now_ : scene::rows_of(*now_, left);
 }
 
 size_t EditedSplats::count(uint8_t bits) const {
@@ -128,7 +117,7 @@ Gaussians EditedSplats::values_of(uint32_t group, const std::vector<uint32_t>& i
     std::vector<uint32_t> sources = indices;
     for (uint32_t& i : sources)
         if (i >= first_->size()) i = sources_[i - first_->size()];
-    Gaussians values = picked(*first_, sources);
+    Gaussians values = scene::rows_of(*first_, sources);
     for (auto g = chain.rbegin(); g != chain.rend(); ++g)
         apply_edit(values, groups_[*g - 1].edit, groups_[*g - 1].origin);
     return values;
@@ -158,12 +147,12 @@ void EditedSplats::change(const ValueEdit& edit) {
     const std::vector<uint32_t> indices = affected_splats();
     if (indices.empty()) return;
     glm::dvec3 origin = now_->origin;
-    Gaussians values = picked(*now_, indices);
+    Gaussians values = scene::rows_of(*now_, indices);
     if (std::holds_alternative<Reset>(edit)) {
         std::vector<uint32_t> sources = indices;
         for (uint32_t& i : sources)
             if (i >= first_->size()) i = sources_[i - first_->size()];
-        values = picked(*first_, sources);
+        values = scene::rows_of(*first_, sources);
     } else {
         // The origin changes only with all splats.
         if (const auto* matrix = std::get_if<glm::dmat4>(&edit); matrix && indices.size() == size()) {
@@ -187,7 +176,7 @@ void EditedSplats::change(const ValueEdit& edit) {
 void EditedSplats::duplicate() {
     const std::vector<uint32_t> indices = affected_splats();
     if (indices.empty()) return;
-    const Gaussians copies = picked(*now_, indices);
+    const Gaussians copies = scene::rows_of(*now_, indices);
     Gaussians& splats = writable();
     const size_t before = size();
     splats.resize(before + indices.size());

@@ -51,7 +51,7 @@ Plan plan_for(const PlanRequest& request) {
         plan.drawing = request.drawing;
         plan.debug = request.debug;
         plan.log_scale_shift = request.debug ? float(std::log(request.splat_scale)) : 0;
-        plan.hidden_marks = request.marks & (kMarkHidden | kMarkDeleted | (request.draft ? kMarkFine : 0));
+        plan.hidden_marks = request.marks & (kMarkHidden | kMarkDeleted);
         if (!request.plain_colors && !plan.surface())
             plan.tinted_marks = request.marks & (kMarkSelected | kMarkLocked | kMarkPreview);
         if (plan.reads_marks() && method.rays)

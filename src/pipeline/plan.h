@@ -29,10 +29,10 @@ struct PlanRequest {
 
     // For an image.
     Drawing drawing = Drawing::color;
-    bool debug = false;                        // splat_scale applies, and the visible splats are counted
-    double splat_scale = 1;                    // factor of every splat's scales, above 0
-    uint32_t marks = 0;                        // Mark bits that some splat has
-    bool draft = false, plain_colors = false;  // as in DrawOptions
+    bool debug = false;         // splat_scale applies, and the visible splats are counted
+    double splat_scale = 1;     // factor of every splat's scales, above 0
+    uint32_t marks = 0;         // Mark bits that some splat has
+    bool plain_colors = false;  // as in DrawOptions
 
     // For a gradient or a training.
     LossWeights loss{};

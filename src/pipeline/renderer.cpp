@@ -234,7 +234,6 @@ Plan Renderer::State::plan_of(const DrawOptions& o) const {
     drawing.debug = true;
     drawing.splat_scale = o.splat_scale;
     drawing.marks = marked;
-    drawing.draft = o.draft;
     drawing.plain_colors = o.plain_colors;
     return plan_for(drawing);
 }

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -41,6 +43,9 @@ inline void copy_splats(const Gaussians& from, size_t i, size_t count, Gaussians
         std::copy_n(sources[a].values->data() + each * i, each * count, targets[a].values->data() + each * k);
     }
 }
+
+/// Some splats of a scene, in this order. rows: below size().
+Gaussians rows_of(const Gaussians& gaussians, std::span<const uint32_t> rows);
 
 /// How many splats are not drawable by which values, such as "means of 2, zero quaternions of 1". Empty if all are drawable.
 std::string undrawable_text(const Gaussians& gaussians);

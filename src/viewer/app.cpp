@@ -319,6 +319,7 @@ void App::open(const std::vector<std::filesystem::path>& paths, const OpenedScen
 void App::enter_scene() {
     const OpenedScene& scene = state_.scene;
     entered_ = drawn_ = scene.gaussians;
+    drafted_ = nullptr;
     marked_ = false;
     if (scene.points || entered_->size() == 0) return editor_.clear();
     const std::filesystem::path file = scene.run.empty() ? scene.path : scene.run / folders::kSplatsFile;
@@ -347,11 +348,16 @@ void App::sync_editor() {
     if (editor_.splats() != drawn_) {
         drawn_ = editor_.splats();
         marked_ = false;
-        shown_.renders.set_scene(drawn_, drawn_ == entered_ ? scene.coarse : nullptr);
+        drafted_ = nullptr;
+        shown_.renders.set_scene(drawn_);
     }
     const auto& marks = *editor_.marks();
     const bool any = std::ranges::any_of(marks, [](uint8_t mark) { return mark != 0; });
-    if (any || marked_) shown_.renders.set_marks(editor_.marks(), drawn_->size() > state_.startup.budget);
+    // A level that the file has shows no edits.
+    const bool level = scene.coarse && drawn_ == entered_ && !any && !marked_;
+    if (const Draft& draft = editor_.draft(); !level && draft.splats != drafted_)
+        shown_.renders.set_draft({drafted_ = draft.splats, draft.rows});
+    if (any || marked_) shown_.renders.set_marks(editor_.marks());
     marked_ = any;
 }
 

@@ -67,7 +67,8 @@ class App {
     std::shared_ptr<const Gaussians> entered_,
         drawn_;                     // the scene that is edited, and what of it the render thread has
     std::filesystem::path opened_;  // the last file that was remembered
-    bool marked_ = false;           // the render thread has marks
+    std::shared_ptr<const Gaussians> drafted_;  // the draft of it that the render thread has
+    bool marked_ = false;                       // the render thread has marks
     Tool last_tool_ = Tool::view;
 };
 

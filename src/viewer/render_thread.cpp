@@ -56,11 +56,15 @@ class RenderThread::Scene {
   public:
     explicit Scene(OpenDevice open) : open_(std::move(open)) {}
 
-    void set(std::shared_ptr<const Gaussians> scene, std::shared_ptr<const Gaussians> coarse) {
+    void set(std::shared_ptr<const Gaussians> scene) {
         scene_ = std::move(scene);
-        coarse_ = std::move(coarse);
+        draft_ = {};
         is_up_ = false;
         marks_ = nullptr;
+    }
+    void set_draft(Draft draft) {
+        draft_ = std::move(draft);
+        draft_is_up_ = marks_are_up_ = false;
     }
     void mark(std::shared_ptr<const std::vector<uint8_t>> marks) {
         marks_ = std::move(marks);
@@ -81,68 +85,86 @@ class RenderThread::Scene {
     std::optional<glm::dvec3> point_at(const Probe& probe);
 
   private:
+    void put(const Gaussians& scene, std::optional<Renderer>& renderer);
     void upload(bool densities);
+    void upload_draft();
     void put_marks();
     void fit_to(const Look& look);
 
     OpenDevice open_;
     std::shared_ptr<gpu::Device> device_;
-    std::optional<Renderer> renderer_, coarse_renderer_;
-    std::shared_ptr<const Gaussians> scene_, coarse_;
+    std::optional<Renderer> renderer_, draft_renderer_;
+    std::shared_ptr<const Gaussians> scene_;
+    Draft draft_;
     std::shared_ptr<const std::vector<uint8_t>> marks_;  // of scene_; null: none
-    bool is_up_ = false, marks_are_up_ = true;
+    bool is_up_ = false, draft_is_up_ = false, marks_are_up_ = true;
     bool densities_are_up_ = false;  // the scene has opacities of Footprint::density
 };
 
 bool RenderThread::Scene::open() {
     if (device_) return false;
     renderer_.reset();
-    coarse_renderer_.reset();
+    draft_renderer_.reset();
     device_ = open_();
     return true;
 }
 
 bool RenderThread::Scene::bring_up() {
     if (scene_ && !is_up_) upload(scene_->density);
+    if (scene_ && !draft_is_up_) upload_draft();
     return renderer_.has_value();
 }
 
 void RenderThread::Scene::close() {
     renderer_.reset();
-    coarse_renderer_.reset();
+    draft_renderer_.reset();
     device_.reset();
     is_up_ = false;
 }
 
-void RenderThread::Scene::upload(bool densities) {
-    const auto put = [&](const Gaussians& scene, std::optional<Renderer>& renderer) {
-        std::optional<Gaussians> fitted;
-        if (scene.density != densities) fit_opacities(fitted.emplace(scene), densities);
-        const Gaussians& splats = fitted ? *fitted : scene;
-        if (renderer)
-            renderer->replace(splats);
-        else
-            renderer.emplace(device_, splats, RenderOptions{});
-    };
-    is_up_ = false;
-    if (!coarse_) coarse_renderer_.reset();
-    put(*scene_, renderer_);
-    if (coarse_) put(*coarse_, coarse_renderer_);
-    is_up_ = true;
+/// Uploads splats, with opacities of Footprint::density or without.
+void RenderThread::Scene::put(const Gaussians& scene, std::optional<Renderer>& renderer) {
+    std::optional<Gaussians> fitted;
+    if (scene.density != densities_are_up_) fit_opacities(fitted.emplace(scene), densities_are_up_);
+    const Gaussians& splats = fitted ? *fitted : scene;
+    if (renderer)
+        renderer->replace(splats);
+    else
+        renderer.emplace(device_, splats, RenderOptions{});
     marks_are_up_ = !marks_;
+}
+
+void RenderThread::Scene::upload(bool densities) {
+    is_up_ = draft_is_up_ = false;
     densities_are_up_ = densities;
+    put(*scene_, renderer_);
+    is_up_ = true;
+}
+
+void RenderThread::Scene::upload_draft() {
+    if (draft_.splats)
+        put(*draft_.splats, draft_renderer_);
+    else
+        draft_renderer_.reset();
+    draft_is_up_ = true;
 }
 
 void RenderThread::Scene::put_marks() {
     if (std::exchange(marks_are_up_, true)) return;
-    renderer_->mark(marks_ && marks_->size() == scene_->size() ? std::span<const uint8_t>(*marks_)
-                                                               : std::span<const uint8_t>());
+    const bool fit = marks_ && marks_->size() == scene_->size();
+    renderer_->mark(fit ? std::span<const uint8_t>(*marks_) : std::span<const uint8_t>());
+    if (!draft_renderer_) return;
+    std::vector<uint8_t> marks;
+    if (fit && draft_.rows)
+        for (const uint32_t row : *draft_.rows) marks.push_back((*marks_)[row]);
+    draft_renderer_->mark(marks);
 }
 
 /// Opacities are those of the kernel, so that a scene looks about the same with all kernels.
 void RenderThread::Scene::fit_to(const Look& look) {
     const bool densities = look.kernel == Footprint::density;
     if (!look.points && densities != densities_are_up_) upload(densities);
+    if (!draft_is_up_) upload_draft();
     put_marks();
 }
 
@@ -151,9 +173,8 @@ std::shared_ptr<const RenderedFrame> RenderThread::Scene::draw(const RenderReque
     const Look& look = request.look;
     const Camera camera = downscale(request.camera, request.divisor);
     fit_to(look);
-    Renderer& renderer = request.coarse && coarse_renderer_ ? *coarse_renderer_ : *renderer_;
+    Renderer& renderer = request.coarse && draft_renderer_ ? *draft_renderer_ : *renderer_;
     DrawOptions options{options_of(look), drawing_for(look.mode), double(look.splat_scale)};
-    options.draft = request.coarse;
     options.plain_colors = !request.file.empty();
     auto finished = std::make_shared<RenderedFrame>();
     finished->request = request;
@@ -227,14 +248,19 @@ RenderThread::RenderThread(OpenDevice open, std::function<void()> on_news)
 
 RenderThread::~RenderThread() = default;
 
-uint64_t RenderThread::set_scene(std::shared_ptr<const Gaussians> gaussians,
-                                 std::shared_ptr<const Gaussians> coarse) {
+uint64_t RenderThread::set_scene(std::shared_ptr<const Gaussians> gaussians) {
     const std::lock_guard lock(mutex_);
     next_.scene = std::move(gaussians);
-    next_.coarse = std::move(coarse);
+    next_.draft.reset();
     next_.marks.reset();
     wake_.notify_one();
     return ++next_.scene_number;
+}
+
+void RenderThread::set_draft(Draft draft) {
+    const std::lock_guard lock(mutex_);
+    next_.draft = std::move(draft);
+    wake_.notify_one();
 }
 
 void RenderThread::set_marks(std::shared_ptr<const std::vector<uint8_t>> marks) {
@@ -300,11 +326,11 @@ bool RenderThread::next(const std::stop_token& stop, Work& work) {
     std::unique_lock lock(mutex_);
     wake_.wait(lock, stop, [this] {
         return !probes_waiting_.empty() || next_.full || !waiting_.empty() || !extras_waiting_.empty() ||
-               next_.scene || next_.marks;
+               next_.scene || next_.draft || next_.marks;
     });
     if (stop.stop_requested()) return false;
     work.scene = std::exchange(next_.scene, nullptr);
-    work.coarse = std::exchange(next_.coarse, nullptr);
+    work.draft = std::exchange(next_.draft, std::nullopt);
     work.marks = std::exchange(next_.marks, std::nullopt);
     work.scene_number = next_.scene_number;
     if (!probes_waiting_.empty()) {
@@ -329,7 +355,8 @@ void RenderThread::answer(const Probe& probe, const std::optional<glm::dvec3>& p
 }
 
 void RenderThread::carry_out(Work& work) {
-    if (work.scene) scene_->set(work.scene, work.coarse);
+    if (work.scene) scene_->set(work.scene);
+    if (work.draft) scene_->set_draft(*std::exchange(work.draft, std::nullopt));
     if (work.marks) scene_->mark(*work.marks);
     if (scene_->open()) report([&](News& news) { news.device = scene_->device(); });
     if (!scene_->bring_up()) return;

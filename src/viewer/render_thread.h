@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "viewer/byte_image.h"
+#include "viewer/draft.h"
 
 namespace ewa::viewer {
 
@@ -32,9 +33,8 @@ struct Look {
 struct RenderRequest {
     Camera camera;  // of the size at which the frame is shown
     Look look;
-    int divisor = 1;  // the frame has 1/divisor of that size
-    bool coarse =
-        false;  // of the coarse scene, if there is one; else without the splats that are marked kMarkFine
+    int divisor = 1;      // the frame has 1/divisor of that size
+    bool coarse = false;  // of the draft, if there is one
     uint64_t serial = 0;
     std::filesystem::path file;  // written as by `ewa render` with this extension; empty: no file
 };
@@ -89,10 +89,10 @@ class RenderThread {
     RenderThread(OpenDevice open, std::function<void()> on_news);
     ~RenderThread();
 
-    /// Sets the scene of all frames requested from now on. coarse: the scene with fewer splats, for RenderRequest::coarse; null:
-    /// none. Returns the number that RenderedFrame::scene will have.
-    uint64_t set_scene(std::shared_ptr<const Gaussians> gaussians,
-                       std::shared_ptr<const Gaussians> coarse = nullptr);
+    /// Sets the scene of all frames requested from now on, without a draft. Returns the number that RenderedFrame::scene will have.
+    uint64_t set_scene(std::shared_ptr<const Gaussians> gaussians);
+    /// Sets the draft of the scene, for RenderRequest::coarse, until the next set_scene().
+    void set_draft(Draft draft);
     /// Sets the marks of the scene's splats (Renderer::mark), until the next set_scene(). A file has no tints. null: none.
     void set_marks(std::shared_ptr<const std::vector<uint8_t>> marks);
     /// Replaces a waiting request that has no file. The frame that is being rendered is finished first.
@@ -138,7 +138,8 @@ class RenderThread {
         uint64_t number = 0;
     };
     struct Work {
-        std::shared_ptr<const Gaussians> scene, coarse;  // scene is null: both as before
+        std::shared_ptr<const Gaussians> scene;  // null: as before
+        std::optional<Draft> draft;              // empty: as before
         std::optional<RenderRequest> request;
         std::optional<Probe> probe;
         std::optional<Full> full;

@@ -101,14 +101,17 @@ void SessionTimes::print(const RenderedFrame* last) const {
     std::fprintf(stderr, "\n");
 }
 
-void Renders::set_scene(std::shared_ptr<const Gaussians> gaussians, std::shared_ptr<const Gaussians> coarse) {
-    has_coarse_ = coarse != nullptr;
-    has_draft_ = false;
-    scene_ = thread_.set_scene(std::move(gaussians), std::move(coarse));
+void Renders::set_scene(std::shared_ptr<const Gaussians> gaussians, Draft draft) {
+    scene_ = thread_.set_scene(std::move(gaussians));
+    set_draft(std::move(draft));
 }
 
-void Renders::set_marks(std::shared_ptr<const std::vector<uint8_t>> marks, bool draft) {
-    has_draft_ = draft;
+void Renders::set_draft(Draft draft) {
+    has_draft_ = draft.splats != nullptr;
+    thread_.set_draft(std::move(draft));
+}
+
+void Renders::set_marks(std::shared_ptr<const std::vector<uint8_t>> marks) {
     ++marks_;
     thread_.set_marks(std::move(marks));
 }
@@ -127,7 +130,7 @@ void Renders::ask(const Camera& camera, const Look& look, bool full) {
     if (first || asked_scene_ != scene_ || asked_marks_ != marks_ || !same_view(request, asked_)) {
         changed_ = now;
         request.divisor = full ? 1 : first ? kFirstDivisor : pace_.divisor();
-        request.coarse = (has_coarse_ || has_draft_) && !full;
+        request.coarse = has_draft_ && !full;
     } else if (!reduced() || now - changed_ < std::chrono::duration<double>(kRestSeconds)) {
         // A full frame takes long: a moving camera should not wait for it, and a resting one needs it once.
         return;
@@ -157,7 +160,7 @@ Renders::News Renders::take() {
     if (news.frame) {
         shown_ = news.picture;
         // The frames of a resting view have other splats than those that set the pace.
-        if (shown_->request.coarse == has_coarse_) pace_.drawn(shown_->request.divisor, shown_->milliseconds);
+        if (shown_->request.coarse == has_draft_) pace_.drawn(shown_->request.divisor, shown_->milliseconds);
     }
     return news;
 }

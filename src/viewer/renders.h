@@ -78,11 +78,12 @@ class Renders {
     /// wake: called on the render thread when take() has something new.
     Renders(OpenDevice open, std::function<void()> wake) : thread_(std::move(open), std::move(wake)) {}
 
-    /// coarse: the same with fewer splats, which is shown while the view changes; null: none.
-    void set_scene(std::shared_ptr<const Gaussians> gaussians,
-                   std::shared_ptr<const Gaussians> coarse = nullptr);
-    /// Sets the marks of the scene's splats, as RenderThread::set_marks(). draft: some of them are skipped while the view changes.
-    void set_marks(std::shared_ptr<const std::vector<uint8_t>> marks, bool draft);
+    /// draft: as RenderThread::set_draft().
+    void set_scene(std::shared_ptr<const Gaussians> gaussians, Draft draft = {});
+    /// Sets the draft of the present scene, as RenderThread::set_draft().
+    void set_draft(Draft draft);
+    /// Sets the marks of the scene's splats, as RenderThread::set_marks().
+    void set_marks(std::shared_ptr<const std::vector<uint8_t>> marks);
     /// Asks for the view if it changed, or in full resolution once it has rested. full: always in full
     /// resolution.
     void ask(const Camera& camera, const Look& look, bool full);
@@ -117,7 +118,7 @@ class Renders {
     void send(const RenderRequest& request);
 
     uint64_t scene_ = 0, asked_scene_ = 0;
-    bool has_coarse_ = false, has_draft_ = false;
+    bool has_draft_ = false;
     uint64_t marks_ = 0, asked_marks_ = 0;  // numbers of set_marks()
     RenderRequest asked_;
     Clock::time_point changed_;  // last change of the requested view

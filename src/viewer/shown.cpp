@@ -28,7 +28,7 @@ Shown::Shown(ViewState& state, Navigation& navigation)
       quality_(state.wake) {}
 
 void Shown::enter_scene() {
-    renders.set_scene(state_.scene.gaussians, state_.scene.coarse);
+    renders.set_scene(state_.scene.gaussians, {state_.scene.coarse, nullptr});
     images_.forget_scene();
     forget_points();
     quality_.forget();

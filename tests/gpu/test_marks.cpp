@@ -91,7 +91,7 @@ TEST(Marks, ThatChangeNothingLeaveTheBytes) {
         EXPECT_NE(renderer.render_bytes(scene.camera, options), before);
         renderer.mark({});
         expect_before();
-        for (const uint8_t nothing : {uint8_t(0), uint8_t(kMarkFine)}) {
+        for (const uint8_t nothing : {uint8_t(0), uint8_t(128)}) {
             renderer.mark(std::vector<uint8_t>(503, nothing));
             expect_before();
         }
@@ -110,19 +110,6 @@ TEST(Marks, OfAnotherLengthAreRefused) {
     EXPECT_THROW(renderer.mark(std::vector<uint8_t>(502)), InputError);
     EXPECT_THROW(renderer.mark(std::vector<uint8_t>(504)), InputError);
     EXPECT_EQ(renderer.render(scene.camera).color.pixels, before.pixels);
-}
-
-TEST(Marks, ADraftLeavesOutFineSplats) {
-    for (const bool points : {false, true}) {
-        const MarkedScene marked = marked_scene(8400, kMarkFine, kMarkHidden, points);
-        const Scene& scene = marked.scene;
-        Renderer renderer(device(), scene.gaussians, scene.options);
-        Renderer without(device(), marked.rest, scene.options);
-        renderer.mark(marked.marks);
-        const Image draft = renderer.render(scene.camera, {.render = scene.options, .draft = true}).color;
-        expect_same_values(draft, without.render(scene.camera).color);
-        EXPECT_NE(renderer.render(scene.camera, {.render = scene.options}).color.pixels, draft.pixels);
-    }
 }
 
 /// One splat in the middle of an image.
@@ -175,8 +162,7 @@ TEST(Marks, TintAnIsolatedSplat) {
         expect_tint(kMarkLocked, 0.45 * own, points);
         expect_tint(kMarkPreview, glm::mix(own, red, 0.65), points);
         expect_tint(kMarkSelected | kMarkLocked, glm::mix(0.45 * own, accent, 0.65), points);
-        expect_tint(kMarkSelected | kMarkPreview | kMarkFine,
-                    glm::mix(glm::mix(own, accent, 0.65), red, 0.65), points);
+        expect_tint(kMarkSelected | kMarkPreview, glm::mix(glm::mix(own, accent, 0.65), red, 0.65), points);
     }
 }
 
@@ -220,7 +206,7 @@ TEST(Marks, AreRefusedAlongRays) {
         renderer.mark(std::vector<uint8_t>{mark});
         EXPECT_THROW(renderer.render(scene.camera), InputError);
     }
-    renderer.mark(std::vector<uint8_t>{kMarkFine});
+    renderer.mark(std::vector<uint8_t>{128});
     EXPECT_EQ(renderer.render(scene.camera).color.pixels, plain.pixels);
 }
 

@@ -92,7 +92,7 @@ TEST(Methods, OfPlansSayWhatTheyLack) {
               "--points draws no surface, so the median depth cannot be drawn");
     EXPECT_EQ(plan({.render = kByRay, .marks = kMarkHidden}),
               "the integrator ray cannot hide or tint marked splats");
-    EXPECT_EQ(plan({.render = kByRay, .marks = kMarkFine}), "");
+    EXPECT_EQ(plan({.render = kByRay, .marks = 128}), "");
     EXPECT_EQ(plan({.render = kSpheres, .drawing = Drawing::count}), "");
     EXPECT_EQ(plan({.purpose = Purpose::training, .render = kByRay}), "");
 }

@@ -89,7 +89,7 @@ class LevelsWriter {
         Gaussians chunk;
         for (size_t at = 0; at < nodes_.size(); ++at) {
             if (splats[at].empty()) continue;
-            Gaussians leaf = rows_of(g, splats[at]);
+            Gaussians leaf = scene::rows_of(g, splats[at]);
             double error = 0;
             if (level > 0)
                 for (const uint32_t i : splats[at]) error += errors_[i];

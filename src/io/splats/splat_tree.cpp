@@ -86,13 +86,4 @@ size_t node_of(const std::vector<TreeNode>& nodes, const float* mean, int depth)
     return at;
 }
 
-Gaussians rows_of(const Gaussians& g, std::span<const uint32_t> rows) {
-    Gaussians part;
-    part.sh_degree = g.sh_degree;
-    part.origin = g.origin;
-    part.resize(rows.size());
-    for (size_t i = 0; i < rows.size(); ++i) scene::copy_splats(g, rows[i], 1, part, i);
-    return part;
-}
-
 }  // namespace ewa::io

@@ -47,7 +47,4 @@ std::vector<TreeNode> build_tree(const Gaussians& gaussians, const TreeLimits& l
 /// The node at this depth whose box has the mean, or the leaf above it. mean: three coordinates.
 size_t node_of(const std::vector<TreeNode>& nodes, const float* mean, int depth = 64);
 
-/// These splats of the scene. rows: below size().
-Gaussians rows_of(const Gaussians& gaussians, std::span<const uint32_t> rows);
-
 }  // namespace ewa::io

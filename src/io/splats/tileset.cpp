@@ -138,7 +138,7 @@ class TilesetWriter {
             }
         for (size_t at = 0; at < nodes_.size(); ++at) {
             if (splats[at].empty()) continue;
-            Gaussians part = rows_of(g, splats[at]);
+            Gaussians part = scene::rows_of(g, splats[at]);
             splats[at] = {};
             select_splats(part, morton_order(part));
             write_tile(std::move(part), tiles_[at]);

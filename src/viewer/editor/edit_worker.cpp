@@ -11,6 +11,7 @@
 #include "edit/edited_splats.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_edit.h"
+#include "scene/splat_arrays.h"
 
 namespace ewa::viewer {
 namespace {
@@ -18,9 +19,9 @@ namespace {
 static_assert(int(edit::kSelected) == kMarkSelected && int(edit::kLocked) == kMarkLocked &&
               int(edit::kHidden) == kMarkHidden && int(edit::kDeleted) == kMarkDeleted);
 
-/// All but the `budget` splats that cover most. Empty if there are no more than that.
-std::vector<bool> fine_splats(const Gaussians& g, size_t budget) {
-    if (g.size() <= budget) return {};
+/// The `budget` splats that cover most, in order. Null if there are no more than that.
+std::shared_ptr<const std::vector<uint32_t>> draft_rows(const Gaussians& g, size_t budget) {
+    if (g.size() <= budget) return nullptr;
     std::vector<std::pair<float, uint32_t>> weights(g.size());
     for (size_t i = 0; i < g.size(); ++i) {
         const float* s = &g.log_scales[3 * i];
@@ -29,9 +30,10 @@ std::vector<bool> fine_splats(const Gaussians& g, size_t budget) {
         weights[i] = {std::isnan(weight) ? -std::numeric_limits<float>::infinity() : weight, uint32_t(i)};
     }
     std::ranges::nth_element(weights, weights.begin() + std::ptrdiff_t(budget), std::greater());
-    std::vector<bool> fine(g.size(), true);
-    for (size_t k = 0; k < budget; ++k) fine[weights[k].second] = false;
-    return fine;
+    auto rows = std::make_shared<std::vector<uint32_t>>();
+    for (size_t k = 0; k < budget; ++k) rows->push_back(weights[k].second);
+    std::ranges::sort(*rows);
+    return rows;
 }
 
 }  // namespace
@@ -90,6 +92,7 @@ void EditWorker::publish() {
     const std::lock_guard lock(mutex_);
     done_.snapshot = present;
     done_.splats = joined_;
+    done_.draft = draft_;
     done_.marks = bits;
     done_.preview_count =
         previewed_.empty() ? std::nullopt : std::optional(size_t(std::ranges::count(previewed_, true)));
@@ -121,7 +124,10 @@ void EditWorker::join() {
         for (const auto& [id, version] : shown) append_splats(*all, *splats_of(id));
         joined_ = std::move(all);
     }
-    if (!dragged || fine_.size() != joined_->size()) fine_ = fine_splats(*joined_, budget_);
+    auto rows = draft_.rows;
+    if (!dragged || !rows) rows = draft_rows(*joined_, budget_);
+    draft_ = {};
+    if (rows) draft_ = {std::make_shared<const Gaussians>(scene::rows_of(*joined_, *rows)), rows};
 }
 
 std::shared_ptr<const EditSnapshot> EditWorker::snapshot() const {
@@ -174,8 +180,6 @@ std::shared_ptr<const std::vector<uint8_t>> EditWorker::marks() const {
         for (size_t i = 0; i < previewed_.size(); ++i)
             if (previewed_[i]) (*bits)[first + i] |= kMarkPreview;
     }
-    for (size_t i = 0; i < fine_.size(); ++i)
-        if (fine_[i]) (*bits)[i] |= kMarkFine;
     return bits;
 }
 

@@ -16,6 +16,7 @@
 
 #include "edit/journal.h"
 #include "edit/shapes.h"
+#include "viewer/draft.h"
 #include "viewer/editor/edit_snapshot.h"
 
 namespace ewa::viewer {
@@ -54,6 +55,7 @@ class EditWorker {
     struct Done {
         std::shared_ptr<const EditSnapshot> snapshot;  // null: as before; so the next two
         std::shared_ptr<const Gaussians> splats;
+        Draft draft;
         std::shared_ptr<const std::vector<uint8_t>> marks;
         std::optional<size_t> preview_count;
         std::vector<edit::Step> steps;
@@ -92,7 +94,7 @@ class EditWorker {
     std::optional<glm::dmat4> drag_;
     std::shared_ptr<const Gaussians> joined_;
     std::vector<std::pair<uint64_t, uint64_t>> joined_of_;  // scenes, with the versions of their values
-    std::vector<bool> fine_;  // of the joined splats: not in a draft; empty: all are
+    Draft draft_;  // of the joined splats, if they are more than the budget
     double milliseconds_ = 0;
     std::vector<edit::Step> steps_;
     std::vector<uint64_t> changed_;

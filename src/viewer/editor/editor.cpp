@@ -201,18 +201,14 @@ bool Editor::busy() const {
 
 Editor::News Editor::take() {
     EditWorker::Done done = worker_->take();
-    News news{.any = done.any,
-              .splats = false,
-              .marks = false,
-              .note = std::exchange(note_, {}),
-              .done = done.steps};
+    News news{.any = done.any, .marks = false, .note = std::exchange(note_, {}), .done = done.steps};
     if (!done.note.empty()) news.note = done.note;
     preview_count_ = done.preview_count;
     if (done.snapshot) {
         snapshot_ = done.snapshot;
-        news.splats = done.splats != drawn_;
         news.marks = true;
         drawn_ = done.splats;
+        draft_ = done.draft;
         marks_ = done.marks;
     }
     for (const auto& scene : scenes_)

@@ -14,6 +14,7 @@
 #include "edit/history.h"
 #include "edit/journal.h"
 #include "edit/shapes.h"
+#include "viewer/draft.h"
 #include "viewer/editor/edit_snapshot.h"
 
 namespace ewa::viewer {
@@ -102,15 +103,17 @@ class Editor {
     bool busy() const;  // edits are being done
     /// Takes what has been done. Call it once per turn of the window's loop, before anything reads snapshot().
     struct News {
-        bool any = false, splats = false, marks = false;  // splats() and marks() are others
-        std::string note;                                 // a message for the user; empty: none
-        std::vector<edit::Step> done;                     // steps that have changed something
+        bool any = false, marks = false;  // marks: splats() and marks() may be others
+        std::string note;                 // a message for the user; empty: none
+        std::vector<edit::Step> done;     // steps that have changed something
     };
     News take();
     /// The state of the active scene.
     const EditSnapshot& snapshot() const { return *snapshot_; }
     /// The splats of all scenes that are shown, joined: what the render thread gets.
     std::shared_ptr<const Gaussians> splats() const { return drawn_; }
+    /// Of splats(); without splats if there are no more than the budget.
+    const Draft& draft() const { return draft_; }
     /// ewa::Mark bits of splats(); null: none.
     std::shared_ptr<const std::vector<uint8_t>> marks() const { return marks_; }
 
@@ -142,6 +145,7 @@ class Editor {
     size_t active_ = 0;
     std::shared_ptr<const EditSnapshot> snapshot_ = std::make_shared<EditSnapshot>();
     std::shared_ptr<const Gaussians> drawn_;
+    Draft draft_;
     std::shared_ptr<const std::vector<uint8_t>> marks_;
     std::optional<size_t> preview_count_;
     std::function<void()> wake_;
