@@ -230,7 +230,7 @@ TEST(Renders, ShowTheCoarseSceneUntilTheViewRests) {
     Gaussians green = *red_splat();
     std::swap(green.sh[0], green.sh[1]);
     Renders renders([] { return open_device({}); }, [] {});
-    renders.set_scene(red_splat(), std::make_shared<const Gaussians>(green));
+    renders.set_scene(red_splat(), {std::make_shared<const Gaussians>(green), nullptr});
     Camera camera = request(0).camera;
     const auto shown = [&](const Camera& seen, bool coarse) {
         return soon([&] {

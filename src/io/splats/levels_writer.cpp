@@ -14,6 +14,7 @@
 #include "io/splats/sog.h"
 #include "io/splats/splat_tree.h"
 #include "scene/decimate.h"
+#include "scene/splat_arrays.h"
 
 namespace ewa::io {
 

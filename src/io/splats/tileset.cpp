@@ -19,6 +19,7 @@
 #include "io/splats/levels.h"
 #include "io/splats/part_folders.h"
 #include "io/splats/splat_tree.h"
+#include "scene/splat_arrays.h"
 
 namespace ewa::io {
 

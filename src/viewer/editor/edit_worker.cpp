@@ -302,6 +302,7 @@ EditWorker::Done EditWorker::take() {
     const std::lock_guard lock(mutex_);
     return std::exchange(done_, Done{.snapshot = {},
                                      .splats = {},
+                                     .draft = {},
                                      .marks = {},
                                      .preview_count = done_.preview_count,
                                      .steps = {},
