@@ -225,6 +225,34 @@ TEST(RenderThread, FitsOpacitiesToTheKernel) {
     EXPECT_EQ(red(Footprint::peak), peak);
 }
 
+/// A draft has rows of the scene, and shows their marks.
+TEST(RenderThread, ADraftShowsTheMarksOfItsRows) {
+    const std::shared_ptr<const Gaussians> red = red_splat();
+    Gaussians both = *red;
+    append_splats(both, *red);
+    both.means[3] += 1000;  // out of the image
+    RenderThread thread([] { return open_device({}); }, [] {});
+    thread.set_scene(std::make_shared<const Gaussians>(both));
+    uint64_t serial = 0;
+    const auto drawn = [&](std::vector<uint32_t> rows, std::vector<uint8_t> marks) {
+        thread.set_draft({red, std::make_shared<const std::vector<uint32_t>>(std::move(rows))});
+        thread.set_marks(std::make_shared<const std::vector<uint8_t>>(std::move(marks)));
+        RenderRequest asked = request(++serial);
+        asked.coarse = true;
+        thread.ask(asked);
+        RenderThread::News news;
+        EXPECT_TRUE(soon([&] {
+            news = thread.take_news();
+            return news.picture && news.picture->request.serial == serial;
+        }));
+        return news.picture ? news.picture->splats_drawn : 99;
+    };
+    EXPECT_EQ(drawn({0}, {0, 0}), 1u);
+    EXPECT_EQ(drawn({0}, {kMarkHidden, 0}), 0u);
+    EXPECT_EQ(drawn({0}, {0, kMarkHidden}), 1u);
+    EXPECT_EQ(drawn({1}, {0, kMarkHidden}), 0u);
+}
+
 /// While the view changes there are fewer splats, and all of them once it rests.
 TEST(Renders, ShowTheCoarseSceneUntilTheViewRests) {
     Gaussians green = *red_splat();
