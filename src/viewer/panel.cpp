@@ -257,9 +257,9 @@ bool footer_button(const char* name, const char* explanation) {
 
 void draw_footer(const PanelFacts& facts, PanelActions& actions) {
     draw_text_box("note", facts.note, 0, kNoteLines);
-    actions.whole_scene = footer_button("Whole scene", "F: from the front");
+    actions.whole_scene = footer_button("Whole scene", "From the front (F, if nothing is selected)");
     ImGui::SameLine();
-    actions.reset = footer_button("First view", "R");
+    actions.reset = footer_button("First view", "As at the start (R in the tab View)");
     if (footer_button("Open", "A file or a folder")) ImGui::OpenPopup("open");
     ImGui::SameLine();
     if (footer_button("Save picture", "F12: a PNG. Shift + F12: an EXR")) ImGui::OpenPopup("picture");

@@ -102,9 +102,10 @@ void draw_help_group(const char* name, std::span<const texts::HelpRow> rows, flo
 }
 
 void draw_help_groups(int columns) {
-    std::vector<texts::HelpRow> tools;
+    std::vector<texts::HelpRow> tools, edits;
     for (const texts::ToolText& tool : texts::kTools)
         if (*tool.key) tools.push_back({tool.key, tool.name});
+    for (const auto& edit : texts::edit_panel::kKeyedEdits) edits.push_back({edit.keys, edit.name});
     float keys = 0;
     for (const auto& rows : {std::span<const texts::HelpRow>(texts::kMoveHelp),
                              std::span<const texts::HelpRow>(texts::kLookHelp),
@@ -115,9 +116,10 @@ void draw_help_groups(int columns) {
     ImGui::TableNextColumn();
     draw_help_group(texts::kMoveGroup, texts::kMoveHelp, keys);
     draw_help_group(texts::kLookGroup, texts::kLookHelp, keys);
+    draw_help_group(texts::kFilesGroup, texts::kFilesHelp, keys);
     ImGui::TableNextColumn();
     draw_help_group(texts::kToolsGroup, tools, keys);
-    draw_help_group(texts::kFilesGroup, texts::kFilesHelp, keys);
+    draw_help_group(texts::kEditsGroup, edits, keys);
     ImGui::EndTable();
 }
 

@@ -8,10 +8,12 @@
 #include <numeric>
 #include <sstream>
 
+#include "edit/shapes.h"
 #include "edit/steps.h"
 #include "ewa/error.h"
 #include "viewer/editor/edit_words.h"
 #include "viewer/editor/histogram.h"
+#include "viewer/editor/texts.h"
 
 namespace ewa::viewer {
 namespace {
@@ -169,6 +171,57 @@ TEST(AdjustmentEdits, SpeakOfWhatChangesAlone) {
     EXPECT_EQ(adjustment_edits(bright, {}), (std::vector<edit::Words>{{"adjust", "brightness=-0.25"}}));
     EXPECT_EQ(adjustment_edits(bright, {.brightness = 0.25f, .opacity = 0.5f}),
               (std::vector<edit::Words>{{"adjust", "opacity=0.5"}}));
+}
+
+TEST(HasKey, TakesEachAlternativeWithItsModifiers) {
+    const std::string keys = "Ctrl+D or Ctrl+Shift+A";
+    EXPECT_TRUE(has_key(keys, 'D', false, true));
+    EXPECT_TRUE(has_key(keys, 'A', true, true));
+    EXPECT_FALSE(has_key(keys, 'A', false, true));
+    EXPECT_FALSE(has_key(keys, 'D', false, false));
+    EXPECT_FALSE(has_key("", 'D', false, false));
+    EXPECT_TRUE(has_key("Ctrl+=", '=', true, true)) << "as plus";
+    constexpr int kBackspace = 259, kDelete = 261;  // of GLFW
+    for (const int key : {kBackspace, kDelete})
+        EXPECT_TRUE(has_key(texts::edit_panel::kDelete.keys, key, false, false));
+}
+
+TEST(HasKey, NoTwoEditsOrToolsShareAKey) {
+    std::vector<std::string> all{texts::kUndo.key, texts::kRedo.key};
+    for (const auto& edit : texts::edit_panel::kKeyedEdits) all.emplace_back(edit.keys);
+    for (const texts::ToolText& tool : texts::kTools)
+        if (*tool.key) all.emplace_back(tool.key);
+    std::vector<int> found(all.size(), 0);
+    constexpr int kLastKey = 348;
+    for (int key = 0; key <= kLastKey; ++key)
+        for (const bool shift : {false, true})
+            for (const bool control : {false, true}) {
+                int here = 0;
+                for (size_t i = 0; i < all.size(); ++i) {
+                    const int has = has_key(all[i], key, shift, control) ? 1 : 0;
+                    found[i] += has;
+                    here += has;
+                }
+                EXPECT_LE(here, 1) << key;
+            }
+    for (size_t i = 0; i < all.size(); ++i) EXPECT_GE(found[i], 1) << all[i];
+}
+
+TEST(SelectionTitle, SaysHowWhichShapeSelects) {
+    EXPECT_EQ(selection_title("all"), "Select all");
+    EXPECT_EQ(selection_title("none"), "Select none");
+    EXPECT_EQ(selection_title("invert"), texts::edit_panel::kInvert.name);
+    EXPECT_EQ(selection_title("grow=0.1"), texts::edit_panel::kGrow.name);
+    EXPECT_EQ(selection_title("opacity=..0.1"), "Select by opacity");
+    EXPECT_EQ(selection_title("remove:" + edit::box_shape({0, 0, 0}, {1, 1, 1})), "Remove by box");
+    EXPECT_EQ(selection_title("and:" + edit::sphere_shape({0, 0, 0}, 1)), "Intersect by sphere");
+    Camera camera;
+    camera.width = camera.height = 100;
+    camera.fx = camera.fy = 100;
+    EXPECT_EQ(selection_title(edit::rectangle_shape(camera, {1, 2}, {30, 40.5}) + ";front"),
+              "Select by rectangle");
+    EXPECT_EQ(selection_title("add:" + edit::polygon_shape(camera, {{1, 2}, {30, 2}, {30, 40}, {2, 40}})),
+              "Add by polygon");
 }
 
 TEST(PlacementText, MovesTurnsAndScalesAboutThePoint) {

@@ -7,10 +7,12 @@
 #include <cmath>
 #include <glm/mat3x3.hpp>
 #include <initializer_list>
+#include <iterator>
 #include <utility>
 
 #include "core/typing.h"
 #include "edit/steps.h"
+#include "viewer/editor/texts.h"
 
 namespace ewa::viewer {
 namespace {
@@ -25,6 +27,14 @@ Tone tone_of(const edit::Adjustment& a) {
     return {contrast / white, ((double(a.brightness) - 0.5) * contrast + 0.5) / white};
 }
 
+/// Whether "x,y,x,y,..." before a semicolon are the corners of a rectangle.
+bool is_rectangle(std::string_view text) {
+    const auto n = core::parse_list(std::string(text.substr(0, text.find(';'))));
+    if (!n || n->size() != 8) return false;
+    const std::vector<double>& at = *n;
+    return at[1] == at[3] && at[2] == at[4] && at[5] == at[7] && at[6] == at[0];
+}
+
 /// The edits of adjustments that have an effect.
 std::vector<edit::Words> adjust(std::initializer_list<edit::Adjustment> adjustments) {
     std::vector<edit::Words> edits;
@@ -35,6 +45,43 @@ std::vector<edit::Words> adjust(std::initializer_list<edit::Adjustment> adjustme
 }
 
 }  // namespace
+
+std::string selection_title(std::string_view shape) {
+    namespace say = texts::edit_panel;
+    std::string_view verb = say::kSelect.name;
+    for (const auto& [prefix, name] : say::kSelectVerbs) {
+        if (!shape.starts_with(prefix)) continue;
+        shape.remove_prefix(prefix.size());
+        verb = name;
+    }
+    const std::string_view name = shape.substr(0, shape.find('='));
+    for (const say::Item& item : {say::kInvert, say::kGrow, say::kShrink})
+        if (name == item.value) return item.name;
+    if (name == shape) return fmt::format("{} {}", verb, name);
+    const bool rectangle = name == "polygon" && is_rectangle(shape.substr(name.size() + 1));
+    return fmt::format(say::kByShape, verb, rectangle ? say::kRectangle : name);
+}
+
+bool has_key(std::string_view keys, int key, bool shift, bool control) {
+    constexpr std::pair<std::string_view, int> kNames[] = {{"Esc", 256}, {"Backspace", 259}, {"Del", 261}};
+    constexpr std::string_view kOr = " or ";
+    for (size_t end = 0; !keys.empty(); keys.remove_prefix(std::min(keys.size(), end + kOr.size()))) {
+        end = std::min(keys.find(kOr), keys.size());
+        std::string_view name = keys.substr(0, end);
+        const auto take = [&](std::string_view modifier) {
+            const bool there = name.starts_with(modifier);
+            if (there) name.remove_prefix(modifier.size());
+            return there;
+        };
+        const bool with_control = take("Ctrl+"), with_shift = take("Shift+");
+        const bool free = name == "=" || name == "-";
+        if (with_control != control || (with_shift != shift && !free)) continue;
+        const auto* named = std::ranges::find(kNames, name, &std::pair<std::string_view, int>::first);
+        // The number of another key is its character.
+        if (key == (named != std::end(kNames) ? named->second : int(name.front()))) return true;
+    }
+    return false;
+}
 
 std::string adjustment_text(const edit::Adjustment& adjustment) {
     const edit::Adjustment none;

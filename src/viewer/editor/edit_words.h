@@ -2,12 +2,19 @@
 // The words of the edits that the panel asks for, from what its controls show. Independent of the window.
 #pragma once
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "edit/history.h"
 #include "viewer/editor/editor.h"
 
 namespace ewa::viewer {
+
+/// The title of a step of this --select, such as "Add by sphere".
+std::string selection_title(std::string_view shape);
+
+/// Whether `keys`, as in "Ctrl+D or Ctrl+Shift+A", has this key, a number of GLFW, with these modifiers. Shift is free with = and -.
+bool has_key(std::string_view keys, int key, bool shift, bool control);
 
 /// The value of --adjust. Members without effect are skipped; empty if none has one.
 std::string adjustment_text(const edit::Adjustment& adjustment);

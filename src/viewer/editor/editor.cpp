@@ -9,6 +9,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "viewer/editor/edit_words.h"
 #include "viewer/editor/edit_worker.h"
 #include "viewer/latest.h"
 
@@ -166,6 +167,7 @@ void Editor::open_journal(EditedScene& scene, bool go_on) {
 
 void Editor::perform(edit::Step step) {
     if (scenes_.empty()) return;
+    if (step.title.empty()) step.title = selection_title(step.edits.front().value);
     open_journal(now(), false);
     worker_->perform(now().id, {std::move(step)}, now().journal);
 }
@@ -176,7 +178,7 @@ void Editor::select(const std::string& shape) {
     const bool in_view = shape.starts_with("polygon=") || shape.starts_with("brush=");
     if (in_view && settings.front) text += ";front";
     if (in_view && settings.extent) text += ";extent";
-    perform({"Select", {{"select", std::move(text)}}});
+    perform({"", {{"select", std::move(text)}}});
 }
 
 void Editor::undo() {

@@ -39,11 +39,11 @@ void push_look(ButtonLook look) {
 
 }  // namespace
 
-void show_hint(const char* hint) {
+void show_hint(const char* hint, const char* keys) {
     if (!*hint || !ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) return;
     ImGui::BeginTooltip();
     ImGui::PushTextWrapPos(kHintWidth * ImGui::GetTextLineHeight());
-    ImGui::TextUnformatted(hint);
+    ImGui::TextUnformatted((hint + (*keys ? std::string(" (") + keys + ")" : "")).c_str());
     ImGui::PopTextWrapPos();
     ImGui::EndTooltip();
 }
@@ -93,7 +93,7 @@ int button_line(std::span<const Button> buttons, float gap) {
         if (ImGui::Button(button.text.name, ImVec2(width, 0))) clicked = int(i);
         ImGui::PopStyleColor(3);
         ImGui::EndDisabled();
-        show_hint(button.text.hint);
+        show_hint(button.text.hint, button.text.keys);
     }
     return clicked;
 }

@@ -15,8 +15,8 @@ namespace ui {
 
 using Text = say::Item;
 
-/// Shows the hint while the pointer is over the last item.
-void show_hint(const char* hint);
+/// Shows the hint, with the keys, while the pointer is over the last item.
+void show_hint(const char* hint, const char* keys = "");
 /// A section's header. Returns whether it is open. open_now: opens it.
 bool section(const Text& text, bool open_at_first, bool open_now = false);
 /// A label. The next item fills the rest of its line.

@@ -47,46 +47,27 @@ void enclose(EditSettings& settings, const std::array<glm::dvec3, 2>& bounds) {
     settings.sphere_radius = std::max(1e-9, 0.5 * glm::distance(bounds[0], bounds[1]));
 }
 
+/// Buttons of edits without a shape.
+void edit_line(Editor& editor, std::initializer_list<ui::Button> buttons) {
+    const int clicked = ui::button_line(buttons);
+    if (clicked < 0) return;
+    const ui::Text& text = (buttons.begin() + clicked)->text;
+    editor.perform({*text.value ? "" : text.name, {{text.edit, text.value}}});
+}
+
 void change_states(Editor& editor, bool live) {
     const EditSnapshot& now = editor.snapshot();
     const bool any = now.selected > 0;
-    if (live) {
-        const int clicked =
-            ui::button_line({{say::kDelete, any, ui::ButtonLook::danger}, {say::kFreeze, any}});
-        if (clicked == 0) editor.perform({say::kDelete.name, {{"delete", ""}}});
-        if (clicked == 1) editor.perform({say::kFreeze.name, {{"lock", ""}}});
-        return;
-    }
-    switch (ui::button_line({{say::kLock, any}, {say::kUnlock, now.locked > 0}})) {
-        case 0:
-            editor.perform({say::kLock.name, {{"lock", ""}}});
-            break;
-        case 1:
-            editor.perform({say::kUnlock.name, {{"unlock", ""}}});
-            break;
-    }
-    switch (ui::button_line({{say::kHide, any}, {say::kShow, now.hidden > 0}})) {
-        case 0:
-            editor.perform({say::kHide.name, {{"hide", ""}}});
-            break;
-        case 1:
-            editor.perform({say::kShow.name, {{"unhide", ""}}});
-            break;
-    }
-    switch (ui::button_line({{say::kDelete, any, ui::ButtonLook::danger}, {say::kDuplicate, any}})) {
-        case 0:
-            editor.perform({say::kDelete.name, {{"delete", ""}}});
-            break;
-        case 1:
-            editor.perform({say::kDuplicate.name, {{"duplicate", ""}}});
-            break;
-    }
+    if (live) return edit_line(editor, {{say::kDelete, any, ui::ButtonLook::danger}, {say::kFreeze, any}});
+    edit_line(editor, {{say::kLock, any}, {say::kUnlock, now.locked > 0}});
+    edit_line(editor, {{say::kHide, any}, {say::kShow, now.hidden > 0}});
+    edit_line(editor, {{say::kDelete, any, ui::ButtonLook::danger}, {say::kDuplicate, any}});
     switch (ui::button_line({{say::kSeparate, any}, {say::kReset, any}})) {
         case 0:
             editor.separate();
             break;
         case 1:
-            editor.perform({say::kReset.name, {{"reset", ""}}});
+            editor.perform({say::kReset.name, {{say::kReset.edit, ""}}});
             break;
     }
 }
@@ -97,17 +78,7 @@ void SelectionSection::draw(Editor& editor, bool live) {
     EditSettings& settings = editor.settings;
     ImGui::PushID("selection");
     ImGui::TextWrapped("%s", count_text(editor.snapshot()).c_str());
-    switch (ui::button_line({{say::kAll}, {say::kNone, editor.snapshot().selected > 0}, {say::kInvert}})) {
-        case 0:
-            editor.perform({say::kSelectAll, {{"select", "all"}}});
-            break;
-        case 1:
-            editor.perform({say::kSelectNone, {{"select", "none"}}});
-            break;
-        case 2:
-            editor.perform({say::kSelectOthers, {{"select", "invert"}}});
-            break;
-    }
+    edit_line(editor, {{say::kAll}, {say::kNone, editor.snapshot().selected > 0}, {say::kInvert}});
     int operation = int(settings.operation);
     if (ui::segments(say::kOperations, operation)) settings.operation = edit::Operation(operation);
     ui::checkbox(say::kFront, settings.front);
@@ -183,14 +154,8 @@ void SelectionSection::draw_growth(Editor& editor) {
     ui::number(say::kDistance, distance_);
     const bool possible = now.selected > 0 && distance_ > 0 && std::isfinite(distance_);
     const std::string value = fmt::format("{:.9g}", distance_);
-    switch (ui::button_line({{say::kGrow, possible}, {say::kShrink, possible}})) {
-        case 0:
-            editor.perform({say::kGrowTitle, {{"select", "grow=" + value}}});
-            break;
-        case 1:
-            editor.perform({say::kShrinkTitle, {{"select", "shrink=" + value}}});
-            break;
-    }
+    const int clicked = ui::button_line({{say::kGrow, possible}, {say::kShrink, possible}});
+    if (clicked >= 0) editor.perform({"", {{"select", (clicked == 0 ? "grow=" : "shrink=") + value}}});
 }
 
 }  // namespace ewa::viewer

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The English texts of the editor, in one place. A translation replaces this file.
 #pragma once
+#include <string_view>
+#include <utility>
+
 #include "viewer/editor/editor.h"
 
 namespace ewa::viewer::texts {
@@ -13,7 +16,7 @@ inline constexpr ButtonText kOpenFile{"Open", "Ctrl+O",
                                       "Splats, photos, a video, a dataset or a run; with Shift a folder"};
 inline constexpr ButtonText kSave{"Save", "Ctrl+S", "Shift or a right click: to another file"};
 inline constexpr ButtonText kUndo{"Undo", "Ctrl+Z", "Takes the last edit back"};
-inline constexpr ButtonText kRedo{"Redo", "Ctrl+Shift+Z", "Does again what was undone"};
+inline constexpr ButtonText kRedo{"Redo", "Ctrl+Shift+Z or Ctrl+Y", "Does again what was undone"};
 inline constexpr ButtonText kClean{"Clean", "", "Finds floaters, far, faint and huge splats"};
 inline constexpr ButtonText kFilm{"Film", "", "A flight through the scene as a video"};
 inline constexpr ButtonText kPublish{"Publish", "", "A web page, a small file, or streamed levels"};
@@ -40,7 +43,7 @@ inline constexpr const char* kDropExplanation = "or a dataset, or a training run
 inline constexpr const char *kOpenAFile = "Open a file", *kOpenAFolder = "Open a folder", *kRecent = "Recent",
                             *kKeysLine = "F1: keys";
 
-// Help (F1). The keys of tools are those of kTools.
+// Help (F1). The keys of the editor are those of kTools and kKeyedEdits.
 struct HelpRow {
     const char *keys, *text;
 };
@@ -78,7 +81,8 @@ inline constexpr HelpRow kFilesHelp[] = {
     {"Ctrl + Q", "quit"},
 };
 inline constexpr const char *kMoveGroup = "Move around", *kLookGroup = "Look",
-                            *kFilesGroup = "Views and files", *kToolsGroup = "Edit";
+                            *kFilesGroup = "Views and files", *kToolsGroup = "Tools, in the tab Edit",
+                            *kEditsGroup = "Edits, in the tab Edit";
 
 // The tools.
 struct ToolText {
@@ -106,23 +110,25 @@ inline constexpr ToolText kTools[] = {
 // The panel.
 namespace edit_panel {
 
-/// A control: its name, and its tooltip.
+/// A control: its name, and its tooltip. An edit without a shape also has its keys, as in "Ctrl+D or Ctrl+Shift+A", and its words.
 struct Item {
     const char* name;
-    const char* hint = "";
+    const char *hint = "", *keys = "", *edit = "", *value = "";
+    bool of_selection = false;  // it does nothing without one
 };
 inline constexpr Item kSelection{"Selection", "Which splats the edits below change"},
     kMove{"Move", "Numbers for the selection, or for everything if nothing is selected"},
     kColours{"Colours", "Of the selection, or of everything if nothing is selected"},
     kClean{"Clean", "Finds splats that no scene needs"}, kHistogram{"Histogram", "Select splats by a value"},
-    kScenes{"Scenes", "The files that are open together"},
+    kScenes{"Scenes", "The file, and what Separate has made of it"},
     kHistory{"History", "All edits; a click goes there"};
 inline constexpr const char *kNoScene = "Open splats to edit them.",
                             *kLive = "Edits go to the training: pause it, edit, go on.";
 
 // Selection.
-inline constexpr Item kAll{"All", "Select all splats (Ctrl+A)"},
-    kNone{"None", "Select nothing (Ctrl+Shift+A)"}, kInvert{"Invert", "Select the others (Ctrl+I)"};
+inline constexpr Item kAll{"All", "Select all splats", "Ctrl+A", "select", "all"},
+    kNone{"None", "Select nothing", "Ctrl+D or Ctrl+Shift+A", "select", "none"},
+    kInvert{"Invert", "Select the others", "Ctrl+I", "select", "invert"};
 inline constexpr Item kOperations[] = {{"Set", "A new shape replaces the selection"},
                                        {"Add", "A new shape joins the selection (Shift)"},
                                        {"Remove", "A new shape leaves the selection (Ctrl)"},
@@ -132,33 +138,46 @@ inline constexpr Item kFront{"Front only", "Only splats that others do not cover
     kBrush{"Brush", "Radius of the brush ([ and ])"},
     kTolerance{"Tolerance", "How far colours may differ, for Flood and Eyedropper"},
     kDistance{"Distance", "By how much to grow or shrink, world units"},
-    kGrow{"Grow", "Also select what is within the distance"},
-    kShrink{"Shrink", "Deselect what is within the distance of other splats"};
-inline constexpr Item kLock{"Lock", "The selection is drawn, and no edit changes it"},
-    kUnlock{"Unlock all", "Edits change locked splats again"},
-    kHide{"Hide", "The selection is not drawn (H)"}, kShow{"Show all", "Draw hidden splats again (Shift+H)"},
-    kDelete{"Delete", "Remove the selection (Del). Undo brings it back"},
-    kDuplicate{"Duplicate", "Copy the selection, and select the copy (Ctrl+D)"},
+    kGrow{"Grow",   "Also select what is within the distance; the key takes 1 % of the selection's size",
+          "Ctrl+=", "select",
+          "grow",   true},
+    kShrink{"Shrink",
+            "Deselect what is within the distance of other splats; the key takes 1 % of the selection's size",
+            "Ctrl+-",
+            "select",
+            "shrink",
+            true};
+inline constexpr Item kLock{"Lock", "The selection is drawn, and no edit changes it", "H", "lock", "", true},
+    kUnlock{"Unlock all", "Edits change locked splats again", "Shift+H", "unlock"},
+    kHide{"Hide", "The selection is not drawn", "Ctrl+H", "hide", "", true},
+    kShow{"Show all", "Draw hidden splats again", "Ctrl+Shift+H", "unhide"},
+    kDelete{"Delete", "Remove the selection. Undo brings it back", "Del or Backspace", "delete", "", true},
+    kDuplicate{"Duplicate", "Copy the selection, and select the copy", "", "duplicate", "", true},
     kSeparate{"Separate", "Make the selection a scene of its own"},
-    kReset{"Reset", "Give the selection the values of the file back"},
-    kFreeze{"Freeze", "The training changes the selection no more"};
+    kReset{"Reset", "Give the selection the values of the file back", "", "reset", "", true},
+    kFreeze{"Freeze", "The training changes the selection no more", "", "lock", "", true};
+/// The edits that a key does.
+inline constexpr Item kKeyedEdits[] = {kAll,  kNone,   kInvert, kGrow, kShrink,
+                                       kLock, kUnlock, kHide,   kShow, kDelete};
 // Braces are numbers, as in {fmt}.
 inline constexpr const char *kSelectedOf = "{} of {} splats selected", *kLockedToo = ", {} locked",
                             *kHiddenToo = ", {} hidden";
-inline constexpr const char *kSelectAll = "Select all", *kSelectNone = "Select none",
-                            *kSelectOthers = "Invert the selection", *kGrowTitle = "Grow the selection",
-                            *kShrinkTitle = "Shrink the selection";
 inline constexpr Item kBoxLow{"Low corner of the box", "World units"},
     kBoxHigh{"High corner of the box", "World units"}, kCentre{"Centre of the sphere", "World units"},
     kRadius{"Radius", "World units"}, kCopy{"Copy", "Copy the numbers as text"},
     kPaste{"Paste", "Take the numbers of a text: box=... or sphere=..."},
     kWholeScene{"Whole scene", "Around all splats"}, kAroundSelection{"Selection", "Around the selection"},
-    kSelect{"Select", "Select what is inside (Enter)"}, kCrop{"Crop", "Delete all that is outside"};
+    kSelect{"Select", "Select what is inside", "Enter"}, kCrop{"Crop", "Delete all that is outside"};
+// Titles of steps: how a shape changes the selection, by the prefix of --select, and how it is called.
+inline constexpr std::pair<std::string_view, const char*> kSelectVerbs[] = {
+    {"add:", "Add"}, {"remove:", "Remove"}, {"and:", "Intersect"}};
+inline constexpr const char *kByShape = "{} by {}", *kRectangle = "rectangle";
 
 // Move and colours.
 inline constexpr Item kPosition{"Position of the middle", "World units. Enter applies"},
     kTurn{"Turn about x, y, z", "Degrees, about the middle. Enter applies"},
-    kScale{"Scale", "Factor, about the middle. Enter applies"}, kApply{"Apply", "Make these changes (Enter)"};
+    kScale{"Scale", "Factor, about the middle. Enter applies"},
+    kApply{"Apply", "Make these changes", "Enter"};
 inline constexpr Item kAxes[] = {{"World", "Arrows and rings follow the world's axes"},
                                  {"Local", "Arrows and rings follow the selection's axes"}};
 inline constexpr const char* kWholeSceneTools = "The whole scene: level it, set its unit, choose its origin";
@@ -206,6 +225,7 @@ inline constexpr const char *kNeedsPinhole =
                             *kPolygonViewChanged = "the view has moved; click the corners again",
                             *kNoSurface = "no splat is opaque enough here",
                             *kNeedsColours = "the eyedropper needs a picture of colours",
+                            *kNothingSelected = "nothing is selected",
                             *kNoLevel = "the three points are nearly on a line; click three others",
                             *kShapeSelect = "Select", *kShapeAdd = "Add", *kShapeRemove = "Remove",
                             *kTrueLength = "true length";

@@ -9,29 +9,17 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <iterator>
 
+#include "viewer/editor/edit_words.h"
 #include "viewer/editor/pick_tools.h"
 #include "viewer/editor/select_tools.h"
 #include "viewer/editor/shape_handles.h"
+#include "viewer/editor/texts.h"
 #include "viewer/editor/transform_gizmo.h"
 
 namespace ewa::viewer {
 namespace {
-
-struct ToolKey {
-    int key;
-    bool shift;
-    Tool tool;
-};
-constexpr ToolKey kToolKeys[] = {
-    {GLFW_KEY_R, false, Tool::rectangle},  {GLFW_KEY_L, false, Tool::lasso},
-    {GLFW_KEY_P, false, Tool::polygon},    {GLFW_KEY_B, false, Tool::brush},
-    {GLFW_KEY_N, false, Tool::sphere},     {GLFW_KEY_X, false, Tool::box},
-    {GLFW_KEY_O, false, Tool::flood},      {GLFW_KEY_1, false, Tool::move},
-    {GLFW_KEY_I, false, Tool::eyedropper}, {GLFW_KEY_2, false, Tool::rotate},
-    {GLFW_KEY_3, false, Tool::scale},      {GLFW_KEY_M, false, Tool::measure},
-    {GLFW_KEY_G, false, Tool::level},
-};
 
 constexpr double kGrowShare = 0.01;   // of the selection's size
 constexpr double kFocusMargin = 1.2;  // size of the picture, in sizes of the focused selection
@@ -56,6 +44,13 @@ bool is_key(const KeyPress& press, int key, int keypad) {
     return press.key == key || press.key == keypad;
 }
 
+bool is_key(const KeyPress& press, const char* keys) {
+    const int key = press.key == GLFW_KEY_KP_ADD        ? GLFW_KEY_EQUAL
+                    : press.key == GLFW_KEY_KP_SUBTRACT ? GLFW_KEY_MINUS
+                                                        : press.key;
+    return has_key(keys, key, press.shift, press.control);
+}
+
 }  // namespace
 
 struct Tools::State {
@@ -73,7 +68,8 @@ struct Tools::State {
     bool tool_key(const KeyPress& press);
     bool control_key(const KeyPress& press);
     bool edit_key(const KeyPress& press);
-    void resize(const char* title, const char* name) const;
+    bool step_key(const KeyPress& press) const;
+    void resize(const char* name) const;
     bool focus() const;
 
     const ToolRoom room;
@@ -120,8 +116,8 @@ bool Tools::State::use_mouse(const ToolPicture& picture) {
 
 bool Tools::State::tool_key(const KeyPress& press) {
     EditSettings& settings = room.settings();
-    for (const ToolKey& row : kToolKeys) {
-        if (row.key != press.key || row.shift != press.shift) continue;
+    for (const texts::ToolText& row : texts::kTools) {
+        if (!is_key(press, row.key)) continue;
         const bool off = row.tool == Tool::measure && settings.tool == Tool::measure;
         settings.tool = off ? Tool::view : row.tool;
         return true;
@@ -129,34 +125,36 @@ bool Tools::State::tool_key(const KeyPress& press) {
     return false;
 }
 
-void Tools::State::resize(const char* title, const char* name) const {
+void Tools::State::resize(const char* name) const {
     const auto& bounds = room.editor.snapshot().bounds;
     if (!bounds) return;
     const double size = glm::length((*bounds)[1] - (*bounds)[0]);
-    if (size > 0) room.perform(title, "select", fmt::format("{}={:.9g}", name, kGrowShare * size));
+    if (size > 0) room.perform("", "select", fmt::format("{}={:.9g}", name, kGrowShare * size));
+}
+
+/// The keys of kKeyedEdits.
+bool Tools::State::step_key(const KeyPress& press) const {
+    namespace say = texts::edit_panel;
+    const auto* item =
+        std::ranges::find_if(say::kKeyedEdits, [&](const auto& each) { return is_key(press, each.keys); });
+    if (item == std::end(say::kKeyedEdits)) return false;
+    const std::string_view value = item->value;
+    if (item->of_selection && room.editor.snapshot().selected == 0 && !room.editor.busy())
+        room.state.say(texts::kNothingSelected);
+    else if (value == say::kGrow.value || value == say::kShrink.value)
+        resize(item->value);
+    else
+        room.perform(value.empty() ? item->name : "", item->edit, item->value);
+    return true;
 }
 
 bool Tools::State::control_key(const KeyPress& press) {
-    const int key = press.key;
-    if (key == GLFW_KEY_Y || (key == GLFW_KEY_Z && press.shift)) {
-        room.editor.redo();
-    } else if (key == GLFW_KEY_Z) {
+    if (is_key(press, texts::kUndo.key))
         room.editor.undo();
-    } else if (key == GLFW_KEY_D || (key == GLFW_KEY_A && press.shift)) {
-        room.perform("Select none", "select", "none");
-    } else if (key == GLFW_KEY_A) {
-        room.perform("Select all", "select", "all");
-    } else if (key == GLFW_KEY_I) {
-        room.perform("Invert", "select", "invert");
-    } else if (key == GLFW_KEY_H) {
-        room.perform(press.shift ? "Show" : "Hide", press.shift ? "unhide" : "hide");
-    } else if (is_key(press, GLFW_KEY_EQUAL, GLFW_KEY_KP_ADD)) {
-        resize("Grow", "grow");
-    } else if (is_key(press, GLFW_KEY_MINUS, GLFW_KEY_KP_SUBTRACT)) {
-        resize("Shrink", "shrink");
-    } else {
-        return false;
-    }
+    else if (is_key(press, texts::kRedo.key))
+        room.editor.redo();
+    else
+        return step_key(press);
     return true;
 }
 
@@ -189,16 +187,12 @@ bool Tools::State::edit_key(const KeyPress& press) {
     } else if (is_key(press, GLFW_KEY_ENTER, GLFW_KEY_KP_ENTER)) {
         if (!is_shape(tool())) return false;
         shapes.select(room.operation());
-    } else if (key == GLFW_KEY_DELETE || key == GLFW_KEY_BACKSPACE) {
-        room.perform("Delete", "delete");
-    } else if (key == GLFW_KEY_H) {
-        room.perform(press.shift ? "Unlock" : "Lock", press.shift ? "unlock" : "lock");
     } else if (key == GLFW_KEY_F && !press.shift) {
         return focus();
     } else if (key == GLFW_KEY_LEFT_BRACKET || key == GLFW_KEY_RIGHT_BRACKET) {
         select.change_brush(key == GLFW_KEY_LEFT_BRACKET ? -1 : 1);
     } else {
-        return tool_key(press);
+        return step_key(press) || tool_key(press);
     }
     return true;
 }
