@@ -132,8 +132,8 @@ bool slider(const Text& text, float& value, float low, float high, const char* f
 bool numbers(const Text& text, glm::dvec3& values) {
     label_above(text);
     ImGui::PushID(text.name);
-    const bool changed =
-        ImGui::InputScalarN("##numbers", ImGuiDataType_Double, &values[0], 3, nullptr, nullptr, "%.6g");
+    const bool changed = ImGui::InputScalarN("##numbers", ImGuiDataType_Double, &values[0], 3, nullptr,
+                                             nullptr, "%.6g", ImGuiInputTextFlags_CharsScientific);
     ImGui::PopID();
     return changed;
 }
@@ -141,8 +141,8 @@ bool numbers(const Text& text, glm::dvec3& values) {
 bool number(const Text& text, double& value) {
     label_left(text);
     ImGui::PushID(text.name);
-    const bool changed =
-        ImGui::InputScalar("##number", ImGuiDataType_Double, &value, nullptr, nullptr, "%.6g");
+    const bool changed = ImGui::InputScalar("##number", ImGuiDataType_Double, &value, nullptr, nullptr,
+                                            "%.6g", ImGuiInputTextFlags_CharsScientific);
     ImGui::PopID();
     return changed;
 }
