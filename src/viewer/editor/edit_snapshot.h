@@ -18,7 +18,8 @@ struct EditSnapshot {
     size_t left = 0, selected = 0, locked = 0, hidden = 0;
     /// The bounds of the selection: its lowest and highest corner, world.
     std::optional<std::array<glm::dvec3, 2>> bounds;
-    glm::dvec3 middle{0};  // of the selection: the mean of the means
+    glm::dvec3 middle{
+        0};  // the mean of the means of what a move changes: the selection, or all that can be selected
     std::vector<edit::Step> steps;
     size_t done = 0;
     uint64_t version = 0, values_version = 0, history_bytes = 0;

@@ -139,27 +139,29 @@ std::shared_ptr<const EditSnapshot> EditWorker::snapshot() const {
     result->splats = splats.splats();
     result->states = std::make_shared<const std::vector<uint8_t>>(splats.states());
     result->cameras = splats.cameras();
-    glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low, sum(0);
-    size_t finite = 0;
+    glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low, sum(0), sum_of_all(0);
+    size_t finite = 0, finite_of_all = 0;
     for (size_t i = 0; i < splats.size(); ++i) {
         const uint8_t state = splats.states()[i];
         if ((state & edit::kDeleted) != 0) continue;
         ++result->left;
         result->locked += (state & edit::kLocked) != 0;
         result->hidden += (state & edit::kHidden) != 0;
-        if (!splats.affected(i)) continue;
-        ++result->selected;
+        const bool selected = splats.affected(i);
+        result->selected += selected;
         const glm::dvec3 at = result->splats->world_mean(i);
-        if (!std::isfinite(at.x + at.y + at.z)) continue;
+        if (!splats.selectable(i) || !std::isfinite(at.x + at.y + at.z)) continue;
+        ++finite_of_all;
+        sum_of_all += at;
+        if (!selected) continue;
         ++finite;
         sum += at;
         low = glm::min(low, at);
         high = glm::max(high, at);
     }
-    if (finite > 0) {
-        result->bounds = {low, high};
-        result->middle = sum / double(finite);
-    }
+    if (finite > 0) result->bounds = {low, high};
+    if (result->selected == 0) finite = finite_of_all, sum = sum_of_all;
+    if (finite > 0) result->middle = sum / double(finite);
     result->steps = history.steps();
     result->done = history.done();
     result->version = history.version();

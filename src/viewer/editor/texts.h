@@ -178,6 +178,7 @@ inline constexpr Item kPosition{"Position of the middle", "World units. Enter ap
     kTurn{"Turn about x, y, z", "Degrees, about the middle. Enter applies"},
     kScale{"Scale", "Factor, about the middle. Enter applies"},
     kApply{"Apply", "Make these changes", "Enter"};
+inline constexpr const char* kRotate = "Rotate";
 inline constexpr Item kAxes[] = {{"World", "Arrows and rings follow the world's axes"},
                                  {"Local", "Arrows and rings follow the selection's axes"}};
 inline constexpr const char* kWholeSceneTools = "The whole scene: level it, set its unit, choose its origin";

@@ -29,13 +29,7 @@ std::optional<glm::dvec3> TransformGizmo::center() {
     const EditSnapshot& snapshot = room_.editor.snapshot();
     if (!snapshot.splats || snapshot.left == 0) return std::nullopt;
     if (awaited_ && (awaited_->version != snapshot.version || !room_.editor.busy())) awaited_.reset();
-    if (awaited_) return awaited_->center;
-    if (snapshot.selected > 0) return snapshot.middle;
-    if (measured_ != snapshot.splats) {
-        measured_ = snapshot.splats;
-        middle_ = scene_bounds(*measured_).center;
-    }
-    return middle_;
+    return awaited_ ? awaited_->center : snapshot.middle;
 }
 
 double TransformGizmo::size(const ToolPicture& picture, const glm::dvec3& center) const {

@@ -52,8 +52,6 @@ class TransformGizmo {
         glm::dvec3 center;
     };
     std::optional<Awaited> awaited_;
-    std::shared_ptr<const Gaussians> measured_;  // the splats whose middle is `middle_`
-    glm::dvec3 middle_{0};
 };
 
 }  // namespace ewa::viewer

@@ -30,6 +30,13 @@ void choose_scene_tool(EditSettings& settings) {
     if (const int clicked = ui::button_line(buttons); clicked >= 0) settings.tool = tools[size_t(clicked)];
 }
 
+/// As of the gizmo that does the same.
+const char* title_of(const Placement& placement, const glm::dvec3& about) {
+    const bool turns = placement.degrees != glm::dvec3(0), scales = placement.scale != 1;
+    if (placement.position != about || turns == scales) return say::kMove.name;
+    return turns ? say::kRotate : say::kScale.name;
+}
+
 }  // namespace
 
 void MoveSection::draw(Editor& editor) {
@@ -48,11 +55,14 @@ void MoveSection::draw(Editor& editor) {
     ui::number(say::kScale, placement_.scale);
     apply = ui::entered() || apply;
     const auto finite = [](const glm::dvec3& v) { return std::isfinite(v.x + v.y + v.z); };
-    const bool valid = placement_.scale > 0 && std::isfinite(placement_.scale) &&
+    // A selection that is being made must not be taken for none.
+    const bool clear = now.selected > 0 || !editor.busy();
+    const bool valid = clear && placement_.scale > 0 && std::isfinite(placement_.scale) &&
                        finite(placement_.position) && finite(placement_.degrees);
     const std::string text = valid ? placement_text(now.middle, placement_) : "";
     apply = ui::button_line({{say::kApply, !text.empty()}}) == 0 || apply;
-    if (apply && !text.empty()) perform_on_selection(editor, say::kMove.name, {{"transform", text}});
+    if (apply && !text.empty())
+        perform_on_selection(editor, title_of(placement_, now.middle), {{"transform", text}});
     ImGui::TextWrapped("%s", say::kWholeSceneTools);
     choose_scene_tool(editor.settings);
     ImGui::PopID();
