@@ -91,6 +91,10 @@ std::string grouped(uint64_t number) {
     return text;
 }
 
+std::string grouped(uint64_t number, std::string_view noun) {
+    return grouped(number) + " " + std::string(noun) + (number == 1 ? "" : "s");
+}
+
 InputError wrong_length(std::string_view array, uint64_t values, std::string_view who_needs,
                         uint64_t needed) {
     return InputError(std::string(array) + " has " + grouped(values) +

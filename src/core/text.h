@@ -32,6 +32,8 @@ std::string lower(std::string_view text);
 
 /// The number with commas: "40,715".
 std::string grouped(uint64_t number);
+/// "1 splat", "40,715 splats".
+std::string grouped(uint64_t number, std::string_view noun);
 
 /// The error for a caller's array of a wrong length: "means has 3 values; 40,715 splats need 122,145".
 InputError wrong_length(std::string_view array, uint64_t values, std::string_view who_needs, uint64_t needed);

@@ -75,7 +75,7 @@ void check(const Gaussians& gaussians) {
         if (fitting(a.size / a.each) > fitting(splats)) splats = a.size / a.each;
     const auto wrong =
         *std::ranges::find_if(arrays, [&](const Array& a) { return a.size != a.each * splats; });
-    std::string whose = core::grouped(splats) + (splats == 1 ? " splat" : " splats");
+    std::string whose = core::grouped(splats, "splat");
     if (wrong.name == std::string_view("sh")) whose += " of sh_degree " + std::to_string(gaussians.sh_degree);
     throw core::wrong_length(wrong.name, wrong.size, whose + (splats == 1 ? " needs" : " need"),
                              wrong.each * splats);
@@ -100,7 +100,7 @@ void set_world_means(Gaussians& gaussians, const std::vector<glm::dvec3>& positi
     check(gaussians);
     if (positions.size() != gaussians.size())
         throw InputError(core::grouped(positions.size()) + " positions for " +
-                         core::grouped(gaussians.size()) + " splats");
+                         core::grouped(gaussians.size(), "splat"));
     gaussians.origin = origin_for(positions);
     gaussians.means.resize(3 * positions.size());
     for (size_t i = 0; i < positions.size(); ++i)

@@ -12,7 +12,6 @@
 #include <string>
 
 #include "core/text.h"
-#include "core/typing.h"
 #include "viewer/editor/texts.h"
 #include "viewer/editor/theme.h"
 
@@ -33,7 +32,7 @@ const std::array kAxes{Axis{"-y", {0, -1, 0}}, Axis{"+y", {0, 1, 0}}, Axis{"+z",
 void show_title(const PanelFacts& facts) {
     ImGui::TextUnformatted(facts.scene.title.c_str());
     const char* what = facts.scene.points ? "point" : "splat";
-    std::string text = core::counted(facts.scene.gaussians->size(), what);
+    std::string text = core::grouped(facts.scene.gaussians->size(), what);
     if (facts.picture && facts.picture->skipped_nonfinite > 0)
         text += ", " + core::grouped(facts.picture->skipped_nonfinite) + " not finite";
     ImGui::TextDisabled("%s", text.c_str());
@@ -176,7 +175,7 @@ void show_details(const PanelFacts& facts, PanelSettings& settings, PanelActions
     if (facts.picture) {
         const RenderedFrame& shown = *facts.picture;
         ImGui::TextDisabled(
-            "%s visible", core::counted(shown.splats_drawn, facts.scene.points ? "point" : "splat").c_str());
+            "%s visible", core::grouped(shown.splats_drawn, facts.scene.points ? "point" : "splat").c_str());
         ImGui::TextDisabled("%d x %d px in %.1f ms%s", shown.picture.width, shown.picture.height,
                             shown.milliseconds, facts.drawing ? "  ..." : "");
     }

@@ -95,6 +95,8 @@ TEST(Lengths, ErrorsNameArrayAndNeed) {
     EXPECT_EQ(core::grouped(999), "999");
     EXPECT_EQ(core::grouped(1000), "1,000");
     EXPECT_EQ(core::grouped(12345678), "12,345,678");
+    EXPECT_EQ(core::grouped(1, "splat"), "1 splat");
+    EXPECT_EQ(core::grouped(1000, "splat"), "1,000 splats");
 }
 
 TEST(Lengths, IndicesAndDegreesAreChecked) {

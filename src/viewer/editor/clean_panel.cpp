@@ -33,7 +33,8 @@ float large_scale(const Gaussians& splats) {
 
 /// "1,234 splats (0.12 %)".
 std::string part_text(size_t count, size_t of) {
-    return fmt::format(say::kPart, core::grouped(count), of > 0 ? 100.0 * double(count) / double(of) : 0.0);
+    return fmt::format(say::kPart, core::grouped(count, "splat"),
+                       of > 0 ? 100.0 * double(count) / double(of) : 0.0);
 }
 
 }  // namespace

@@ -18,13 +18,6 @@ namespace {
 constexpr float kThinnestBrush = 2, kThickestBrush = 500;  // px
 constexpr double kFirstDistance = 0.01;                    // of the selection's diagonal
 
-std::string count_text(const EditSnapshot& now) {
-    std::string text = fmt::format(say::kSelectedOf, core::grouped(now.selected), core::grouped(now.left));
-    if (now.locked > 0) text += fmt::format(say::kLockedToo, core::grouped(now.locked));
-    if (now.hidden > 0) text += fmt::format(say::kHiddenToo, core::grouped(now.hidden));
-    return text;
-}
-
 /// The lowest and the highest corner of the splats that are not deleted.
 std::array<glm::dvec3, 2> bounds_of(const Gaussians& splats, const std::vector<uint8_t>* states) {
     constexpr float kLargest = std::numeric_limits<float>::max();
@@ -77,8 +70,13 @@ void change_states(Editor& editor, bool live) {
 void SelectionSection::draw(Editor& editor, bool live) {
     EditSettings& settings = editor.settings;
     ImGui::PushID("selection");
-    ImGui::TextWrapped("%s", count_text(editor.snapshot()).c_str());
-    edit_line(editor, {{say::kAll}, {say::kNone, editor.snapshot().selected > 0}, {say::kInvert}});
+    const EditSnapshot& now = editor.snapshot();
+    // Always two lines, so that the buttons below stay where they are.
+    using core::grouped;
+    ImGui::Text("%s", fmt::format(say::kSelectedOf, grouped(now.selected), grouped(now.left)).c_str());
+    ImGui::TextDisabled("%s",
+                        fmt::format(say::kLockedAndHidden, grouped(now.locked), grouped(now.hidden)).c_str());
+    edit_line(editor, {{say::kAll}, {say::kNone, now.selected > 0}, {say::kInvert}});
     int operation = int(settings.operation);
     if (ui::segments(say::kOperations, operation)) settings.operation = edit::Operation(operation);
     ui::checkbox(say::kFront, settings.front);

@@ -160,8 +160,7 @@ inline constexpr Item kLock{"Lock", "The selection is drawn, and no edit changes
 inline constexpr Item kKeyedEdits[] = {kAll,  kNone,   kInvert, kGrow, kShrink,
                                        kLock, kUnlock, kHide,   kShow, kDelete};
 // Braces are numbers, as in {fmt}.
-inline constexpr const char *kSelectedOf = "{} of {} splats selected", *kLockedToo = ", {} locked",
-                            *kHiddenToo = ", {} hidden";
+inline constexpr const char *kSelectedOf = "{} of {} selected", *kLockedAndHidden = "{} locked, {} hidden";
 inline constexpr Item kBoxLow{"Low corner of the box", "World units"},
     kBoxHigh{"High corner of the box", "World units"}, kCentre{"Centre of the sphere", "World units"},
     kRadius{"Radius", "World units"}, kCopy{"Copy", "Copy the numbers as text"},
@@ -196,7 +195,7 @@ inline constexpr Item kFloaters{"Floaters", "Groups of fewer than 10 splats that
     kFewViews{"Seen by fewer than", "Splats that fewer photos than this see"},
     kFaint{"Almost transparent", "Splats with an opacity below this"},
     kLarge{"Too large", "Splats with a larger standard deviation than this, world units"};
-inline constexpr const char *kWouldRemove = "would remove", *kPart = "{} splats ({:.2g} %)",
+inline constexpr const char *kWouldRemove = "would remove", *kPart = "{} ({:.2g} %)",
                             *kFinding = "looking ...", *kNothingFound = "nothing to remove";
 
 inline constexpr const char *kRemoveFloaters = "Remove floaters", *kRemoveFar = "Remove far clusters",
