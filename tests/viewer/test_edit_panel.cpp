@@ -11,6 +11,7 @@
 #include "edit/shapes.h"
 #include "edit/steps.h"
 #include "ewa/error.h"
+#include "support/soon.h"
 #include "viewer/editor/edit_words.h"
 #include "viewer/editor/histogram.h"
 #include "viewer/editor/texts.h"
@@ -222,6 +223,63 @@ TEST(SelectionTitle, SaysHowWhichShapeSelects) {
               "Select by rectangle");
     EXPECT_EQ(selection_title("add:" + edit::polygon_shape(camera, {{1, 2}, {30, 2}, {30, 40}, {2, 40}})),
               "Add by polygon");
+}
+
+TEST(EditNews, SaysWhatWasDoneAndWithHowManySplats) {
+    EditSnapshot first;
+    first.left = 10'000;
+    EditSnapshot selected = first;
+    selected.steps = {{"Select by box", {{"select", "box=0,0,0,1,1,1"}}}};
+    selected.done = 1;
+    selected.selected = 7163;
+    selected.milliseconds = 2.4;
+    EXPECT_EQ(edit_news(first, selected), "Select by box, 7,163 splats, 2 ms");
+    EditSnapshot deleted = selected;
+    deleted.steps.push_back({"Delete", {{"delete", ""}}});
+    deleted.done = 2;
+    deleted.left = 2837;
+    deleted.selected = 0;
+    deleted.values_version = 1;
+    EXPECT_EQ(edit_news(selected, deleted), "Delete, 7,163 splats, 2 ms");
+    EditSnapshot undone = selected;
+    undone.steps = deleted.steps;
+    EXPECT_EQ(edit_news(deleted, undone), "Undone: Delete, 7,163 splats, 2 ms");
+    EXPECT_EQ(edit_news(undone, deleted), "Redone: Delete, 7,163 splats, 2 ms");
+    EditSnapshot opened = first;
+    opened.steps = deleted.steps;
+    EXPECT_EQ(edit_news(deleted, opened), "Undone: 2 edits, 7,163 splats, 0 ms");
+    // Another edit in place of an undone one.
+    EditSnapshot hidden = selected;
+    hidden.steps.push_back({"Hide", {{"hide", ""}}});
+    hidden.done = 2;
+    hidden.selected = 0;
+    hidden.hidden = 7163;
+    EXPECT_EQ(edit_news(undone, hidden), "Hide, 7,163 splats, 2 ms");
+    EXPECT_EQ(edit_news(deleted, first), "") << "another scene";
+}
+
+TEST(EditSnapshot, TheMiddleIsThatOfWhatAMoveChanges) {
+    auto splats = std::make_shared<Gaussians>();
+    splats->resize(4);
+    for (size_t i = 0; i < 4; ++i) {
+        splats->means[3 * i] = std::array{1.0f, 2.0f, 3.0f, 10.0f}[i];
+        splats->quaternions[4 * i] = 1;
+    }
+    constexpr size_t kBudget = 1000;
+    Editor editor(
+        {}, [] {}, kBudget);
+    editor.enter("scene", {}, splats, {}, false);
+    const auto middle = [&] {
+        EXPECT_TRUE(test::soon([&] { return !editor.busy(); }));
+        editor.take();
+        return editor.snapshot().middle.x;
+    };
+    EXPECT_EQ(middle(), 4);
+    editor.select("x=9..");
+    EXPECT_EQ(middle(), 10);
+    EXPECT_EQ(editor.snapshot().steps.front().title, "Select by x");
+    editor.perform({"Lock", {{"lock", ""}}});
+    EXPECT_EQ(middle(), 2) << "a move leaves what is locked";
 }
 
 TEST(PlacementText, MovesTurnsAndScalesAboutThePoint) {

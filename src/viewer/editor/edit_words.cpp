@@ -10,6 +10,7 @@
 #include <iterator>
 #include <utility>
 
+#include "core/text.h"
 #include "core/typing.h"
 #include "edit/steps.h"
 #include "viewer/editor/texts.h"
@@ -60,6 +61,25 @@ std::string selection_title(std::string_view shape) {
     if (name == shape) return fmt::format("{} {}", verb, name);
     const bool rectangle = name == "polygon" && is_rectangle(shape.substr(name.size() + 1));
     return fmt::format(say::kByShape, verb, rectangle ? say::kRectangle : name);
+}
+
+std::string edit_news(const EditSnapshot& before, const EditSnapshot& now) {
+    const bool undone = now.done < before.done;
+    const size_t row = undone ? now.done : now.done - 1, all = now.steps.size();
+    if (row >= all) return "";
+    const bool redone = before.done < std::min(before.steps.size(), now.done) &&
+                        before.steps[before.done] == now.steps[before.done];
+    std::string text = undone ? texts::kUndone : redone ? texts::kRedone : "";
+    const size_t steps = undone ? before.done - now.done : now.done - before.done;
+    text += text.empty() || steps == 1 ? now.steps[row].title : core::grouped(steps, "edit");
+    // What the step has changed; else what is selected, or what a move without a selection takes.
+    size_t splats = now.selected;
+    if (splats == 0 && now.values_version != before.values_version)
+        splats = now.left - now.locked - now.hidden;
+    for (const auto count : {&EditSnapshot::hidden, &EditSnapshot::locked, &EditSnapshot::left})
+        if (now.*count != before.*count)
+            splats = std::max(now.*count, before.*count) - std::min(now.*count, before.*count);
+    return fmt::format("{}, {}, {:.0f} ms", text, core::grouped(splats, "splat"), now.milliseconds);
 }
 
 bool has_key(std::string_view keys, int key, bool shift, bool control) {

@@ -13,6 +13,10 @@ namespace ewa::viewer {
 /// The title of a step of this --select, such as "Add by sphere".
 std::string selection_title(std::string_view shape);
 
+/// What has been done, undone or redone between two snapshots of a scene, such as "Undone: Delete, 7,163 splats, 12 ms". Empty:
+/// nothing that is known.
+std::string edit_news(const EditSnapshot& before, const EditSnapshot& now);
+
 /// Whether `keys`, as in "Ctrl+D or Ctrl+Shift+A", has this key, a number of GLFW, with these modifiers. Shift is free with = and -.
 bool has_key(std::string_view keys, int key, bool shift, bool control);
 

@@ -24,6 +24,7 @@ inline constexpr ButtonText kPicture{"Picture", "F12", "Writes what you see as a
 inline constexpr ButtonText kPanel{"Panel", "F2", "Shows or hides the panel"};
 inline constexpr ButtonText kHelp{"Help", "F1", "All keys"};
 inline constexpr const char *kSaveAs = "Save as ...", *kMore = "More", *kSaving = "saving ...";
+inline constexpr const char *kUndone = "Undone: ", *kRedone = "Redone: ";
 inline constexpr const char *kSelected = "selected", *kWouldBeSelected = "would be selected";
 inline constexpr const char* kEditsTraining = "edits go to the training";
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/text.h"
-#include "core/typing.h"
+#include "viewer/editor/edit_words.h"
 #include "viewer/editor/icons.h"
 #include "viewer/editor/texts.h"
 #include "viewer/editor/theme.h"
@@ -211,29 +211,19 @@ void draw_strip(Editor& editor, const BarArea& area) {
 /// What the last edit did, for some seconds; then the hint of the active tool.
 std::string status_text(const Editor& editor) {
     static struct {
-        uint64_t version = 0;
-        size_t scene = 0, left = 0, selected = 0;
+        EditSnapshot snapshot;
+        size_t scene = 0;
         double until = 0;
         std::string text;
     } last;  // seen in the frame before
     const EditSnapshot& now = editor.snapshot();
-    if (now.version != last.version || editor.active() != last.scene) {
-        const auto change = [](size_t before, size_t after) {
-            return before > after ? before - after : after - before;
-        };
-        const size_t splats =
-            now.left != last.left ? change(last.left, now.left) : change(last.selected, now.selected);
-        const bool known = editor.active() == last.scene && now.done > 0 && now.done <= now.steps.size();
-        last.text.clear();
-        if (known) {
-            last.text = now.steps[now.done - 1].title + ": ";
-            if (splats > 0) last.text += core::counted(splats, "splat") + ", ";
-            last.text += std::to_string(std::lround(now.milliseconds)) + " ms";
-        }
-        last.version = now.version;
+    if (now.version != last.snapshot.version || editor.active() != last.scene) {
+        last.text = editor.active() == last.scene ? edit_news(last.snapshot, now) : "";
+        last.snapshot = now;
+        last.snapshot.splats.reset();
+        last.snapshot.states.reset();
+        last.snapshot.cameras = {};
         last.scene = editor.active();
-        last.left = now.left;
-        last.selected = now.selected;
         last.until = ImGui::GetTime() + kEditShown;
     }
     if (!last.text.empty() && ImGui::GetTime() < last.until) return last.text;
@@ -258,7 +248,7 @@ std::string shortened(std::string text, float width) {
 std::string selection_text(const Editor& editor, const BarFacts& facts) {
     if (editor.saving()) return texts::kSaving;
     if (const auto count = editor.preview_count())
-        return core::counted(*count, "splat") + " " + texts::kWouldBeSelected;
+        return core::grouped(*count, "splat") + " " + texts::kWouldBeSelected;
     if (const size_t selected = editor.snapshot().selected; selected > 0)
         return core::grouped(selected) + " " + texts::kSelected;
     return facts.live ? texts::kEditsTraining : "";
