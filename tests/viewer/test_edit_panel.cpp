@@ -8,6 +8,7 @@
 #include <numeric>
 #include <sstream>
 
+#include "edit/edits.h"
 #include "edit/shapes.h"
 #include "edit/steps.h"
 #include "ewa/error.h"
@@ -161,6 +162,26 @@ TEST(AdjustmentEdits, LeadFromOneAdjustmentToTheOther) {
                 now = adjusted(read(words.value), now);
             }
             for (size_t c = 0; c < 4; ++c) EXPECT_NEAR(now[c], adjusted(to, color)[c], 1e-6);
+        }
+}
+
+TEST(AdjustmentEdits, AreStepsOfAdjustFromAnyPlaceOfTheSliders) {
+    std::vector<Adjustment> all{{}};
+    for (const float brightness : {-0.5f, 0.5f})
+        for (const float contrast : {0.2f, 3.0f})
+            for (const float white : {0.2f, 3.0f})
+                for (const std::array<float, 3>& tint :
+                     {std::array{1.0f, 1.0f, 1.0f}, {0.01f, 0.01f, 0.01f}, {1.0f, 0.01f, 0.5f}})
+                    all.push_back({tint, brightness, contrast, white, 0.01f});
+    for (const Adjustment& from : all)
+        for (const Adjustment& to : all) {
+            std::array<double, 4> now = adjusted(from, {0.9, 0.4, -0.1, 0.3});
+            for (const edit::Words& words : adjustment_edits(from, to)) {
+                EXPECT_NO_THROW(edit::parse(words.name, words.value));
+                now = adjusted(read(words.value), now);
+            }
+            for (size_t c = 0; c < 4; ++c)
+                EXPECT_NEAR(now[c], adjusted(to, {0.9, 0.4, -0.1, 0.3})[c], 1e-3) << adjustment_text(from);
         }
 }
 

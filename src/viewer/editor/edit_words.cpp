@@ -36,6 +36,21 @@ bool is_rectangle(std::string_view text) {
     return at[1] == at[3] && at[2] == at[4] && at[5] == at[7] && at[6] == at[0];
 }
 
+/// The white point that brings all values of linear() into the ranges of --adjust.
+double white_for(double factor, double offset) {
+    constexpr double kMostTint = 1000;
+    return 1 / std::max({1.0, std::abs(offset), factor / kMostTint});
+}
+constexpr double kLeastWhite = 0.01;
+
+/// Multiplies all channels by a factor, then adds the offset.
+edit::Adjustment linear(double factor, double offset) {
+    const double white = white_for(factor, offset);
+    edit::Adjustment result{.brightness = float(offset * white), .white = float(white)};
+    result.tint.fill(float(factor * white));
+    return result;
+}
+
 /// The edits of adjustments that have an effect.
 std::vector<edit::Words> adjust(std::initializer_list<edit::Adjustment> adjustments) {
     std::vector<edit::Words> edits;
@@ -129,16 +144,15 @@ std::vector<edit::Words> adjustment_edits(const edit::Adjustment& from, const ed
         return adjust({change});
     }
     const auto& [red, green, blue] = change.tint;
-    if (red == green && green == blue) {
-        const double factor = double(red) * after.factor / before.factor;
-        change.tint.fill(float(factor));
-        change.brightness = float(after.offset - factor * before.offset);
-        return adjust({change});
+    const double factor = double(red) * after.factor / before.factor;
+    const double offset = after.offset - factor * before.offset;
+    if (red == green && green == blue && white_for(factor, offset) >= kLeastWhite) {
+        edit::Adjustment both = linear(factor, offset);
+        both.opacity = change.opacity;
+        return adjust({both});
     }
     // Offsets would differ between the channels: back to no tone, then to the new one.
-    edit::Adjustment back;
-    back.tint.fill(float(1 / before.factor));
-    back.brightness = float(-before.offset / before.factor);
+    const edit::Adjustment back = linear(1 / before.factor, -before.offset / before.factor);
     change.brightness = to.brightness;
     change.contrast = to.contrast;
     change.white = to.white;
