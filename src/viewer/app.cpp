@@ -219,6 +219,7 @@ void App::panel() {
     };
     std::function<void()> rows = [this] {
         edit_panel_.draw(editor_, live());
+        state_.settings.look.plain = edit_panel_.shows_colours();
         if (edit_panel_.take_redraw()) state_.redraw();
     };
     if (editor_.scenes() == 0) rows = nullptr;
@@ -276,6 +277,7 @@ void App::draw() {
     screen_->gui.begin_frame();
     if (!state_.scripted()) draw_overlays();
     if (!state_.scripted()) draw_editor();
+    state_.settings.look.plain = false;
     if (state_.panel_shown()) panel();
     if (!state_.scripted()) film_.draw();
     if (state_.help) draw_help(state_.help);

@@ -175,7 +175,7 @@ std::shared_ptr<const RenderedFrame> RenderThread::Scene::draw(const RenderReque
     fit_to(look);
     Renderer& renderer = request.coarse && draft_renderer_ ? *draft_renderer_ : *renderer_;
     DrawOptions options{options_of(look), drawing_for(look.mode), double(look.splat_scale)};
-    options.plain_colors = !request.file.empty();
+    options.plain_colors = look.plain || !request.file.empty();
     auto finished = std::make_shared<RenderedFrame>();
     finished->request = request;
     finished->scene = scene;

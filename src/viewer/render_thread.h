@@ -27,6 +27,7 @@ struct Look {
     bool points = false;  // in place of the kernel
     int nearest = RenderOptions().nearest;
     std::shared_ptr<const SkyMap> sky = nullptr;  // in place of the background; null: none
+    bool plain = false;                           // marks hide splats, but do not tint them
     bool operator==(const Look&) const = default;
 };
 

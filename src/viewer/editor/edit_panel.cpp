@@ -16,7 +16,7 @@ struct EditPanel::State {
     ColourSection colours;
     CleanSection clean;
     HistogramSection histogram;
-    bool show_cleaning = false, redraw = false;
+    bool show_cleaning = false, redraw = false, plain = false;
 };
 
 EditPanel::EditPanel() : state_(std::make_unique<State>()) {}
@@ -24,6 +24,10 @@ EditPanel::~EditPanel() = default;
 
 void EditPanel::show_cleaning() {
     state_->show_cleaning = true;
+}
+
+bool EditPanel::shows_colours() const {
+    return state_->plain;
 }
 
 bool EditPanel::take_redraw() {
@@ -37,13 +41,16 @@ void EditPanel::draw(Editor& editor, bool live) {
         part.draw(editor, more...);
         state.redraw = part.waiting() || state.redraw;
     };
-    state.redraw = false;
+    state.redraw = state.plain = false;
     if (!editor.snapshot().splats) return ImGui::TextDisabled("%s", say::kNoScene);
     if (live) ImGui::TextWrapped("%s", say::kLive);
     if (ui::section(say::kSelection, true)) draw(state.selection, live);
     if (live) return state.clean.end(editor);
     if (ui::section(say::kMove, false)) state.move.draw(editor);
-    if (ui::section(say::kColours, false)) draw(state.colours);
+    if (ui::section(say::kColours, false)) {
+        draw(state.colours);
+        state.plain = editor.snapshot().selected > 0 && !editor.preview_count();
+    }
     const bool jump = std::exchange(state.show_cleaning, false);
     const bool clean = ui::section(say::kClean, false, jump);
     if (jump) ImGui::SetScrollHereY(0);

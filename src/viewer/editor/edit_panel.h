@@ -15,6 +15,8 @@ class EditPanel {
     void draw(Editor& editor, bool live);
     /// Opens the section of cleaning.
     void show_cleaning();
+    /// Whether the last draw() has shown the controls of colours, under which a selection is drawn without its tint.
+    bool shows_colours() const;
     /// Whether the last draw() has shown something that changes soon, so that another frame is due. Once for each draw().
     bool take_redraw();
 

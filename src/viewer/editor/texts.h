@@ -182,6 +182,7 @@ inline constexpr const char* kRotate = "Rotate";
 inline constexpr Item kAxes[] = {{"World", "Arrows and rings follow the world's axes"},
                                  {"Local", "Arrows and rings follow the selection's axes"}};
 inline constexpr const char* kWholeSceneTools = "The whole scene: level it, set its unit, choose its origin";
+inline constexpr const char* kPlainColours = "The selection is shown without its tint.";
 inline constexpr Item kTint{"Tint", "Factor of each channel"},
     kBrightness{"Brightness", "Added to all channels"}, kContrast{"Contrast", "Factor about the middle grey"},
     kWhite{"White point", "The value that becomes white"}, kOpacity{"Opacity", "Factor of the opacity"},

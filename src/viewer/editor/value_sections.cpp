@@ -111,6 +111,7 @@ void ColourSection::settle(Editor& editor) {
 void ColourSection::draw(Editor& editor) {
     ImGui::PushID("colours");
     settle(editor);
+    if (editor.snapshot().selected > 0) ImGui::TextDisabled("%s", say::kPlainColours);
     ui::label_left(say::kTint);
     ImGui::ColorEdit3("##tint", shown_.tint.data(), ImGuiColorEditFlags_Float);
     ui::slider(say::kBrightness, shown_.brightness, -0.5f, 0.5f, "%.3f");
