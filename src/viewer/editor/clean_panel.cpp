@@ -56,58 +56,35 @@ void CleanSection::remove(Editor& editor, const char* title, const std::string& 
     editor.perform({title, {{"select", shape}, {"delete", ""}}});
 }
 
-/// One button: shows the floaters, then removes them.
-void CleanSection::draw_main(Editor& editor) {
-    ImGui::PushID("main");
-    const auto count = editor.preview_count();
-    if (rule_ != say::kCleanUp.name) {
-        if (ui::button_line({{say::kCleanUp, true, ui::ButtonLook::chosen}}) == 0) {
-            rule_ = say::kCleanUp.name;
-            preview(editor, kFloatersShape);
-        }
-    } else {
-        const std::string text = !count        ? say::kFinding
-                                 : *count == 0 ? say::kNothingFound
-                                               : fmt::format("{} {}", say::kRemove.name,
-                                                             part_text(*count, editor.snapshot().left));
-        const bool found = count.value_or(0) > 0;
-        switch (
-            ui::button_line({{{text.c_str()}, found, found ? ui::ButtonLook::danger : ui::ButtonLook::plain},
-                             {say::kCancel}})) {
-            case 0:
-                remove(editor, say::kRemoveFloaters, kFloatersShape);
-                break;
-            case 1:
-                end(editor);
-                break;
-        }
-    }
-    ImGui::PopID();
-}
-
-void CleanSection::draw_rule(Editor& editor, const ui::Text& text, const char* title,
-                             const std::string& shape) {
-    const bool shown = rule_ == text.name;
+/// The buttons of a rule. first: one that shows what it takes, and perhaps one that removes it at once. title: of the step.
+void CleanSection::draw_rule(Editor& editor, const ui::Text& text, std::initializer_list<ui::Button> first,
+                             const char* title, const std::string& shape) {
     ImGui::PushID(text.name);
-    switch (ui::button_line(
-        {{say::kPreview, true, shown ? ui::ButtonLook::chosen : ui::ButtonLook::plain}, {say::kRemove}})) {
-        case 0:
-            end(editor);
-            if (shown) break;
+    if (rule_ != text.name) {
+        const int clicked = ui::button_line(first);
+        if (clicked == 0) {
             rule_ = text.name;
             preview(editor, shape);
-            break;
-        case 1:
+        }
+        if (clicked == 1) remove(editor, title, shape);
+        return ImGui::PopID();
+    }
+    // A number is dragged: the preview follows when it rests.
+    if (shape != previewed_ && !ImGui::IsAnyItemActive()) preview(editor, shape);
+    const auto count = editor.preview_count();
+    const std::string remove_text =
+        !count        ? say::kFinding
+        : *count == 0 ? say::kNothingFound
+                      : fmt::format("{} {}", say::kRemove.name, part_text(*count, editor.snapshot().left));
+    const bool found = count.value_or(0) > 0;
+    const auto look = found ? ui::ButtonLook::danger : ui::ButtonLook::plain;
+    switch (ui::button_line({{{remove_text.c_str()}, found, look}, {say::kCancel}})) {
+        case 0:
             remove(editor, title, shape);
             break;
-    }
-    if (shown && rule_ == text.name) {
-        // A number is dragged: the preview follows when it rests.
-        if (shape != previewed_ && !ImGui::IsAnyItemActive()) preview(editor, shape);
-        if (const auto count = editor.preview_count())
-            ImGui::TextWrapped("%s %s", say::kWouldRemove, part_text(*count, editor.snapshot().left).c_str());
-        else
-            ImGui::TextDisabled("%s", say::kFinding);
+        case 1:
+            end(editor);
+            break;
     }
     ImGui::PopID();
 }
@@ -120,23 +97,25 @@ void CleanSection::draw(Editor& editor) {
     scene_ = editor.active();
     if (scale_ == 0) scale_ = large_scale(*now.splats);
     ImGui::PushID("clean");
-    draw_main(editor);
+    const std::initializer_list<ui::Button> first{{say::kPreview}, {say::kRemove}};
+    draw_rule(editor, say::kCleanUp, {{say::kCleanUp, true, ui::ButtonLook::chosen}}, say::kRemoveFloaters,
+              kFloatersShape);
     ui::label_left(say::kFloaters);
-    draw_rule(editor, say::kFloaters, say::kRemoveFloaters, kFloatersShape);
+    draw_rule(editor, say::kFloaters, first, say::kRemoveFloaters, kFloatersShape);
     ui::label_left(say::kFar);
-    draw_rule(editor, say::kFar, say::kRemoveFar, "far");
+    draw_rule(editor, say::kFar, first, say::kRemoveFar, "far");
     if (cameras_of(editor)) {
         ui::label_left(say::kFewViews);
         ImGui::SliderInt("##views", &views_, 1, 20, "%d", ImGuiSliderFlags_AlwaysClamp);
-        draw_rule(editor, say::kFewViews, say::kRemoveFewViews,
+        draw_rule(editor, say::kFewViews, first, say::kRemoveFewViews,
                   fmt::format("{}=..{}", edit::kViews, views_ - 1));
     }
     ui::slider(say::kFaint, opacity_, 0.001f, 1, "%.3f", true);
-    draw_rule(editor, say::kFaint, say::kRemoveFaint, fmt::format("opacity=..{}", opacity_));
+    draw_rule(editor, say::kFaint, first, say::kRemoveFaint, fmt::format("opacity=..{}", opacity_));
     ui::label_left(say::kLarge);
     ImGui::InputFloat("##scale", &scale_, 0, 0, "%.4g");
     if (!(scale_ > 0)) scale_ = FLT_MIN;
-    draw_rule(editor, say::kLarge, say::kRemoveLarge, fmt::format("scale={}..", scale_));
+    draw_rule(editor, say::kLarge, first, say::kRemoveLarge, fmt::format("scale={}..", scale_));
     ImGui::PopID();
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <future>
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,6 +14,7 @@
 #include "viewer/editor/edit_words.h"
 #include "viewer/editor/editor.h"
 #include "viewer/editor/histogram.h"
+#include "viewer/editor/panel_controls.h"
 #include "viewer/latest.h"
 
 namespace ewa::viewer {
@@ -68,9 +70,8 @@ class CleanSection {
     void end(Editor& editor);
 
   private:
-    void draw_rule(Editor& editor, const texts::edit_panel::Item& text, const char* title,
-                   const std::string& shape);
-    void draw_main(Editor& editor);
+    void draw_rule(Editor& editor, const ui::Text& text, std::initializer_list<ui::Button> first,
+                   const char* title, const std::string& shape);
     void preview(Editor& editor, const std::string& shape);
     void remove(Editor& editor, const char* title, const std::string& shape);
     std::string previewed_;  // a shape of edit/shapes.h; empty: none

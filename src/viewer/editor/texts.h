@@ -197,8 +197,8 @@ inline constexpr Item kFloaters{"Floaters", "Groups of fewer than 10 splats that
     kFewViews{"Seen by fewer than", "Splats that fewer photos than this see"},
     kFaint{"Almost transparent", "Splats with an opacity below this"},
     kLarge{"Too large", "Splats with a larger standard deviation than this, world units"};
-inline constexpr const char *kWouldRemove = "would remove", *kPart = "{} ({:.2g} %)",
-                            *kFinding = "looking ...", *kNothingFound = "nothing to remove";
+inline constexpr const char *kPart = "{} ({:.2g} %)", *kFinding = "looking ...",
+                            *kNothingFound = "nothing to remove";
 
 inline constexpr const char *kRemoveFloaters = "Remove floaters", *kRemoveFar = "Remove far clusters",
                             *kRemoveFewViews = "Remove rarely seen splats",
