@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "core/text.h"
+#include "viewer/editor/panel_controls.h"
 #include "viewer/editor/theme.h"
 
 namespace ewa::viewer {
@@ -106,12 +107,6 @@ constexpr std::array<std::string_view, size_t(Icon::drop) + 1> kShapes{
     // eye_off: closed, with lashes
     "M 2.6 9.5 B 5 13.6 8.2 15.6 12 15.6 B 15.8 15.6 19 13.6 21.4 9.5 M 12 15.6 L 12 19 M 7.2 14.5 L 5.6 "
     "17.4 M 16.8 14.5 L 18.4 17.4",
-    // play
-    "M 7 4.4 L 19.6 12 L 7 19.6 Z",
-    // stop
-    "M 5.6 5.6 L 18.4 5.6 L 18.4 18.4 L 5.6 18.4 Z",
-    // key: a diamond
-    "M 12 4 L 20 12 L 12 20 L 4 12 Z",
     // more
     "D 5.5 12 1.7 D 12 12 1.7 D 18.5 12 1.7",
     // drop: into a tray
@@ -174,16 +169,6 @@ class Pen {
     std::string_view words_;
 };
 
-void show_tooltip(const std::string& text) {
-    const size_t end = std::min(text.find('\n'), text.size());
-    ImGui::BeginTooltip();
-    ImGui::PushTextWrapPos(20 * ImGui::GetTextLineHeight());
-    ImGui::TextUnformatted(text.c_str(), text.c_str() + end);
-    if (end + 1 < text.size()) ImGui::TextDisabled("%s", text.c_str() + end + 1);
-    ImGui::PopTextWrapPos();
-    ImGui::EndTooltip();
-}
-
 }  // namespace
 
 void draw_icon(Icon icon, const ImVec2& center, float size, unsigned color) {
@@ -206,8 +191,7 @@ bool icon_button(Icon icon, const char* tooltip, bool active, bool enabled, floa
               active ? ImGui::GetColorU32(accent()) : ImGui::GetColorU32(ImGuiCol_Text));
     ImGui::EndDisabled();
     ImGui::PopID();
-    if (tooltip && *tooltip && ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled))
-        show_tooltip(tooltip);
+    ui::show_hint(tooltip);
     return clicked && enabled;
 }
 

@@ -1,29 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // The icons of the window. They are lines in a grid of 24 units, so that they are sharp in any size.
 #pragma once
+#include "viewer/editor/editor.h"
 
 struct ImVec2;
 
 namespace ewa::viewer {
 
-/// The first ones are those of Tool, in its order.
+/// Those of the tools are before these: Icon(tool).
 enum class Icon {
-    view,
-    rectangle,
-    lasso,
-    polygon,
-    brush,
-    sphere,
-    box,
-    flood,
-    eyedropper,
-    move,
-    rotate,
-    scale,
-    measure,
-    level,
-    origin,
-    open,
+    open = int(Tool::origin) + 1,
     save,
     undo,
     redo,
@@ -35,9 +21,6 @@ enum class Icon {
     panel,
     eye,
     eye_off,
-    play,
-    stop,
-    key,
     more,
     drop
 };
@@ -47,7 +30,7 @@ void draw_icon(Icon icon, const ImVec2& center, float size, unsigned color);
 
 /// A flat square button in the present line. Returns whether it is clicked. The icon is its ID: two buttons with one icon need
 /// another ImGui::PushID.
-/// tooltip: the first line is the brighter one, as in "Undo (Ctrl+Z)\nTakes the last edit back"; null: none.
+/// tooltip: the first line is the brighter one, as in "Undo (Ctrl+Z)\nTakes the last edit back".
 /// active: the button stays lit. side: of the square; 0: the usual one.
 bool icon_button(Icon icon, const char* tooltip, bool active, bool enabled, float side = 0);
 

@@ -13,7 +13,8 @@
 namespace ewa::viewer::ui {
 namespace {
 
-constexpr float kLabelWidth = 5.5f, kHintWidth = 18;  // heights of the text
+constexpr float kLabelWidth = 5.5f, kHintWidth = 20;  // heights of the text
+constexpr double kHintPause = 0.7;                    // s after a click, without hints
 constexpr float kChosenOpacity = 0.35f;               // of the accent behind a chosen button
 
 /// A colour of the style in red, as light as it was.
@@ -40,10 +41,17 @@ void push_look(ButtonLook look) {
 }  // namespace
 
 void show_hint(const char* hint, const char* keys) {
-    if (!*hint || !ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) return;
+    static double held = -1;  // when the mouse was held last: a hint must not cover what it has changed
+    if (ImGui::IsMouseDown(ImGuiMouseButton_Left)) held = ImGui::GetTime();
+    const bool rests = held < 0 || ImGui::GetTime() > held + kHintPause;
+    if (!rests || !*hint || !ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) return;
+    const std::string text = hint;
+    const size_t end = std::min(text.find('\n'), text.size());
+    const std::string first = text.substr(0, end) + (*keys ? std::string(" (") + keys + ")" : "");
     ImGui::BeginTooltip();
     ImGui::PushTextWrapPos(kHintWidth * ImGui::GetTextLineHeight());
-    ImGui::TextUnformatted((hint + (*keys ? std::string(" (") + keys + ")" : "")).c_str());
+    ImGui::TextUnformatted(first.c_str());
+    if (end < text.size()) ImGui::TextDisabled("%s", text.c_str() + end + 1);
     ImGui::PopTextWrapPos();
     ImGui::EndTooltip();
 }

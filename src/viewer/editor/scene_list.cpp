@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "core/text.h"
+#include "viewer/editor/icons.h"
 #include "viewer/editor/panel_controls.h"
 #include "viewer/editor/panel_sections.h"
 #include "viewer/editor/theme.h"
@@ -15,28 +16,6 @@ namespace {
 
 constexpr size_t kMostRows = 10;          // of the history, without scrolling
 constexpr size_t kMostHintLetters = 300;  // of a step's words
-
-/// A button with an eye, crossed out for a scene that is not shown.
-bool eye_button(bool open) {
-    const float side = ImGui::GetFrameHeight();
-    const bool clicked = ImGui::InvisibleButton("eye", ImVec2(side, side));
-    const ImVec2 low = ImGui::GetItemRectMin();
-    const ImVec2 middle(low.x + 0.5f * side, low.y + 0.5f * side);
-    const ImU32 color = ImGui::GetColorU32(open ? ImGuiCol_Text : ImGuiCol_TextDisabled);
-    const float line = std::max(1.0f, 0.07f * side);
-    ImDrawList& list = *ImGui::GetWindowDrawList();
-    for (const float lid : {-0.42f, 0.42f})
-        list.AddBezierQuadratic(ImVec2(middle.x - 0.38f * side, middle.y),
-                                ImVec2(middle.x, middle.y + lid * side),
-                                ImVec2(middle.x + 0.38f * side, middle.y), color, line);
-    if (open)
-        list.AddCircleFilled(middle, 0.1f * side, color);
-    else
-        list.AddLine(ImVec2(middle.x - 0.25f * side, middle.y + 0.25f * side),
-                     ImVec2(middle.x + 0.25f * side, middle.y - 0.25f * side), color, line);
-    ui::show_hint(say::kShowScene);
-    return clicked;
-}
 
 /// Returns whether the scene is to be closed.
 bool close_button(bool unsaved) {
@@ -96,7 +75,8 @@ void draw_scenes(Editor& editor) {
         const EditedScene& scene = editor.scene(i);
         const float side = ImGui::GetFrameHeight(), gap = ImGui::GetStyle().ItemSpacing.x;
         ImGui::PushID(int(i));
-        if (eye_button(scene.shown)) editor.show(i, !scene.shown);
+        const Icon eye = scene.shown ? Icon::eye : Icon::eye_off;
+        if (icon_button(eye, say::kShowScene, false, true, side)) editor.show(i, !scene.shown);
         ImGui::SameLine();
         ImGui::PushStyleVar(ImGuiStyleVar_SelectableTextAlign, ImVec2(0, 0.5f));
         const float width = std::max(side, ImGui::GetContentRegionAvail().x - 2 * (side + gap));
