@@ -291,8 +291,9 @@ void label_field(const char* label) {
     ImGui::SetNextItemWidth(-FLT_MIN);
 }
 
-bool draw_section(const char* name, bool open) {
+bool draw_section(const char* name, bool open, bool open_now) {
     ImGui::Separator();
+    if (open_now) ImGui::SetNextItemOpen(true);
     ImGui::PushStyleColor(ImGuiCol_Header, ImU32(0));
     const bool shown = ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : 0);
     ImGui::PopStyleColor();

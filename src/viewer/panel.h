@@ -76,8 +76,8 @@ void draw_training(const PanelFacts& facts, PanelSettings& settings, PanelAction
 
 /// Draws a label. The next item gets the rest of the line.
 void label_field(const char* label);
-/// Draws the heading of a section that folds. open: whether it is open at first. Returns whether it is open.
-bool draw_section(const char* name, bool open);
+/// Draws the heading of a section that folds. open: whether it is open at first. open_now: opens it. Returns whether it is open.
+bool draw_section(const char* name, bool open, bool open_now = false);
 /// The number of lines of text that wraps at the border of the window; not more than `most`.
 int text_lines(const std::string& text, int most);
 /// Draws text that wraps, in a box of `least` to `most` lines. It scrolls if it has more.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "viewer/editor/theme.h"
+#include "viewer/panel.h"
 
 namespace ewa::viewer::ui {
 namespace {
@@ -57,9 +58,7 @@ void show_hint(const char* hint, const char* keys) {
 }
 
 bool section(const Text& text, bool open_at_first, bool open_now) {
-    ImGui::Dummy(ImVec2(0, 0.15f * ImGui::GetTextLineHeight()));
-    if (open_now) ImGui::SetNextItemOpen(true);
-    const bool open = ImGui::CollapsingHeader(text.name, open_at_first ? ImGuiTreeNodeFlags_DefaultOpen : 0);
+    const bool open = draw_section(text.name, open_at_first, open_now);
     if (!open) show_hint(text.hint);
     return open;
 }

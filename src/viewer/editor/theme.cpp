@@ -16,7 +16,7 @@ struct ThemeColor {
 constexpr unsigned kAccentDark = 0xf2a93b, kAccentLight = 0x854a00;
 constexpr unsigned kBackdropDark = 0x17181a, kBackdropLight = 0xd9dbde;
 
-/// Text has a contrast of at least 7 to what lies behind it (WCAG 2).
+/// Text has a contrast of at least 7 to what lies behind it (WCAG 2), but for the number over a knob that moves.
 constexpr ThemeColor kThemeColors[] = {
     {ImGuiCol_Text, 0xecedef, 0x1b1c1e},
     {ImGuiCol_TextDisabled, 0xb9bcc2, 0x484b50},
@@ -39,15 +39,15 @@ constexpr ThemeColor kThemeColors[] = {
     {ImGuiCol_Button, 0x36383d, 0xe1e3e7},
     {ImGuiCol_ButtonHovered, 0x41444a, 0xd5d8dd},
     {ImGuiCol_ButtonActive, 0x4c5057, 0xc8ccd2},
-    {ImGuiCol_Header, 0x36383d, 0xdfe1e5},
+    {ImGuiCol_Header, kAccentDark, kAccentLight, 0.25f},  // the chosen row of a list
     {ImGuiCol_HeaderHovered, 0x3a3c42, 0xe3e5e9},
     {ImGuiCol_HeaderActive, 0x43464c, 0xd6d9de},
     {ImGuiCol_Tab, 0x2a2b2f, 0xe9eaed},
     {ImGuiCol_TabHovered, 0x41444a, 0xd5d8dd},
     {ImGuiCol_TabActive, 0x36383d, 0xffffff},
     {ImGuiCol_CheckMark, kAccentDark, kAccentLight},
-    {ImGuiCol_SliderGrab, 0x8d9199, 0x868b93},
-    {ImGuiCol_SliderGrabActive, kAccentDark, kAccentLight},
+    {ImGuiCol_SliderGrab, 0x8d9199, 0x868b93, 0.3f},  // the number shows through
+    {ImGuiCol_SliderGrabActive, kAccentDark, kAccentLight, 0.3f},
     {ImGuiCol_PlotLines, 0xb9bcc2, 0x484b50},
     {ImGuiCol_PlotLinesHovered, kAccentDark, kAccentLight},
     {ImGuiCol_PlotHistogram, kAccentDark, kAccentLight},

@@ -264,7 +264,7 @@ void FilmStrip::draw_track() {
     const auto chosen = key_at_playhead();
     for (size_t i = 0; i < views().size(); ++i)
         draw_diamond({scale.at(*views()[i].time), middle}, 0.45f * line,
-                     ImGui::GetColorU32(chosen == i ? ImGuiCol_SliderGrabActive : ImGuiCol_SliderGrab));
+                     ImGui::GetColorU32(chosen == i ? ImGuiCol_CheckMark : ImGuiCol_TextDisabled));
     const float x = scale.at(playhead_);
     list.AddLine({x, at.y + line}, {x, bottom}, text, std::max(1.0f, 0.1f * line));
 }

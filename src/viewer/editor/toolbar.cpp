@@ -24,7 +24,7 @@ namespace {
 constexpr double kTopBar = 2.6, kStrip = 2.6, kStatusLine = 1.7;
 constexpr float kButtonSide = 2.1f, kSmall = 0.8f;
 // In sides of a button.
-constexpr float kButtonGap = 0.1f, kGroupGap = 0.3f;
+constexpr float kButtonGap = 0.1f, kGroupGap = 0.3f, kDot = 0.1f;
 constexpr double kEditShown = 6;  // seconds in which the status line shows the last edit
 
 struct BarButton {
@@ -33,6 +33,7 @@ struct BarButton {
     std::function<void()> act;
     bool enabled = true, active = false, apart = false;  // apart: a separator is before it
     std::function<void()> menu = {};                     // of a right click
+    bool dot = false;                                    // there is something to do
 };
 using BarButtons = std::vector<BarButton>;
 
@@ -127,6 +128,9 @@ void draw_buttons(const BarButtons& buttons, const BarFit& fit, ImVec2 at, bool 
         const BarButton& button = buttons[i];
         if (icon_button(button.icon, bar_tooltip(button.text).c_str(), button.active, button.enabled, side))
             button.act();
+        if (button.dot)
+            ImGui::GetWindowDrawList()->AddCircleFilled({at.x + 0.85f * side, at.y + 0.15f * side},
+                                                        kDot * side, accent());
         if (button.menu) button.menu();
         along += side * (1 + kButtonGap);
     }
@@ -153,7 +157,7 @@ BarButtons top_buttons(Editor& editor, const BarFacts& facts, BarActions& action
     const auto save = [&actions] { (ImGui::GetIO().KeyShift ? actions.save_as : actions.save) = true; };
     return {{Icon::open, texts::kOpenFile, setter(actions.open)},
             {Icon::save, texts::kSave, save, can_save, false, false,
-             [&actions, can_save] { choose_save(can_save, actions); }},
+             [&actions, can_save] { choose_save(can_save, actions); }, editor.unsaved()},
             {Icon::undo, texts::kUndo, [&editor] { editor.undo(); }, now.done > 0, false, true},
             {Icon::redo, texts::kRedo, [&editor] { editor.redo(); }, now.done < now.steps.size()},
             {Icon::clean, texts::kClean, setter(actions.clean), splats, false, true},
