@@ -287,7 +287,8 @@ float footer_height(const PanelFacts& facts) {
 void label_field(const char* label) {
     ImGui::AlignTextToFramePadding();
     ImGui::TextUnformatted(label);
-    ImGui::SameLine(kLabelColumn * ImGui::GetTextLineHeight());
+    const float needed = ImGui::CalcTextSize(label).x + ImGui::GetStyle().ItemInnerSpacing.x;
+    ImGui::SameLine(std::max(kLabelColumn * ImGui::GetTextLineHeight(), needed));
     ImGui::SetNextItemWidth(-FLT_MIN);
 }
 

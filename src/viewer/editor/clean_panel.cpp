@@ -104,7 +104,7 @@ void CleanSection::draw(Editor& editor) {
     draw_rule(editor, say::kFloaters, first, say::kRemoveFloaters, kFloatersShape);
     ui::label_left(say::kFar);
     draw_rule(editor, say::kFar, first, say::kRemoveFar, "far");
-    if (cameras_of(editor)) {
+    if (now.cameras) {
         ui::label_left(say::kFewViews);
         ImGui::SliderInt("##views", &views_, 1, 20, "%d", ImGuiSliderFlags_AlwaysClamp);
         draw_rule(editor, say::kFewViews, first, say::kRemoveFewViews,

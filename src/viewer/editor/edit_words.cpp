@@ -65,10 +65,11 @@ std::vector<edit::Words> adjust(std::initializer_list<edit::Adjustment> adjustme
 std::string selection_title(std::string_view shape) {
     namespace say = texts::edit_panel;
     std::string_view verb = say::kSelect.name;
-    for (const auto& [prefix, name] : say::kSelectVerbs) {
-        if (!shape.starts_with(prefix)) continue;
-        shape.remove_prefix(prefix.size());
-        verb = name;
+    constexpr std::string_view kPrefixes[] = {"add:", "remove:", "and:"};
+    for (size_t i = 0; i < std::size(kPrefixes); ++i) {
+        if (!shape.starts_with(kPrefixes[i])) continue;
+        shape.remove_prefix(kPrefixes[i].size());
+        verb = say::kOperations[i + 1].name;
     }
     const std::string_view name = shape.substr(0, shape.find('='));
     for (const say::Item& item : {say::kInvert, say::kGrow, say::kShrink})

@@ -59,7 +59,7 @@ void HistogramSection::ask(Editor& editor, const HistogramColumn& column) {
     const EditSnapshot& now = editor.snapshot();
     if (asked_.splats == now.splats && asked_.states == now.states && asked_.column.name == column.name)
         return;
-    asked_ = {now.splats, now.states, cameras_of(editor), column, asked_.number + 1};
+    asked_ = {now.splats, now.states, editor.snapshot().cameras, column, asked_.number + 1};
     counting_.ask(asked_);
 }
 
@@ -104,7 +104,7 @@ void HistogramSection::draw_bins(Editor& editor, const Histogram& histogram) {
 
 void HistogramSection::draw(Editor& editor) {
     ImGui::PushID("histogram");
-    const std::vector<HistogramColumn> columns = histogram_columns(bool(cameras_of(editor)));
+    const std::vector<HistogramColumn> columns = histogram_columns(bool(editor.snapshot().cameras));
     if (std::ranges::find(columns, column_, &HistogramColumn::name) == columns.end())
         column_ = columns.front().name;
     ui::label_left(say::kColumn);

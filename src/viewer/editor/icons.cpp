@@ -17,7 +17,6 @@ namespace ewa::viewer {
 namespace {
 
 constexpr float kGrid = 24, kStroke = 1.6f;
-constexpr float kUsualSide = 1.3f;   // of a button, in heights of a frame
 constexpr float kIconShare = 0.64f;  // of the button's side
 
 /// In the order of Icon, y down. M x y begins a line, L x y continues straight, B with three points by a Bézier curve, and A x y r
@@ -176,7 +175,6 @@ void draw_icon(Icon icon, const ImVec2& center, float size, unsigned color) {
 }
 
 bool icon_button(Icon icon, const char* tooltip, bool active, bool enabled, float side) {
-    if (side <= 0) side = kUsualSide * ImGui::GetFrameHeight();
     ImGui::PushID(int(icon));
     ImGui::BeginDisabled(!enabled);
     const bool clicked = ImGui::InvisibleButton("button", ImVec2(side, side));

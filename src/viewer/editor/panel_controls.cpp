@@ -14,9 +14,9 @@
 namespace ewa::viewer::ui {
 namespace {
 
-constexpr float kLabelWidth = 5.5f, kHintWidth = 20;  // heights of the text
-constexpr double kHintPause = 0.7;                    // s after a click, without hints
-constexpr float kChosenOpacity = 0.35f;               // of the accent behind a chosen button
+constexpr float kHintWidth = 20;         // heights of the text
+constexpr double kHintPause = 0.7;       // s after a click, without hints
+constexpr float kChosenOpacity = 0.35f;  // of the accent behind a chosen button
 
 /// A colour of the style in red, as light as it was.
 ImVec4 reddish(ImGuiCol color) {
@@ -64,13 +64,8 @@ bool section(const Text& text, bool open_at_first, bool open_now) {
 }
 
 void label_left(const Text& text) {
-    ImGui::AlignTextToFramePadding();
-    ImGui::TextUnformatted(text.name);
+    label_field(text.name);
     show_hint(text.hint);
-    const float usual = kLabelWidth * ImGui::GetTextLineHeight();
-    const float needed = ImGui::CalcTextSize(text.name).x + ImGui::GetStyle().ItemInnerSpacing.x;
-    ImGui::SameLine(ImGui::GetCursorPosX() + std::max(usual, needed));
-    ImGui::SetNextItemWidth(-FLT_MIN);
 }
 
 void label_above(const Text& text) {

@@ -21,8 +21,6 @@ namespace ewa::viewer {
 
 /// Performs a step on the selection, or on all splats that can be selected if none is.
 void perform_on_selection(Editor& editor, const char* title, std::vector<edit::Words> edits);
-/// The cameras of the active scene; empty: it has none.
-edit::Cameras cameras_of(const Editor& editor);
 
 class SelectionSection {
   public:

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The English texts of the editor, in one place. A translation replaces this file.
 #pragma once
-#include <string_view>
-#include <utility>
-
 #include "viewer/editor/editor.h"
 
 namespace ewa::viewer::texts {
@@ -24,7 +21,8 @@ inline constexpr ButtonText kPicture{"Picture", "F12", "Writes what you see as a
 inline constexpr ButtonText kPanel{"Panel", "F2", "Shows or hides the panel"};
 inline constexpr ButtonText kHelp{"Help", "F1", "All keys"};
 inline constexpr const char *kSaveAs = "Save as ...", *kMore = "More", *kSaving = "saving ...";
-inline constexpr const char *kUndone = "Undone: ", *kRedone = "Redone: ";
+inline constexpr const char *kUndone = "Undone: ", *kRedone = "Redone: ",
+                            *kNothingSelected = "nothing is selected";
 inline constexpr const char *kSelected = "selected", *kWouldBeSelected = "would be selected";
 inline constexpr const char* kEditsTraining = "edits go to the training";
 
@@ -139,15 +137,8 @@ inline constexpr Item kFront{"Front only", "Only splats that others do not cover
     kBrush{"Brush", "Radius of the brush ([ and ])"},
     kTolerance{"Tolerance", "How far colours may differ, for Flood and Eyedropper"},
     kDistance{"Distance", "By how much to grow or shrink, world units"},
-    kGrow{"Grow",   "Also select what is within the distance; the key takes 1 % of the selection's size",
-          "Ctrl+=", "select",
-          "grow",   true},
-    kShrink{"Shrink",
-            "Deselect what is within the distance of other splats; the key takes 1 % of the selection's size",
-            "Ctrl+-",
-            "select",
-            "shrink",
-            true};
+    kGrow{"Grow", "Also select what is within the distance (by key: 1 %)", "Ctrl+=", "select", "grow", true},
+    kShrink{"Shrink", "Deselect what is near other splats (by key: 1 %)", "Ctrl+-", "select", "shrink", true};
 inline constexpr Item kLock{"Lock", "The selection is drawn, and no edit changes it", "H", "lock", "", true},
     kUnlock{"Unlock all", "Edits change locked splats again", "Shift+H", "unlock"},
     kHide{"Hide", "The selection is not drawn", "Ctrl+H", "hide", "", true},
@@ -168,9 +159,6 @@ inline constexpr Item kBoxLow{"Low corner of the box", "World units"},
     kPaste{"Paste", "Take the numbers of a text: box=... or sphere=..."},
     kWholeScene{"Whole scene", "Around all splats"}, kAroundSelection{"Selection", "Around the selection"},
     kSelect{"Select", "Select what is inside", "Enter"}, kCrop{"Crop", "Delete all that is outside"};
-// Titles of steps: how a shape changes the selection, by the prefix of --select, and how it is called.
-inline constexpr std::pair<std::string_view, const char*> kSelectVerbs[] = {
-    {"add:", "Add"}, {"remove:", "Remove"}, {"and:", "Intersect"}};
 inline constexpr const char *kByShape = "{} by {}", *kRectangle = "rectangle";
 
 // Move and colours.
@@ -227,7 +215,6 @@ inline constexpr const char *kNeedsPinhole =
                             *kPolygonViewChanged = "the view has moved; click the corners again",
                             *kNoSurface = "no splat is opaque enough here",
                             *kNeedsColours = "the eyedropper needs a picture of colours",
-                            *kNothingSelected = "nothing is selected",
                             *kNoLevel = "the three points are nearly on a line; click three others",
                             *kShapeSelect = "Select", *kShapeAdd = "Add", *kShapeRemove = "Remove",
                             *kTrueLength = "true length";
