@@ -8,7 +8,6 @@
 #include <numeric>
 
 #include "core/text.h"
-#include "core/typing.h"
 #include "run/option_table.h"
 #include "viewer/editor/offers.h"
 #include "viewer/editor/theme.h"
@@ -104,7 +103,7 @@ std::string quality_text(const PanelFacts& facts, const char* name, int steps) {
 
 void choose_training(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
     std::vector<std::string> texts;
-    std::string present = core::counted(uint64_t(settings.train_steps), "step");
+    std::string present = core::grouped(uint64_t(settings.train_steps), "step");
     for (size_t i = 0; i < kQualityNames.size(); ++i) {
         const int steps = train::kQualities[i].second;
         texts.push_back(quality_text(facts, kQualityNames[i], steps));
