@@ -141,7 +141,7 @@ bool Tools::State::step_key(const KeyPress& press) const {
     const std::string_view value = item->value;
     if (item->of_selection && room.editor.snapshot().selected == 0 && !room.editor.busy())
         room.state.say(texts::kNothingSelected);
-    else if (value == say::kGrow.value || value == say::kShrink.value)
+    if (value == say::kGrow.value || value == say::kShrink.value)
         resize(item->value);
     else
         room.perform(value.empty() ? item->name : "", item->edit, item->value);
