@@ -291,7 +291,10 @@ TEST(EditSnapshot, TheMiddleIsThatOfWhatAMoveChanges) {
         {}, [] {}, kBudget);
     editor.enter("scene", {}, splats, {}, false);
     const auto middle = [&] {
-        EXPECT_TRUE(test::soon([&] { return !editor.busy(); }));
+        EXPECT_TRUE(test::soon([&] {
+            editor.take();
+            return !editor.busy();
+        }));
         editor.take();
         return editor.snapshot().middle.x;
     };
@@ -301,6 +304,9 @@ TEST(EditSnapshot, TheMiddleIsThatOfWhatAMoveChanges) {
     EXPECT_EQ(editor.snapshot().steps.front().title, "Select by x");
     editor.perform({"Lock", {{"lock", ""}}});
     EXPECT_EQ(middle(), 2) << "a move leaves what is locked";
+    EXPECT_FALSE(editor.snapshot().bounds);
+    ASSERT_TRUE(editor.snapshot().bounds_of_all);
+    EXPECT_EQ((*editor.snapshot().bounds_of_all)[1].x, 3);
 }
 
 TEST(PlacementText, MovesTurnsAndScalesAboutThePoint) {

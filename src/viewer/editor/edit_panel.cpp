@@ -9,14 +9,14 @@ namespace ewa::viewer {
 
 void EditPanel::draw(Editor& editor, bool live) {
     // Asks for another frame if it waits for something.
-    const auto draw = [&](auto& part, const auto&... more) {
-        part.draw(editor, more...);
+    const auto draw = [&](auto& part) {
+        part.draw(editor);
         redraw_ = part.waiting() || redraw_;
     };
     redraw_ = shows_colours_ = false;
     if (!editor.snapshot().splats) return ImGui::TextDisabled("%s", say::kNoScene);
     if (live) ImGui::TextWrapped("%s", say::kLive);
-    if (ui::section(say::kSelection, true)) draw(selection_, live);
+    if (ui::section(say::kSelection, true)) selection_.draw(editor, live);
     if (live) return clean_.end(editor);
     if (ui::section(say::kMove, false)) move_.draw(editor);
     if (ui::section(say::kColours, false)) {

@@ -16,10 +16,10 @@ struct EditSnapshot {
     std::shared_ptr<const std::vector<uint8_t>> states;
     edit::Cameras cameras;  // of the splats' run, while no splat has moved
     size_t left = 0, selected = 0, locked = 0, hidden = 0;
-    /// The bounds of the selection: its lowest and highest corner, world.
-    std::optional<std::array<glm::dvec3, 2>> bounds;
-    glm::dvec3 middle{
-        0};  // the mean of the means of what a move changes: the selection, or all that can be selected
+    /// The bounds of the selection, and of all splats that can be selected: the lowest and the highest corner, world.
+    std::optional<std::array<glm::dvec3, 2>> bounds, bounds_of_all;
+    /// The mean of the means of what a move changes: the selection, or all that can be selected.
+    glm::dvec3 middle{0};
     std::vector<edit::Step> steps;
     size_t done = 0;
     uint64_t version = 0, values_version = 0, history_bytes = 0;

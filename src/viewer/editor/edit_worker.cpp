@@ -36,6 +36,20 @@ std::shared_ptr<const std::vector<uint32_t>> draft_rows(const Gaussians& g, size
     return rows;
 }
 
+/// The bounds and the sum of finite points.
+struct Spread {
+    glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-low}, sum{0};
+    size_t count = 0;
+
+    void add(const glm::dvec3& at) {
+        if (!std::isfinite(at.x + at.y + at.z)) return;
+        ++count;
+        sum += at;
+        low = glm::min(low, at);
+        high = glm::max(high, at);
+    }
+};
+
 }  // namespace
 
 EditWorker::EditWorker(std::function<void()> wake, size_t budget)
@@ -139,29 +153,23 @@ std::shared_ptr<const EditSnapshot> EditWorker::snapshot() const {
     result->splats = splats.splats();
     result->states = std::make_shared<const std::vector<uint8_t>>(splats.states());
     result->cameras = splats.cameras();
-    glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low, sum(0), sum_of_all(0);
-    size_t finite = 0, finite_of_all = 0;
+    Spread all, selected;
     for (size_t i = 0; i < splats.size(); ++i) {
         const uint8_t state = splats.states()[i];
         if ((state & edit::kDeleted) != 0) continue;
         ++result->left;
         result->locked += (state & edit::kLocked) != 0;
         result->hidden += (state & edit::kHidden) != 0;
-        const bool selected = splats.affected(i);
-        result->selected += selected;
+        if (!splats.selectable(i)) continue;
+        result->selected += splats.affected(i);
         const glm::dvec3 at = result->splats->world_mean(i);
-        if (!splats.selectable(i) || !std::isfinite(at.x + at.y + at.z)) continue;
-        ++finite_of_all;
-        sum_of_all += at;
-        if (!selected) continue;
-        ++finite;
-        sum += at;
-        low = glm::min(low, at);
-        high = glm::max(high, at);
+        all.add(at);
+        if (splats.affected(i)) selected.add(at);
     }
-    if (finite > 0) result->bounds = {low, high};
-    if (result->selected == 0) finite = finite_of_all, sum = sum_of_all;
-    if (finite > 0) result->middle = sum / double(finite);
+    if (all.count > 0) result->bounds_of_all = {all.low, all.high};
+    if (selected.count > 0) result->bounds = {selected.low, selected.high};
+    const Spread& moved = result->selected > 0 ? selected : all;
+    if (moved.count > 0) result->middle = moved.sum / double(moved.count);
     result->steps = history.steps();
     result->done = history.done();
     result->version = history.version();

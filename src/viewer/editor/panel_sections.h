@@ -3,7 +3,6 @@
 #pragma once
 #include <array>
 #include <cstdint>
-#include <future>
 #include <initializer_list>
 #include <memory>
 #include <optional>
@@ -25,13 +24,11 @@ void perform_on_selection(Editor& editor, const char* title, std::vector<edit::W
 class SelectionSection {
   public:
     void draw(Editor& editor, bool live);
-    bool waiting() const { return whole_.valid(); }
 
   private:
     void draw_shape(Editor& editor);
     void draw_growth(Editor& editor);
-    double distance_ = 0;                           // of growing, world units; 0: not chosen yet
-    std::future<std::array<glm::dvec3, 2>> whole_;  // the bounds of the scene, for the box or the sphere
+    double distance_ = 0;  // of growing, world units; 0: not chosen yet
 };
 
 class MoveSection {

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <limits>
 
 #include "core/text.h"
 #include "viewer/editor/panel_controls.h"
@@ -17,21 +16,6 @@ namespace {
 
 constexpr float kThinnestBrush = 2, kThickestBrush = 500;  // px
 constexpr double kFirstDistance = 0.01;                    // of the selection's diagonal
-
-/// The lowest and the highest corner of the splats that are not deleted.
-std::array<glm::dvec3, 2> bounds_of(const Gaussians& splats, const std::vector<uint8_t>* states) {
-    constexpr float kLargest = std::numeric_limits<float>::max();
-    glm::vec3 low(kLargest), high(-kLargest);
-    for (size_t i = 0; i < splats.size(); ++i) {
-        if (states && i < states->size() && ((*states)[i] & edit::kDeleted) != 0) continue;
-        const glm::vec3 at(splats.means[3 * i], splats.means[3 * i + 1], splats.means[3 * i + 2]);
-        if (!std::isfinite(at.x + at.y + at.z)) continue;
-        low = glm::min(low, at);
-        high = glm::max(high, at);
-    }
-    if (low.x > high.x) low = high = glm::vec3(0);
-    return {splats.origin + glm::dvec3(low), splats.origin + glm::dvec3(high)};
-}
 
 void enclose(EditSettings& settings, const std::array<glm::dvec3, 2>& bounds) {
     settings.box_low = bounds[0];
@@ -94,7 +78,6 @@ void SelectionSection::draw(Editor& editor, bool live) {
 void SelectionSection::draw_shape(Editor& editor) {
     EditSettings& settings = editor.settings;
     const EditSnapshot& now = editor.snapshot();
-    if (finished(whole_)) enclose(settings, whole_.get());
     const bool box = settings.tool == Tool::box;
     if (!box && settings.tool != Tool::sphere) return;
     if (box) {
@@ -114,17 +97,9 @@ void SelectionSection::draw_shape(Editor& editor) {
                    : edit::sphere_shape(settings.sphere_center, settings.sphere_radius);
     };
     ImGui::PushID("shape");
-    switch (ui::button_line(
-        {{say::kWholeScene, !whole_.valid()}, {say::kAroundSelection, now.bounds.has_value()}})) {
-        case 0:
-            whole_ = std::async(std::launch::async, [splats = now.splats, states = now.states] {
-                return bounds_of(*splats, states.get());
-            });
-            break;
-        case 1:
-            enclose(settings, *now.bounds);
-            break;
-    }
+    const int around = ui::button_line(
+        {{say::kWholeScene, now.bounds_of_all.has_value()}, {say::kAroundSelection, now.bounds.has_value()}});
+    if (around >= 0) enclose(settings, around == 0 ? *now.bounds_of_all : *now.bounds);
     switch (ui::button_line(
         {{say::kCopy}, {say::kPaste}, {say::kSelect}, {say::kCrop, true, ui::ButtonLook::danger}})) {
         case 0:
