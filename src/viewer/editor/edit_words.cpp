@@ -36,7 +36,7 @@ bool is_rectangle(std::string_view text) {
     return at[1] == at[3] && at[2] == at[4] && at[5] == at[7] && at[6] == at[0];
 }
 
-/// The white point that brings all values of linear() into the ranges of --adjust.
+/// The white point that brings all values of tone_step() into the ranges of --adjust.
 double white_for(double factor, double offset) {
     constexpr double kMostTint = 1000;
     return 1 / std::max({1.0, std::abs(offset), factor / kMostTint});
@@ -44,7 +44,7 @@ double white_for(double factor, double offset) {
 constexpr double kLeastWhite = 0.01;
 
 /// Multiplies all channels by a factor, then adds the offset.
-edit::Adjustment linear(double factor, double offset) {
+edit::Adjustment tone_step(double factor, double offset) {
     const double white = white_for(factor, offset);
     edit::Adjustment result{.brightness = float(offset * white), .white = float(white)};
     result.tint.fill(float(factor * white));
@@ -148,12 +148,12 @@ std::vector<edit::Words> adjustment_edits(const edit::Adjustment& from, const ed
     const double factor = double(red) * after.factor / before.factor;
     const double offset = after.offset - factor * before.offset;
     if (red == green && green == blue && white_for(factor, offset) >= kLeastWhite) {
-        edit::Adjustment both = linear(factor, offset);
+        edit::Adjustment both = tone_step(factor, offset);
         both.opacity = change.opacity;
         return adjust({both});
     }
     // Offsets would differ between the channels: back to no tone, then to the new one.
-    const edit::Adjustment back = linear(1 / before.factor, -before.offset / before.factor);
+    const edit::Adjustment back = tone_step(1 / before.factor, -before.offset / before.factor);
     change.brightness = to.brightness;
     change.contrast = to.contrast;
     change.white = to.white;
