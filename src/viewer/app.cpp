@@ -199,8 +199,10 @@ void App::handle_mouse() {
 }
 
 void App::panel() {
+    const EditSnapshot& edited = editor_.snapshot();
     const PanelFacts facts{
         .scene = state_.scene,
+        .splats = editor_.scenes() > 0 && edited.splats ? edited.left : state_.scene.gaussians->size(),
         .device = state_.device_name,
         .on_cpu = state_.on_cpu,
         .picture = shown_.renders.shown().get(),

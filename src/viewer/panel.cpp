@@ -32,7 +32,7 @@ const std::array kAxes{Axis{"-y", {0, -1, 0}}, Axis{"+y", {0, 1, 0}}, Axis{"+z",
 void show_title(const PanelFacts& facts) {
     ImGui::TextUnformatted(facts.scene.title.c_str());
     const char* what = facts.scene.points ? "point" : "splat";
-    std::string text = core::grouped(facts.scene.gaussians->size(), what);
+    std::string text = core::grouped(facts.splats, what);
     if (facts.picture && facts.picture->skipped_nonfinite > 0)
         text += ", " + core::grouped(facts.picture->skipped_nonfinite) + " not finite";
     ImGui::TextDisabled("%s", text.c_str());

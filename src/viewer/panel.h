@@ -19,6 +19,7 @@ namespace ewa::viewer {
 /// What the panel shows.
 struct PanelFacts {
     const OpenedScene& scene;
+    size_t splats;  // or points, after edits
     const std::string& device;
     std::optional<bool> on_cpu;    // whether the device is a CPU; empty: not known
     const RenderedFrame* picture;  // null: none yet
