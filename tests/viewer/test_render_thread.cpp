@@ -9,6 +9,7 @@
 #include "cli/program.h"
 #include "ewa/error.h"
 #include "ewa/evaluation.h"
+#include "ewa/renderer.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
 #include "support/soon.h"
@@ -251,6 +252,26 @@ TEST(RenderThread, ADraftShowsTheMarksOfItsRows) {
     EXPECT_EQ(drawn({0}, {kMarkHidden, 0}), 0u);
     EXPECT_EQ(drawn({0}, {0, kMarkHidden}), 1u);
     EXPECT_EQ(drawn({1}, {0, kMarkHidden}), 0u);
+}
+
+TEST(RenderThread, DrawsAPlainLookWithoutTints) {
+    RenderThread thread([] { return open_device({}); }, [] {});
+    thread.set_scene(red_splat());
+    uint64_t serial = 0;
+    const auto drawn = [&](bool plain) {
+        RenderRequest asked = request(++serial);
+        asked.look.plain = plain;
+        thread.ask(asked);
+        EXPECT_TRUE(soon([&] {
+            const auto picture = thread.take_news().picture;
+            return picture && picture->request.serial == serial;
+        }));
+        return thread.take_news().picture->picture.rgba;
+    };
+    const std::vector<uint8_t> unmarked = drawn(false);
+    thread.set_marks(std::make_shared<const std::vector<uint8_t>>(1, uint8_t(kMarkSelected)));
+    EXPECT_NE(drawn(false), unmarked);
+    EXPECT_EQ(drawn(true), unmarked);
 }
 
 /// While the view changes there are fewer splats, and all of them once it rests.
