@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "live/edit_queue.h"
 
+#include <exception>
 #include <utility>
 
 #include "core/text.h"
@@ -36,10 +37,14 @@ bool EditQueue::perform(const std::function<EditReply(const std::string& body)>&
             edit->taken = true;
         }
         Outcome outcome;
+        std::exception_ptr failure;  // of the machine, which is no matter of the edit
         try {
             outcome.reply = perform(edit->body);
         } catch (const InputError& error) {
             outcome.refusal = core::one_line(error.what());
+        } catch (const std::exception& error) {
+            outcome.refusal = "the edit failed: " + core::one_line(error.what());
+            if (dynamic_cast<const RunError*>(&error)) failure = std::current_exception();
         }
         {
             const std::lock_guard lock(mutex_);
@@ -47,6 +52,7 @@ bool EditQueue::perform(const std::function<EditReply(const std::string& body)>&
             edit->outcome = std::move(outcome);
         }
         news_.notify_all();
+        if (failure) std::rethrow_exception(failure);
     }
 }
 

@@ -27,7 +27,8 @@ class EditQueue {
     /// Waits until the edit is performed or refused. Returns nothing if none has taken it after `wait`, or too many edits wait, or
     /// after stop(): the edit is then not performed. Once it is taken, the wait continues.
     std::optional<Outcome> ask(std::string body, std::chrono::milliseconds wait);
-    /// Performs the edits that wait, in order. perform: gets the body; its InputError is a refusal. Returns whether there was one.
+    /// Performs the edits that wait, in order. perform: gets the body; whatever it throws is a refusal. Its RunError is thrown on, once
+    /// the edit is answered. Returns whether there was an edit.
     bool perform(const std::function<EditReply(const std::string& body)>& perform);
     /// Ends all waits.
     void stop();

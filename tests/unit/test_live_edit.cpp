@@ -4,7 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <future>
+#include <thread>
+
 #include "ewa/error.h"
+#include "live/edit_queue.h"
 #include "support/temp_folder.h"
 
 namespace ewa::test {
@@ -59,6 +63,31 @@ TEST(LiveEdit, RefusesOtherTexts) {
              {R"({"edits": [["decimate", "50%"]]})", "--decimate"},
              {R"({"edits": [["transform", "move=1,0,0"]]})", "--transform"}})
         expect_error<InputError>([&] { cli::live_edit(splats_in_a_row(), body); }, {part});
+}
+
+TEST(EditQueue, AnswersWhateverAnEditThrows) {
+    live::EditQueue queue;
+    const auto refusal = [&](const auto& perform) {
+        auto answer = std::async([&] { return queue.ask("body", std::chrono::minutes(1)); });
+        try {
+            while (!queue.perform(perform)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        } catch (...) {
+            queue.stop();  // ends the wait
+            EXPECT_TRUE(answer.get()) << "nothing was answered";
+            throw;
+        }
+        const auto outcome = answer.get();
+        return outcome ? outcome->refusal : "nothing was answered";
+    };
+    EXPECT_EQ(refusal([](const std::string&) -> live::EditReply { throw InputError("not\nthis"); }),
+              "not this");
+    EXPECT_EQ(refusal([](const std::string&) -> live::EditReply { throw std::length_error("too long"); }),
+              "the edit failed: too long");
+    EXPECT_EQ(queue.performed(), 0u);
+    EXPECT_EQ(refusal([](const std::string&) { return live::EditReply(); }), "");
+    EXPECT_EQ(queue.performed(), 1u);
+    EXPECT_THROW(refusal([](const std::string&) -> live::EditReply { throw RunError("no device"); }),
+                 RunError);
 }
 
 }  // namespace
