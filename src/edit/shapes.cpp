@@ -21,10 +21,6 @@
 namespace ewa::edit {
 namespace {
 
-[[noreturn]] void refuse_shape(const std::string& what, const std::string& text, const std::string& form) {
-    throw InputError(what + ": '" + text + "' is not " + form);
-}
-
 std::vector<double> numbers_of(const std::string& what, const std::string& text, const std::string& value,
                                size_t count, const std::string& form) {
     const auto n = core::parse_list(value);
@@ -119,11 +115,11 @@ Shape flood(const glm::dvec3& point, double tolerance) {
         const glm::dvec3 color = color_of_splat(everything.splats, *nearest);
         const Part part =
             part_of(all, [&](size_t i) { return like(color_of_splat(*all.splats(), i), color, tolerance); });
-        return taken(all, part, group_at(part, nearest_to(part, point).value()));
+        const auto seed = nearest_to(part, point);  // none if its colour is not finite
+        return taken(all, part, seed ? group_at(part, *seed) : std::vector<bool>());
     };
 }
 
-/// least: groups of fewer splats are taken. 0: all but the largest group.
 Shape small_groups(bool all_but_largest) {
     return [=](const EditedSplats& all) {
         const Part part = whole(all);
@@ -234,7 +230,10 @@ Shape parse_shape(const std::string& text, const std::string& what) {
                       value = equals < text.size() ? text.substr(equals + 1) : "";
     if (name == "polygon" || name == "brush") return parse_view_shape(text, what);
     if (name == "color" || name == "flood") {
-        const auto n = numbers_of(what, text, value, 4, name == "color" ? "color=r,g,b,T" : "flood=x,y,z,T");
+        const std::string form =
+            name + (name == "color" ? "=r,g,b,T" : "=x,y,z,T") + " with a tolerance T of 0 or more";
+        const auto n = numbers_of(what, text, value, 4, form);
+        if (n[3] < 0) refuse_shape(what, text, form);
         const glm::dvec3 at(n[0], n[1], n[2]);
         return name == "color" ? shape_of_color(at, n[3]) : flood(at, n[3]);
     }

@@ -65,8 +65,10 @@ glm::dmat4 parse_step(const std::string& what, const std::string& step) {
     const std::vector<double> n = parse_numbers(what, step.substr(equals + 1));
     if (name == "move" && n.size() == 3) return glm::translate(glm::dmat4(1.0), glm::dvec3(n[0], n[1], n[2]));
     if (name == "scale" && n.size() == 1) return glm::scale(glm::dmat4(1.0), glm::dvec3(n[0]));
-    if (name == "turn" && n.size() == 4 && std::hypot(n[0], n[1], n[2]) > 0)
-        return turn({n[0], n[1], n[2]}, n[3]);
+    if (name == "turn" && n.size() == 4) {
+        const glm::dvec3 axis(n[0], n[1], n[2]);
+        if (std::isnormal(glm::dot(axis, axis))) return turn(axis, n[3]);
+    }
     refuse(what, step);
 }
 
@@ -99,7 +101,11 @@ double parse_scale_to(const std::string& text, const glm::dmat4& transform) {
 void place_splats(Gaussians& gaussians, const glm::dmat4& matrix, const std::string& what) {
     if (matrix == glm::dmat4(1.0)) return;
     const size_t before = drawable_count(gaussians);
-    transform_splats(gaussians, matrix);
+    try {
+        transform_splats(gaussians, matrix);
+    } catch (const InputError& error) {
+        throw InputError(what + ": " + error.what());
+    }
     const size_t after = drawable_count(gaussians);
     if (after < before)
         throw InputError(fmt::format(

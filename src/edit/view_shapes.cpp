@@ -60,7 +60,7 @@ struct Region {
     bool front = false, extent = false;
 };
 
-/// Empty behind the near plane, and for means that are not finite.
+/// Empty behind the near plane, and where a value is not finite.
 std::optional<Seen> seen_splat(const Gaussians& g, size_t i, const View& view, bool shape) {
     const glm::dvec3 p = view.rotation * g.world_mean(i) + view.translation;
     if (!(p.z > double(shared::NEAR_PLANE) && std::isfinite(p.x + p.y + p.z))) return std::nullopt;
@@ -68,6 +68,7 @@ std::optional<Seen> seen_splat(const Gaussians& g, size_t i, const View& view, b
     const double scale = view.parallel ? 1 : 1 / p.z;
     seen.at = {view.fx * p.x * scale + view.cx, view.fy * p.y * scale + view.cy};
     seen.depth = p.z;
+    if (!std::isfinite(seen.at.x + seen.at.y)) return std::nullopt;
     if (!shape) return seen;
     if (!drawable(g, i)) return std::nullopt;
     const glm::dmat3 covariance = view.rotation * scene::covariance_of(g, i) * glm::transpose(view.rotation);
@@ -77,6 +78,7 @@ std::optional<Seen> seen_splat(const Gaussians& g, size_t i, const View& view, b
     const glm::dvec3 sx = covariance * x, sy = covariance * y;
     seen.covariance = glm::dmat2(glm::dot(x, sx), glm::dot(x, sy), glm::dot(x, sy), glm::dot(y, sy));
     seen.deviation = std::sqrt(std::max({covariance[0][0], covariance[1][1], covariance[2][2]}));
+    if (!std::isfinite(seen.covariance[0][0] * seen.covariance[1][1] + seen.deviation)) return std::nullopt;
     return seen;
 }
 
@@ -161,11 +163,9 @@ class Cover {
     }
 
     bool shows(const Seen& seen) const {
-        const int column = int((seen.at.x - bounds_.low.x) / edge_),
-                  row = int((seen.at.y - bounds_.low.y) / edge_);
-        const size_t cell = size_t(std::clamp(row, 0, rows_ - 1)) * size_t(columns_) +
-                            size_t(std::clamp(column, 0, columns_ - 1));
-        return seen.depth <= depths_[cell] + seen.deviation;
+        const glm::dvec2 at = seen.at - bounds_.low;
+        const size_t k = size_t(cell(at.y, rows_)) * size_t(columns_) + size_t(cell(at.x, columns_));
+        return seen.depth <= depths_[k] + seen.deviation;
     }
 
   private:
@@ -175,6 +175,9 @@ class Cover {
         Seen seen;
         double opacity;
     };
+
+    /// The nearest of `count` cells along an axis.
+    int cell(double at, int count) const { return int(std::clamp(at / edge_, 0.0, double(count - 1))); }
 
     void blend(const EditedSplats& all, const View& view) {
         std::vector<Drawn> drawn;
@@ -201,9 +204,6 @@ class Cover {
         const double peak =
             splat.opacity * std::sqrt(std::max((a - least) * (c - least) - b * b, 0.0) / determinant);
         const double rx = kReach * std::sqrt(a), ry = kReach * std::sqrt(c);
-        const auto cell = [&](double at, int count) {
-            return int(std::clamp(at / edge_, 0.0, double(count - 1)));
-        };
         const glm::dvec2 at = splat.seen.at - bounds_.low;
         for (int y = cell(at.y - ry, rows_); y <= cell(at.y + ry, rows_); ++y)
             for (int x = cell(at.x - rx, columns_); x <= cell(at.x + rx, columns_); ++x) {
@@ -239,10 +239,7 @@ std::vector<bool> splats_in(const Region& region, const EditedSplats& all) {
     return {flags.begin(), flags.end()};
 }
 
-constexpr const char* kForm =
-    "polygon=x,y,x,y,x,y,...;view=VIEW or brush=R,x,y,...;view=VIEW, with ;front and ;extent behind it if "
-    "wanted; "
-    "VIEW is fx,fy,cx,cy,w,x,y,z,tx,ty,tz, with parallel: before it for parallel rays";
+constexpr double kFarthest = 1e9;  // px, of a point of a region
 
 std::optional<View> parse_view(std::string text) {
     View view;
@@ -253,56 +250,59 @@ std::optional<View> parse_view(std::string text) {
     constexpr size_t kNumbers = 11;
     if (!n || n->size() != kNumbers) return std::nullopt;
     const glm::dquat q((*n)[4], (*n)[5], (*n)[6], (*n)[7]);
-    if (!(glm::length(q) > 0) || (*n)[0] == 0 || (*n)[1] == 0) return std::nullopt;
+    const double length = glm::length(q);
+    if (!(length > 0 && std::isfinite(length)) || (*n)[0] == 0 || (*n)[1] == 0) return std::nullopt;
     view.fx = (*n)[0], view.fy = (*n)[1], view.cx = (*n)[2], view.cy = (*n)[3];
     view.rotation = glm::mat3_cast(glm::normalize(q));
     view.translation = {(*n)[8], (*n)[9], (*n)[10]};
     return view;
 }
 
-/// Coordinates, from the first of `numbers` on.
-bool add_points(Region& region, const std::vector<double>& numbers, size_t first) {
-    for (size_t i = first; i + 1 < numbers.size(); i += 2) {
-        region.points.emplace_back(numbers[i], numbers[i + 1]);
+/// value: what is behind polygon= or brush=.
+bool parse_points(Region& region, const std::string& value, bool brush) {
+    const auto n = core::parse_list(value);
+    if (!n || std::ranges::any_of(*n, [](double v) { return std::abs(v) > kFarthest; })) return false;
+    if (brush) region.brush = n->front();
+    for (size_t i = brush; i + 1 < n->size(); i += 2) {
+        region.points.emplace_back((*n)[i], (*n)[i + 1]);
         region.bounds.add(region.points.back());
     }
-    return (numbers.size() - first) % 2 == 0 && region.points.size() >= (region.brush ? 1u : 3u);
+    if (brush) return *region.brush > 0 && n->size() % 2 == 1 && n->size() > 1;
+    return n->size() % 2 == 0 && region.points.size() > 2;
 }
 
-std::optional<Region> parse_region(const std::string& text) {
+Region parse_region(const std::string& text, const std::string& what) {
     Region region;
     bool has_view = false;
-    size_t begin = 0;
-    while (begin <= text.size()) {
+    for (size_t begin = 0; begin <= text.size();) {
         const size_t end = std::min(text.find(';', begin), text.size());
-        const std::string part = text.substr(begin, end - begin);
-        const auto value_of = [&](std::string_view name) -> std::optional<std::string> {
-            if (!part.starts_with(name)) return std::nullopt;
-            return part.substr(name.size());
-        };
-        if (const auto view = value_of("view=")) {
-            const auto parsed = parse_view(*view);
-            if (!parsed) return std::nullopt;
-            region.view = *parsed;
+        const std::string part = text.substr(begin, end - begin),
+                          value = part.substr(part.find('=') + 1);  // without "=", all
+        if (begin == 0) {
+            const bool brush = part.starts_with("brush");
+            if (!parse_points(region, value, brush))
+                refuse_shape(what, part,
+                             brush ? "brush=R,x,y,x,y,... with a radius R above 0, in px up to 1e9"
+                                   : "polygon=x,y,x,y,x,y,... with three points or more, in px up to 1e9");
+        } else if (part.starts_with("view=")) {
+            const auto view = parse_view(value);
+            if (!view)
+                refuse_shape(what, part,
+                             "view=fx,fy,cx,cy,w,x,y,z,tx,ty,tz, with parallel: before fx for parallel rays; "
+                             "neither a focal length nor the quaternion w,x,y,z is 0");
+            region.view = *view;
             has_view = true;
-        } else if (const auto polygon = begin == 0 ? value_of("polygon=") : std::nullopt) {
-            const auto n = core::parse_list(*polygon);
-            if (!n || !add_points(region, *n, 0)) return std::nullopt;
-        } else if (const auto brush = begin == 0 ? value_of("brush=") : std::nullopt) {
-            const auto n = core::parse_list(*brush);
-            if (!n || n->empty() || !(n->front() > 0)) return std::nullopt;
-            region.brush = n->front();
-            if (!add_points(region, *n, 1)) return std::nullopt;
         } else if (part == "front") {
             region.front = true;
         } else if (part == "extent") {
             region.extent = true;
         } else {
-            return std::nullopt;
+            refuse_shape(what, part, "view=VIEW, front or extent");
         }
         begin = end + 1;
     }
-    return has_view ? std::optional(region) : std::nullopt;
+    if (!has_view) refuse_shape(what, text, "a polygon or a brush with ;view=VIEW behind its points");
+    return region;
 }
 
 std::string points_text(const std::vector<glm::dvec2>& points) {
@@ -314,10 +314,14 @@ std::string points_text(const std::vector<glm::dvec2>& points) {
 
 }  // namespace
 
+void refuse_shape(const std::string& what, const std::string& text, const std::string& form) {
+    constexpr size_t kShown = 120;
+    throw InputError(what + ": '" + text.substr(0, kShown) +
+                     (text.size() > kShown ? "...' is not " : "' is not ") + form);
+}
+
 Shape parse_view_shape(const std::string& text, const std::string& what) {
-    const auto region = parse_region(text);
-    if (!region) throw InputError(what + ": '" + text + "' is not " + kForm);
-    return [region = *region](const EditedSplats& all) { return splats_in(region, all); };
+    return [region = parse_region(text, what)](const EditedSplats& all) { return splats_in(region, all); };
 }
 
 std::string view_text(const Camera& camera) {

@@ -14,6 +14,9 @@ namespace ewa::edit {
 /// For each splat, whether the shape takes it. Splats that are not selectable are skipped by select().
 using Shape = std::function<std::vector<bool>(const EditedSplats&)>;
 
+/// Throws InputError: "what: 'text' is not form". A long text is cut off.
+[[noreturn]] void refuse_shape(const std::string& what, const std::string& text, const std::string& form);
+
 /// Parses polygon=... and brush=... of parse_selection() (edit/shapes.h). Throws InputError that begins with `what`.
 Shape parse_view_shape(const std::string& text, const std::string& what);
 

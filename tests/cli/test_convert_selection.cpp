@@ -62,6 +62,13 @@ TEST_F(ConvertSelection, ReplaysAJournal) {
 TEST_F(ConvertSelection, NamesTheShapeThatItCannotRead) {
     expect_failure(run_ewa({"convert", splats_, out_, "--select", "everything"}), 2,
                    "--select: 'everything' is not all");
+    expect_failure(run_ewa({"convert", splats_, out_, "--select", "flood=0,0,0,-1"}), 2,
+                   "--select: 'flood=0,0,0,-1' is not flood=x,y,z,T");
+    expect_failure(
+        run_ewa({"convert", splats_, out_, "--select", "brush=1e308,0,0;view=1,1,0,0,1,0,0,0,0,0,0;front"}),
+        2, "--select: 'brush=1e308,0,0' is not brush=R");
+    expect_failure(run_ewa({"convert", splats_, out_, "--select", "all", "--transform", "scale=0"}), 2,
+                   "--transform: the transform flattens");
     expect_failure(run_ewa({"convert", splats_, out_, "--select", "all", "--adjust", "glow=2"}), 2,
                    "--adjust: 'glow=2'");
 }
