@@ -29,7 +29,8 @@ void transform_about(Gaussians& splats, const glm::dmat4& matrix, const glm::dve
 
 void apply_edit(Gaussians& splats, const ValueEdit& edit, const glm::dvec3& origin) {
     if (const auto* matrix = std::get_if<glm::dmat4>(&edit)) transform_about(splats, *matrix, origin);
-    if (const auto* adjustment = std::get_if<Adjustment>(&edit)) adjust_splats(splats, *adjustment);
+    if (const auto* adjustment = std::get_if<Adjustment>(&edit))
+        change_splats(splats, "--adjust", [&](Gaussians& g) { adjust_splats(g, *adjustment); });
 }
 
 void scale_opacities(Gaussians& splats, double factor) {
@@ -37,6 +38,7 @@ void scale_opacities(Gaussians& splats, double factor) {
     fit_opacities(splats, false);
     for (float& logit : splats.opacity_logits) {
         const double opacity = factor / (1 + std::exp(-double(logit)));
+        if (std::isnan(opacity)) continue;
         logit = opacity < 1 ? std::min(float(std::log(opacity / (1 - opacity))), scene::kOpaqueLogit)
                             : scene::kOpaqueLogit;
     }

@@ -63,8 +63,8 @@ class EditedSplats {
 
     /// Sets the states of all splats. Requires size() of them.
     void set_states(std::vector<uint8_t> states);
-    /// Changes the values of the affected splats. Throws InputError, and changes nothing, for a transform that is no affine one or
-    /// takes values out of the range of float32.
+    /// Changes the values of the affected splats. Throws InputError, and changes nothing, for a transform that is no affine one, and
+    /// where values leave the range of float32.
     void change(const ValueEdit& edit);
     /// Appends a copy of each affected splat, and selects the copies in place of the originals.
     void duplicate();

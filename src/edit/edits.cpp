@@ -98,7 +98,7 @@ Edit sort(const std::string& value) {
     return {.text = "--sort", .change = [](Gaussians& g) { select_splats(g, morton_order(g)); }};
 }
 
-constexpr double kMostFactor = 1000;  // of an adjustment
+constexpr double kLeastFactor = 1e-6, kMostFactor = 1000;  // of an adjustment
 
 Edit select_shape(const std::string& value) {
     return {.text = "--select",
@@ -137,9 +137,11 @@ Edit reset(const std::string&) {
 Adjustment parse_adjustment(const std::string& text) {
     Adjustment a;
     const auto refuse = [&] {
-        throw InputError("--adjust: '" + text +
-                         "' is not tint=r,g,b, brightness=x, contrast=x, white=x or opacity=x, or several of "
-                         "them with ; between; factors are above 0");
+        throw InputError(
+            "--adjust: '" + text +
+            "' is not tint=r,g,b, brightness=x, contrast=x, white=x or opacity=x, or several of "
+            "them with ; between; tint is from 0 to 1000, brightness from -1 to 1, other factors "
+            "from 0.000001 to 1000");
     };
     size_t begin = 0;
     while (begin <= text.size()) {
@@ -149,7 +151,7 @@ Adjustment parse_adjustment(const std::string& text) {
         const std::string name = step.substr(0, equals);
         const auto n = core::parse_list(equals < step.size() ? step.substr(equals + 1) : "");
         const auto factor = [&](float& member) {
-            if (!n || n->size() != 1 || !(n->front() > 0 && n->front() <= kMostFactor)) refuse();
+            if (!n || n->size() != 1 || n->front() < kLeastFactor || n->front() > kMostFactor) refuse();
             member = float(n->front());
         };
         if (name == "tint" && n && n->size() == 3) {

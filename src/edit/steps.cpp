@@ -98,11 +98,11 @@ double parse_scale_to(const std::string& text, const glm::dmat4& transform) {
     return factor;
 }
 
-void place_splats(Gaussians& gaussians, const glm::dmat4& matrix, const std::string& what) {
-    if (matrix == glm::dmat4(1.0)) return;
+void change_splats(Gaussians& gaussians, const std::string& what,
+                   const std::function<void(Gaussians&)>& change) {
     const size_t before = drawable_count(gaussians);
     try {
-        transform_splats(gaussians, matrix);
+        change(gaussians);
     } catch (const InputError& error) {
         throw InputError(what + ": " + error.what());
     }
@@ -112,6 +112,11 @@ void place_splats(Gaussians& gaussians, const glm::dmat4& matrix, const std::str
             "{}: {} of {} splats could not be drawn afterwards: a value would exceed the range of "
             "float32 (3.4e38); use a smaller step, or remove them first with convert --crop",
             what, before - after, before));
+}
+
+void place_splats(Gaussians& gaussians, const glm::dmat4& matrix, const std::string& what) {
+    if (matrix == glm::dmat4(1.0)) return;
+    change_splats(gaussians, what, [&](Gaussians& g) { transform_splats(g, matrix); });
 }
 
 }  // namespace ewa::edit

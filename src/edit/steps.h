@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The parsing of transforms of a scene, as users type them.
 #pragma once
+#include <functional>
 #include <glm/mat4x4.hpp>
 #include <string>
 #include <vector>
@@ -18,7 +19,10 @@ glm::dmat4 parse_transform(const std::vector<std::string>& steps, const std::str
 /// scaling, the two points are LENGTH apart. Throws InputError.
 double parse_scale_to(const std::string& text, const glm::dmat4& transform = glm::dmat4(1.0));
 
-/// Transforms the splats. Throws InputError, which begins with `what`, if fewer splats would be drawable afterwards.
+/// Changes the splats. Throws InputError, which begins with `what`, if `change` does or fewer splats are drawable afterwards.
+void change_splats(Gaussians& gaussians, const std::string& what,
+                   const std::function<void(Gaussians&)>& change);
+/// Transforms the splats by change_splats().
 void place_splats(Gaussians& gaussians, const glm::dmat4& matrix, const std::string& what);
 
 }  // namespace ewa::edit

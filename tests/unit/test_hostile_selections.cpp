@@ -138,5 +138,35 @@ TEST(HostileTransform, NamesTheOption) {
     }
 }
 
+TEST(HostileAdjustment, LeavesWhatIsNoNumber) {
+    edit::EditedSplats edited(std::make_shared<const Gaussians>(odd_splats()));
+    edit::perform_on(edited, edit::parse("select", "all"));
+    edit::perform_on(edited, edit::parse("adjust", "tint=1.5,1,1;opacity=0.5"));
+    EXPECT_TRUE(std::isnan(edited.splats()->opacity_logits[5]));
+    EXPECT_NEAR(edited.splats()->opacity_logits[6], std::log(0.25 / 0.75), 1e-6);
+    EXPECT_TRUE(std::isnan(edited.splats()->sh[18]));
+}
+
+TEST(HostileAdjustment, IsRefusedBeforeItChangesAnything) {
+    for (const char* value : {"white=1e-60", "opacity=1e-60", "contrast=1e-9", "white=1001", "tint=1e300,1,1",
+                              "tint=-1,1,1", "opacity=inf", "brightness=nan", "contrast="}) {
+        SCOPED_TRACE(value);
+        expect_error<InputError>([&] { edit::parse("adjust", value); },
+                                 {"--adjust: '", value, "factors from 0.000001 to 1000"});
+    }
+    Gaussians bright = odd_splats();
+    bright.sh[24] = 3e38f;
+    edit::EditedSplats edited(std::make_shared<const Gaussians>(bright));
+    edit::perform_on(edited, edit::parse("select", "all"));
+    const edit::Edit doubled = edit::parse("adjust", "tint=2,2,2");
+    expect_error<InputError>([&] { edit::perform_on(edited, doubled); }, {"--adjust: 1 of ", "float32"});
+    EXPECT_EQ(edited.splats(), edited.first());
+    edit::perform_on(edited, edit::parse("select", "x=0.75..1"));
+    expect_error<InputError>([&] { edit::perform_on(edited, doubled); }, {"--adjust: 1 of 1 splats"});
+    edit::perform_on(edited, edit::parse("select", "x=0.65..0.75"));
+    for (int i = 0; i < 100; ++i) edit::perform_on(edited, doubled);
+    EXPECT_TRUE(std::isfinite(edited.splats()->sh[21]));
+}
+
 }  // namespace
 }  // namespace ewa::test
