@@ -4,12 +4,10 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <optional>
-#include <unordered_map>
 
 #include "core/text.h"
 #include "core/typing.h"
@@ -130,60 +128,13 @@ Shape small_groups(bool all_but_largest) {
     };
 }
 
-/// Cells of the edge `size`, for searches within that distance.
-class Cells {
-  public:
-    explicit Cells(double size) : size_(size) {}
-    void add(const glm::dvec3& point) { cells_[key(cell(point))].push_back(point); }
-    bool any_within(const glm::dvec3& point, double radius) const {
-        const auto middle = cell(point);
-        for (int64_t z = -1; z <= 1; ++z)
-            for (int64_t y = -1; y <= 1; ++y)
-                for (int64_t x = -1; x <= 1; ++x) {
-                    const auto found = cells_.find(key({middle[0] + x, middle[1] + y, middle[2] + z}));
-                    if (found == cells_.end()) continue;
-                    for (const glm::dvec3& other : found->second) {
-                        const glm::dvec3 d = other - point;
-                        if (glm::dot(d, d) <= radius * radius) return true;
-                    }
-                }
-        return false;
-    }
-
-  private:
-    using Cell = std::array<int64_t, 3>;
-    Cell cell(const glm::dvec3& p) const {
-        constexpr double kMost = 1e15;  // beyond it, points share a cell
-        Cell c{};
-        for (int axis = 0; axis < 3; ++axis)
-            c[size_t(axis)] = int64_t(std::clamp(std::floor(p[axis] / size_), -kMost, kMost));
-        return c;
-    }
-    /// Cells that share a key are searched together.
-    static uint64_t key(const Cell& c) {
-        return uint64_t(c[0]) * 0x9e3779b97f4a7c15u ^ uint64_t(c[1]) * 0xc2b2ae3d27d4eb4fu ^
-               uint64_t(c[2]) * 0x165667b19e3779f9u;
-    }
-    double size_;
-    std::unordered_map<uint64_t, std::vector<glm::dvec3>> cells_;
-};
-
 /// The selected splats and those near them, or the selected ones that are not near others.
 Shape resized(double radius, bool grow) {
     return [=](const EditedSplats& all) {
-        const Gaussians& g = *all.splats();
-        Cells cells(radius);
-        const auto selected = [&](size_t i) { return (all.states()[i] & kSelected) != 0; };
-        for (size_t i = 0; i < all.size(); ++i)
-            if (all.selectable(i) && selected(i) == grow) cells.add(g.world_mean(i));
-        std::vector<bool> flags(all.size());
-        for (size_t i = 0; i < all.size(); ++i) {
-            if (!all.selectable(i)) continue;
-            if (grow)
-                flags[i] = selected(i) || cells.any_within(g.world_mean(i), radius);
-            else
-                flags[i] = selected(i) && !cells.any_within(g.world_mean(i), radius);
-        }
+        std::vector<bool> some(all.size());
+        for (size_t i = 0; i < all.size(); ++i) some[i] = all.selectable(i) && all.affected(i) == grow;
+        std::vector<bool> flags = scene::splats_near(*all.splats(), some, radius);
+        if (!grow) flags.flip();
         return flags;
     };
 }

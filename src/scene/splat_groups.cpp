@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <limits>
 #include <map>
 #include <memory>
 #include <nanoflann.hpp>
@@ -23,7 +24,7 @@ constexpr size_t kNearest = 32;
 constexpr double kTouching = 9;        // squared, in standard deviations
 constexpr double kOfAboutItsSize = 2;  // factor between the largest standard deviations
 
-/// The means of splats whose largest standard deviations are in one octave.
+/// The means of some splats, such as those whose largest standard deviations are in one octave.
 struct Octave {
     const Gaussians* gaussians = nullptr;
     std::vector<uint32_t> splats;
@@ -52,6 +53,25 @@ bool touch(const Gaussians& g, size_t a, size_t b) {
     const glm::dvec3 d(double(p[0]) - q[0], double(p[1]) - q[1], double(p[2]) - q[2]);
     return glm::dot(d, glm::inverse(covariance_of(g, a) + covariance_of(g, b)) * d) < kTouching;
 }
+
+/// Ends a search at the first point within a distance: points that are dense do not make it longer.
+class AnyWithin {
+  public:
+    using DistanceType = double;  // for nanoflann
+    explicit AnyWithin(double squared)
+        : limit_(std::nextafter(squared, std::numeric_limits<double>::infinity())) {}
+    bool addPoint(double, uint32_t) {
+        found_ = true;
+        return false;
+    }
+    double worstDist() const { return limit_; }
+    bool full() const { return found_; }
+    void sort() const {}
+
+  private:
+    double limit_;
+    bool found_ = false;
+};
 
 /// Sets that are joined two by two.
 class Sets {
@@ -139,6 +159,29 @@ SplatGroups touching_groups(const Gaussians& gaussians) {
     groups.of.resize(count);
     for (size_t i = 0; i < count; ++i) groups.of[i] = number[sets.root(uint32_t(i))];
     return groups;
+}
+
+std::vector<bool> splats_near(const Gaussians& gaussians, const std::vector<bool>& some, double radius) {
+    const auto place = [&](size_t i) {
+        return std::array<double, 3>{gaussians.means[3 * i], gaussians.means[3 * i + 1],
+                                     gaussians.means[3 * i + 2]};
+    };
+    const auto finite = [](const std::array<double, 3>& p) { return std::isfinite(p[0] + p[1] + p[2]); };
+    Octave points{&gaussians, {}};
+    for (size_t i = 0; i < some.size(); ++i)
+        if (some[i] && finite(place(i))) points.splats.push_back(uint32_t(i));
+    if (points.splats.empty()) return some;
+    OctaveTree tree(3, points);
+    tree.buildIndex();
+    constexpr size_t kAtOnce = 4096;
+    std::vector<uint8_t> near(some.begin(), some.end());
+    core::on_all_cores((near.size() + kAtOnce - 1) / kAtOnce, [&](size_t piece) {
+        for (size_t i = piece * kAtOnce; i < std::min(near.size(), (piece + 1) * kAtOnce); ++i) {
+            AnyWithin any(radius * radius);
+            if (near[i] == 0 && finite(place(i))) near[i] = tree.findNeighbors(any, place(i).data(), {});
+        }
+    });
+    return {near.begin(), near.end()};
 }
 
 std::vector<uint32_t> views_of_splats(const Gaussians& gaussians, const std::vector<Camera>& cameras) {

@@ -22,6 +22,9 @@ struct SplatGroups {
 /// is not drawable is a group of its own. O(n log n).
 SplatGroups touching_groups(const Gaussians& gaussians);
 
+/// For each splat, whether it is one of `some` (of size()), or its mean is within `radius` of the mean of one of them. O(n log n).
+std::vector<bool> splats_near(const Gaussians& gaussians, const std::vector<bool>& some, double radius);
+
 /// For each splat, the number of cameras with its mean in their image, beyond the near plane. Occlusion by other splats does not
 /// count. Lenses must be native (is_native).
 std::vector<uint32_t> views_of_splats(const Gaussians& gaussians, const std::vector<Camera>& cameras);
