@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat2x2.hpp>
+#include <glm/matrix.hpp>
 #include <limits>
 #include <optional>
 
@@ -110,41 +111,54 @@ bool any_segment(const Region& region, const Meets& meets) {
     return meets(last, next);
 }
 
-/// Whether the ellipse of a splat touches the border of a polygon: in units of its standard deviations, the splat is a circle.
-bool ellipse_meets(const Region& region, const Seen& seen) {
-    const double a = seen.covariance[0][0], b = seen.covariance[0][1], c = seen.covariance[1][1];
-    const double l = std::sqrt(a), m = l > 0 ? b / l : 0,
-                 n = std::sqrt(std::max(c - m * m, 0.0));  // Cholesky
-    if (!(l > 0 && n > 0)) return false;
-    const auto whitened = [&](const glm::dvec2& p) {
-        const double x = (p.x - seen.at.x) / l;
-        return glm::dvec2(x, (p.y - seen.at.y - m * x) / n);
+/// Whether an ellipse about 0, of points x with x' ellipse^-1 x <= 1, touches the band of this half width along a segment.
+bool meets_band(const glm::dmat2& ellipse, const glm::dvec2& from, const glm::dvec2& to, double half) {
+    const double length = glm::distance(from, to);
+    if (!(length > 0)) return false;
+    const glm::dvec2 u = (to - from) / length, n(-u.y, u.x);
+    const double uu = glm::dot(u, ellipse * u), un = glm::dot(u, ellipse * n),
+                 nn = std::max(glm::dot(n, ellipse * n), 0.0), reach = std::sqrt(nn);
+    const double low = glm::dot(from, n) - half, high = low + 2 * half;
+    if (low > reach || high < -reach) return false;
+    // How far the part of the ellipse that is between low and high reaches along the segment.
+    const auto end = [&](double sign) {
+        const double y = std::clamp(uu > 0 ? sign * un / std::sqrt(uu) : 0.0, low, high);
+        const double lean = nn > 0 ? un / nn : 0, left = nn > 0 ? 1 - y * y / nn : 1;
+        return lean * y + sign * std::sqrt(std::max((uu - un * lean) * left, 0.0));
     };
-    return any_segment(region, [&](const glm::dvec2& from, const glm::dvec2& to) {
-        const glm::dvec2 near = nearest_on(whitened(from), whitened(to), glm::dvec2(0));
-        return glm::dot(near, near) <= kExtent * kExtent;
-    });
+    const double begin = glm::dot(from, u);
+    return end(-1) <= begin + length && end(1) >= begin;
 }
 
-bool in_brush(const Region& region, const Seen& seen) {
-    return any_segment(region, [&](const glm::dvec2& from, const glm::dvec2& to) {
-        const glm::dvec2 away = seen.at - nearest_on(from, to, seen.at);
-        const double distance = glm::length(away);
-        double reach = *region.brush;
-        if (region.extent && distance > 0) {
-            const glm::dvec2 n = away / distance;
-            reach += kExtent * std::sqrt(std::max(glm::dot(n, seen.covariance * n), 0.0));
-        }
-        return distance <= reach;
-    });
+/// Whether that ellipse touches a disc. The point of the ellipse nearest to `center` is ellipse (ellipse + t)^-1 center with the t >= 0
+/// that puts it on the border, and its distance rises with t.
+bool meets_disc(const glm::dmat2& ellipse, const glm::dvec2& center, double radius) {
+    constexpr int kHalvings = 60;
+    double low = 0, high = glm::length(center) * std::sqrt(ellipse[0][0] + ellipse[1][1]);
+    for (int i = 0; i < kHalvings; ++i) {
+        const double t = (low + high) / 2;
+        const glm::dvec2 v = glm::inverse(ellipse + glm::dmat2(t)) * center;
+        const bool farther = glm::dot(v, ellipse * v) > 1, near = t * glm::length(v) <= radius;
+        if (farther != near) return near;
+        (farther ? low : high) = t;
+    }
+    return true;  // they touch in a point
 }
 
 bool in_region(const Region& region, const Seen& seen) {
-    const double largest = std::max(seen.covariance[0][0], seen.covariance[1][1]);
-    const double margin = region.brush.value_or(0) + (region.extent ? kExtent * std::sqrt(largest) : 0);
-    if (!region.bounds.has(seen.at, margin)) return false;
-    if (region.brush) return in_brush(region, seen);
-    return in_polygon(region.points, seen.at) || (region.extent && ellipse_meets(region, seen));
+    const glm::dmat2 ellipse = (region.extent ? kExtent * kExtent : 0.0) * seen.covariance;
+    const double radius = region.brush.value_or(0);
+    if (!region.bounds.has(seen.at, radius + std::sqrt(std::max(ellipse[0][0], ellipse[1][1])))) return false;
+    if (!region.brush && in_polygon(region.points, seen.at)) return true;
+    if (!region.brush && !region.extent) return false;
+    const double farthest = radius + std::sqrt(ellipse[0][0] + ellipse[1][1]);
+    return any_segment(region, [&](const glm::dvec2& a, const glm::dvec2& b) {
+        const glm::dvec2 from = a - seen.at, to = b - seen.at;
+        const double distance = glm::length(nearest_on(from, to, glm::dvec2(0)));
+        if (distance <= radius || distance > farthest) return distance <= radius;
+        return meets_band(ellipse, from, to, radius) ||
+               (region.brush && (meets_disc(ellipse, from, radius) || meets_disc(ellipse, to, radius)));
+    });
 }
 
 /// The depth behind which splats of a region are covered: where the transmittance falls below a half, in cells of its bounds.

@@ -2,8 +2,10 @@
 // Shapes of selections against their definitions, and where splats are dense.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <glm/geometric.hpp>
 #include <limits>
 
 #include "edit/edits.h"
@@ -66,8 +68,80 @@ TEST(Resized, IsByTheDistanceOfMeans) {
         EXPECT_EQ(splats.affected(i), before[i] != 0 || near(i, edit::kSelected)) << i;
     splats.set_states(before);
     do_edit(splats, "select", "shrink=0.2");
-    for (size_t i = 0; i < g.size(); ++i)
-        EXPECT_EQ(splats.affected(i), before[i] != 0 && !near(i, 0)) << i;
+    for (size_t i = 0; i < g.size(); ++i) EXPECT_EQ(splats.affected(i), before[i] != 0 && !near(i, 0)) << i;
+}
+
+/// A splat in the image of parallel rays of 100 px per unit: its ellipse of 2 standard deviations.
+struct Drawn {
+    glm::dvec2 at;
+    double a, b, turn;  // half axes, px, and the angle of the first
+
+    glm::dvec2 border(double angle) const {
+        const glm::dvec2 p(a * std::cos(angle), b * std::sin(angle));
+        return at + glm::dvec2(p.x * std::cos(turn) - p.y * std::sin(turn),
+                               p.x * std::sin(turn) + p.y * std::cos(turn));
+    }
+    bool has(const glm::dvec2& p) const {
+        const glm::dvec2 d = p - at;
+        return glm::length(glm::dvec2((d.x * std::cos(turn) + d.y * std::sin(turn)) / a,
+                                      (d.y * std::cos(turn) - d.x * std::sin(turn)) / b)) <= 1;
+    }
+};
+
+double distance_to(const std::vector<glm::dvec2>& line, const glm::dvec2& p) {
+    double least = std::numeric_limits<double>::infinity();
+    for (size_t i = 0; i + 1 < line.size(); ++i) {
+        const glm::dvec2 along = line[i + 1] - line[i];
+        const double t = std::clamp(glm::dot(p - line[i], along) / glm::dot(along, along), 0.0, 1.0);
+        least = std::min(least, glm::distance(p, line[i] + t * along));
+    }
+    return least;
+}
+
+TEST(BrushByExtent, TakesTheEllipsesThatItTouches) {
+    constexpr int kSamples = 2000;
+    Random random(7);
+    std::vector<Drawn> drawn;
+    Gaussians g;
+    g.resize(100);
+    for (size_t i = 0; i < g.size(); ++i) {
+        const double a = std::pow(10, random.uniform(0, 2));
+        drawn.push_back({{random.uniform(0, 500), random.uniform(0, 500)},
+                         a,
+                         a * std::pow(10, random.uniform(-2, 0)),
+                         random.uniform(0, 3)});
+        // In steps of float32, which the scene has.
+        g.means[3 * i] = float(drawn[i].at.x / 100);
+        g.means[3 * i + 1] = float(drawn[i].at.y / 100);
+        g.log_scales[3 * i] = float(std::log(drawn[i].a / 200));
+        g.log_scales[3 * i + 1] = g.log_scales[3 * i + 2] = float(std::log(drawn[i].b / 200));
+        g.quaternions[4 * i] = float(std::cos(drawn[i].turn / 2));
+        g.quaternions[4 * i + 3] = float(std::sin(drawn[i].turn / 2));
+    }
+    edit::EditedSplats splats(std::make_shared<const Gaussians>(g));
+    size_t taken = 0, left = 0;
+    for (int stroke = 0; stroke < 30; ++stroke) {
+        const double radius = std::pow(10, random.uniform(-1, 2));
+        std::vector<glm::dvec2> line;
+        std::string text = "brush=" + std::to_string(radius);
+        for (int k = 0; k < 3; ++k) {
+            line.emplace_back(random.integer(0, 500), random.integer(0, 500));
+            text += "," + std::to_string(int(line[k].x)) + "," + std::to_string(int(line[k].y));
+        }
+        do_edit(splats, "select", text + ";view=parallel:100,100,0,0,1,0,0,0,0,0,10;extent");
+        for (size_t i = 0; i < drawn.size(); ++i) {
+            const Drawn& splat = drawn[i];
+            double distance = splat.has(line[0]) || splat.has(line[1]) || splat.has(line[2]) ? 0 : 1e9;
+            for (int k = 0; k < kSamples; ++k)
+                distance = std::min(distance, distance_to(line, splat.border(2 * M_PI * k / kSamples)));
+            const double unsure = 2 * M_PI * splat.a / kSamples + 1e-3;
+            if (std::abs(distance - radius) < unsure) continue;
+            EXPECT_EQ(splats.affected(i), distance < radius) << "stroke " << stroke << ", splat " << i;
+            (distance < radius ? taken : left) += 1;
+        }
+    }
+    EXPECT_GT(taken, 100u);
+    EXPECT_GT(left, 1000u);
 }
 
 }  // namespace
