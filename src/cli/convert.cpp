@@ -257,7 +257,8 @@ bool edit_scene(const ConvertArguments& arguments, Work& work, std::optional<fol
         if (!outcome.removes) {
             work.lost.push_back(outcome.after < outcome.before
                                     ? fmt::format("{} left {} of {}", outcome.text, outcome.after, of)
-                                    : fmt::format("{} made {} of {}", outcome.text, outcome.after, of));
+                                    : fmt::format("{} made {} of {}", outcome.text,
+                                                  core::counted(outcome.after, "splat"), outcome.before));
             continue;
         }
         const size_t removed = outcome.before - outcome.after;
@@ -315,7 +316,7 @@ int run(const CLI::App& app, const ConvertArguments& arguments) {
     // Report wrong use before the inputs are read: they may be large.
     const auto& [edits, journals, picture] = arguments.editing;
     if (!picture.empty() &&
-        std::ranges::none_of(edits, [](const edit::Edit& edit) { return edit.filter || edit.act; }))
+        std::ranges::none_of(edits, [](const edit::Edit& e) { return e.filter || e.text == "--delete"; }))
         throw InputError("--dry-run: no option removes splats; see --where and others of ewa convert --help");
     check_files(app, arguments);
     read_all(arguments, work);

@@ -276,7 +276,7 @@ class Chain {
             keep(edit.filter(gaussians_, applied_.moved ? Cameras() : cameras_));
         } else {
             edit.change(gaussians_);
-            applied_.left.clear();
+            applied_.left.assign(gaussians_.size(), kNew);
         }
         if (edit.filter || gaussians_.size() != before)
             applied_.outcomes.push_back({edit.text, bool(edit.filter), before, gaussians_.size()});
@@ -285,21 +285,24 @@ class Chain {
     Applied finish() {
         end_selection();
         place();
+        std::erase(applied_.left, kNew);
         return std::move(applied_);
     }
 
   private:
+    static constexpr uint32_t kNew = UINT32_MAX;  // of Applied::left: no splat of the first scene
+
     void act(const Edit& edit) {
         place();
         if (!selection_)
             selection_.emplace(std::make_shared<const Gaussians>(std::move(gaussians_)),
                                applied_.moved ? Cameras() : cameras_);
         EditedSplats& splats = *selection_;
-        const size_t before = splats.left(), all = splats.size();
+        const size_t before = splats.left();
         perform_on(splats, edit);
         if (splats.left() != before)
             applied_.outcomes.push_back({edit.text, splats.left() < before, before, splats.left()});
-        if (splats.size() != all) applied_.left.clear();
+        applied_.left.resize(splats.size(), kNew);
         applied_.moved = applied_.moved || edit.place;
     }
 
@@ -320,7 +323,7 @@ class Chain {
         for (size_t i = 0; i < stay.size(); ++i) {
             if (!stay[i]) continue;
             staying.push_back(uint32_t(i));
-            if (!applied_.left.empty()) numbers.push_back(applied_.left[i]);
+            numbers.push_back(applied_.left[i]);
         }
         applied_.left = std::move(numbers);
         if (staying.size() < stay.size()) keep_splats(gaussians_, staying);

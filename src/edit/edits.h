@@ -54,7 +54,7 @@ struct Applied {
     std::vector<std::string> remarks;  // of place edits
     bool moved = false;
     std::vector<uint32_t>
-        left;  // indices of the splats that are kept; only if no edit merges, sorts or copies splats
+        left;  // indices of the first splats that are kept; only if no edit merges or sorts splats
 };
 
 /// Applies the edits in order. Consecutive place edits transform the scene once. After --select, edits with `act` and place edits

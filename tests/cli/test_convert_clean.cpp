@@ -106,6 +106,29 @@ TEST(ConvertClean, DryRunDrawsInRed) {
     EXPECT_GT(gray, 3 * red / 2);
 }
 
+TEST(ConvertClean, DryRunDrawsCopiesAsLeft) {
+    const Folder folder;
+    make_row(folder / "s.ply");
+    const auto red = [&](const std::vector<std::string>& edits, const std::string& said) {
+        std::vector<std::string> all = {"convert", folder / "s.ply", "--dry-run", folder / "p.png"};
+        all.insert(all.end(), edits.begin(), edits.end());
+        const Outcome outcome = run_ewa(all);
+        expect_success(outcome);
+        EXPECT_NE(outcome.out.find(said), std::string::npos) << outcome.out;
+        const ewa::Image picture = ewa::load_image(folder / "p.png");
+        size_t count = 0;
+        for (size_t i = 0; i < picture.pixels.size(); i += 3)
+            count += picture.pixels[i] > 3 * picture.pixels[i + 1] && picture.pixels[i] > 0.2f;
+        return count;
+    };
+    EXPECT_EQ(
+        red({"--select", "all", "--duplicate", "--where", "x=..900"}, "--duplicate made 32 splats of 16"),
+        0u);
+    EXPECT_GT(red({"--select", "x=..11", "--duplicate", "--select", "x=12..", "--delete"},
+                  "--delete would remove 4 of 28 splats"),
+              10u);
+}
+
 TEST(ConvertClean, RefusesWithTheReason) {
     const Folder folder;
     make_row(folder / "s.ply");
@@ -127,6 +150,7 @@ TEST(ConvertClean, RefusesWithTheReason) {
     refuse({"--where", "sphere=1,2,3,nan"}, "finite");
     refuse({"--where", "views=2.."}, "the folder of a training run");
     refuse({"--dry-run", folder / "p.png"}, "no option removes splats");
+    refuse({"--select", "all", "--duplicate", "--dry-run", folder / "p.png"}, "no option removes splats");
     refuse({"--where", "x=900.."}, "none of the 16 splats is left");
 }
 
