@@ -252,6 +252,7 @@ bool edit_scene(const ConvertArguments& arguments, Work& work, std::optional<fol
     const Gaussians before = picture.empty() ? Gaussians() : work.gaussians;
     const edit::Applied applied = edit::apply(work.gaussians, edits, cameras_of(run));
     work.lost.insert(work.lost.end(), applied.remarks.begin(), applied.remarks.end());
+    for (const std::string& warning : applied.warnings) core::warn(core::one_line(warning));
     for (const edit::Outcome& outcome : applied.outcomes) {
         const std::string of = core::counted(outcome.before, "splat");
         if (!outcome.removes) {

@@ -101,7 +101,7 @@ Edit sort(const std::string& value) {
 constexpr double kLeastFactor = 1e-6, kMostFactor = 1000;  // of an adjustment
 
 Edit select_shape(const std::string& value) {
-    return {.text = "--select",
+    return {.text = "--select " + value,
             .act = [selection = parse_selection(value)](EditedSplats& splats) { select(splats, selection); }};
 }
 
@@ -290,6 +290,7 @@ class Chain {
     }
 
   private:
+    static constexpr size_t kShown = 120;         // bytes of an edit in a warning
     static constexpr uint32_t kNew = UINT32_MAX;  // of Applied::left: no splat of the first scene
 
     void act(const Edit& edit) {
@@ -299,7 +300,12 @@ class Chain {
                                applied_.moved ? Cameras() : cameras_);
         EditedSplats& splats = *selection_;
         const size_t before = splats.left();
+        const bool selects = edit.text.starts_with("--select "), none = splats.count(kSelected) == 0;
         perform_on(splats, edit);
+        if (none && !selects && !edit.text.starts_with("--un"))
+            applied_.warnings.push_back(edit.text + " changed nothing: no splat is selected");
+        if (selects && splats.count(kSelected) == 0 && edit.text != "--select none")
+            applied_.warnings.push_back(edit.text.substr(0, kShown) + " selects no splat");
         if (splats.left() != before)
             applied_.outcomes.push_back({edit.text, splats.left() < before, before, splats.left()});
         applied_.left.resize(splats.size(), kNew);

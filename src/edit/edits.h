@@ -50,8 +50,9 @@ struct Outcome {
 };
 
 struct Applied {
-    std::vector<Outcome> outcomes;     // of filters, and of edits that have changed the number of splats
-    std::vector<std::string> remarks;  // of place edits
+    std::vector<Outcome> outcomes;      // of filters, and of edits that have changed the number of splats
+    std::vector<std::string> remarks;   // of place edits
+    std::vector<std::string> warnings;  // of edits that change nothing, as no splat is selected
     bool moved = false;
     std::vector<uint32_t>
         left;  // indices of the first splats that are kept; only if no edit merges or sorts splats

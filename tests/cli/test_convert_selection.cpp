@@ -43,6 +43,22 @@ TEST_F(ConvertSelection, ChangesTheSelectedSplatsAlone) {
     EXPECT_NE(converted({"--select", "x=0..", "--adjust", "tint=0,1,1;opacity=0.5"}).sh, before.sh);
 }
 
+TEST_F(ConvertSelection, WarnsWhereNothingIsSelected) {
+    const auto warned = [&](const std::vector<std::string>& edits) {
+        std::vector<std::string> arguments{"convert", splats_, out_, "--quiet"};
+        arguments.insert(arguments.end(), edits.begin(), edits.end());
+        const Outcome outcome = run_ewa(arguments);
+        EXPECT_EQ(outcome.status, 0);
+        EXPECT_EQ(read_splats(out_).gaussians.size(), 200u);
+        return outcome.err;
+    };
+    EXPECT_EQ(warned({"--delete"}), "warning: --delete changed nothing: no splat is selected\n");
+    EXPECT_EQ(warned({"--select", "x=900..", "--transform", "move=1,0,0"}),
+              "warning: --select x=900.. selects no splat\n"
+              "warning: --transform changed nothing: no splat is selected\n");
+    EXPECT_EQ(warned({"--select", "all", "--lock", "--unlock", "--select", "none"}), "");
+}
+
 TEST_F(ConvertSelection, ReplaysAJournal) {
     const std::string journal = folder_ / "splats.ply.edits";
     write_file(journal,
