@@ -27,7 +27,18 @@ void transform_about(Gaussians& splats, const glm::dmat4& matrix, const glm::dve
     splats.origin = origin;
 }
 
+/// Rounds the means to float32 about another origin.
+void move_origin(Gaussians& splats, const glm::dvec3& origin) {
+    const glm::dvec3 apart = splats.origin - origin;
+    if (apart == glm::dvec3(0)) return;
+    for (size_t k = 0; k < splats.means.size(); ++k)
+        splats.means[k] = float(splats.means[k] + apart[int(k % 3)]);
+    splats.origin = origin;
+}
+
+/// Of a reset, the splats have the first values already.
 void apply_edit(Gaussians& splats, const ValueEdit& edit, const glm::dvec3& origin) {
+    if (std::holds_alternative<Reset>(edit)) move_origin(splats, origin);
     if (const auto* matrix = std::get_if<glm::dmat4>(&edit)) transform_about(splats, *matrix, origin);
     if (const auto* adjustment = std::get_if<Adjustment>(&edit))
         change_splats(splats, "--adjust", [&](Gaussians& g) { adjust_splats(g, *adjustment); });
@@ -109,6 +120,13 @@ const glm::dvec3& EditedSplats::origin_of(uint32_t group) const {
     return group == 0 ? first_->origin : groups_[group - 1].origin;
 }
 
+/// The values that splats had at first.
+Gaussians EditedSplats::first_values(std::vector<uint32_t> indices) const {
+    for (uint32_t& i : indices)
+        if (i >= first_->size()) i = sources_[i - first_->size()];
+    return scene::rows_of(*first_, indices);
+}
+
 /// The values of splats that are all in one group.
 Gaussians EditedSplats::values_of(uint32_t group, const std::vector<uint32_t>& indices) const {
     std::vector<uint32_t> chain;
@@ -116,10 +134,7 @@ Gaussians EditedSplats::values_of(uint32_t group, const std::vector<uint32_t>& i
         chain.push_back(group);
         if (std::holds_alternative<Reset>(groups_[group - 1].edit)) break;
     }
-    std::vector<uint32_t> sources = indices;
-    for (uint32_t& i : sources)
-        if (i >= first_->size()) i = sources_[i - first_->size()];
-    Gaussians values = scene::rows_of(*first_, sources);
+    Gaussians values = first_values(indices);
     for (auto g = chain.rbegin(); g != chain.rend(); ++g)
         apply_edit(values, groups_[*g - 1].edit, groups_[*g - 1].origin);
     return values;
@@ -133,37 +148,25 @@ Gaussians& EditedSplats::writable() {
     return *own_;
 }
 
-void EditedSplats::set_values(const std::vector<uint32_t>& indices, const Gaussians& values) {
+void EditedSplats::set_values(const std::vector<uint32_t>& indices, Gaussians values) {
     Gaussians& splats = writable();
-    const glm::dvec3 apart = values.origin - splats.origin;
-    for (size_t k = 0; k < indices.size(); ++k) {
-        scene::copy_splats(values, k, 1, splats, indices[k]);
-        if (apart == glm::dvec3(0)) continue;
-        for (int axis = 0; axis < 3; ++axis)
-            splats.means[3 * indices[k] + size_t(axis)] =
-                float(values.means[3 * k + size_t(axis)] + apart[axis]);
-    }
+    move_origin(values, splats.origin);
+    for (size_t k = 0; k < indices.size(); ++k) scene::copy_splats(values, k, 1, splats, indices[k]);
 }
 
 void EditedSplats::change(const ValueEdit& edit) {
     const std::vector<uint32_t> indices = affected_splats();
     if (indices.empty()) return;
     glm::dvec3 origin = now_->origin;
-    Gaussians values = scene::rows_of(*now_, indices);
-    if (std::holds_alternative<Reset>(edit)) {
-        std::vector<uint32_t> sources = indices;
-        for (uint32_t& i : sources)
-            if (i >= first_->size()) i = sources_[i - first_->size()];
-        values = scene::rows_of(*first_, sources);
-    } else {
-        // The origin changes only with all splats.
-        if (const auto* matrix = std::get_if<glm::dmat4>(&edit); matrix && indices.size() == size()) {
-            Gaussians moved = values;
-            place_splats(moved, *matrix, "--transform");
-            origin = moved.origin;
-        }
-        apply_edit(values, edit, origin);
+    Gaussians values =
+        std::holds_alternative<Reset>(edit) ? first_values(indices) : scene::rows_of(*now_, indices);
+    // The origin changes only with all splats.
+    if (const auto* matrix = std::get_if<glm::dmat4>(&edit); matrix && indices.size() == size()) {
+        Gaussians moved = values;
+        place_splats(moved, *matrix, "--transform");
+        origin = moved.origin;
     }
+    apply_edit(values, edit, origin);
     group_of_.resize(size());
     std::map<uint32_t, uint32_t> children;  // by the group that a splat was in
     for (const uint32_t i : indices) {
@@ -172,7 +175,7 @@ void EditedSplats::change(const ValueEdit& edit) {
         group_of_[i] = child->second;
     }
     writable().origin = origin;
-    set_values(indices, values);
+    set_values(indices, std::move(values));
 }
 
 void EditedSplats::duplicate() {

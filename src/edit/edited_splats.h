@@ -87,8 +87,9 @@ class EditedSplats {
     };
     std::vector<uint32_t> affected_splats() const;
     const glm::dvec3& origin_of(uint32_t group) const;
+    Gaussians first_values(std::vector<uint32_t> indices) const;
     Gaussians values_of(uint32_t group, const std::vector<uint32_t>& indices) const;
-    void set_values(const std::vector<uint32_t>& indices, const Gaussians& values);
+    void set_values(const std::vector<uint32_t>& indices, Gaussians values);
     Gaussians& writable();
     void take_back(size_t groups);  // groups: that remain
 

@@ -144,5 +144,28 @@ TEST(BrushByExtent, TakesTheEllipsesThatItTouches) {
     EXPECT_GT(left, 1000u);
 }
 
+TEST(Undo, AfterAResetInAnotherOriginGivesTheSameBits) {
+    Random random(8);
+    Gaussians far;
+    far.resize(200);
+    for (float& v : far.means) v = float(random.uniform(-5, 5));
+    for (float& v : far.quaternions) v = float(random.normal());
+    far.origin = {5e5, 4e6, 100};
+    edit::EditedSplats splats(std::make_shared<const Gaussians>(far));
+    do_edit(splats, "select", "all");
+    do_edit(splats, "transform", "move=-499990.1,-3999990.3,0");
+    ASSERT_NE(splats.splats()->origin, far.origin);
+    do_edit(splats, "select", "x=10..");
+    ASSERT_GT(splats.count(edit::kSelected), 50u);
+    do_edit(splats, "reset", "");
+    do_edit(splats, "transform", "turn=0.1,0.2,0.3,40");
+    const std::vector<float> before = splats.splats()->means;
+    const edit::EditedSplats::Extent extent = splats.extent();
+    do_edit(splats, "transform", "scale=1.1");
+    EXPECT_NE(splats.splats()->means, before);
+    splats.rewind(extent);
+    EXPECT_EQ(splats.splats()->means, before);
+}
+
 }  // namespace
 }  // namespace ewa::test
