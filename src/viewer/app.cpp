@@ -24,8 +24,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double kPollSeconds = 0.05;  // while a better frame, a file or a screenshot is on its way
-constexpr int kMostDevicesLost = 5;    // a device that is lost more often is broken
+constexpr double kPollSeconds = 0.05;   // while a better frame, a file or a screenshot is on its way
+constexpr double kDialogSeconds = 0.3;  // from one frame of an open dialog to the next
+constexpr int kMostDevicesLost = 5;     // a device that is lost more often is broken
 constexpr float kScaleStep = 1.25f, kLeastScale = 0.05f, kMostScale = 2;
 
 void toggle(bool& setting) {
@@ -80,6 +81,8 @@ void App::run() {
         const double seconds = std::chrono::duration<double>(now - loop.last_frame).count();
         loop.last_frame = now;
         if (state_.window.stirred()) loop.redraws = Loop::kRedraws;
+        // Some dialogs show the seconds.
+        if (state_.woken.exchange(false) || dialogs_.open()) state_.redraw();
         if (state_.message.expire(now)) state_.redraw();
         if (!state_.scripted()) {
             for (const KeyPress& key : keys) handle_key(key);
@@ -113,7 +116,7 @@ double App::patience() const {
     if (state_.loop.redraws > 0 || navigation_.flying() || state_.settings.turntable || film_.playing())
         return 1.0 / 60;
     const bool waits = shown_.renders.reduced() || session_.waiting() || editor_.busy() || editor_.saving();
-    return waits || dialogs_.open() ? kPollSeconds : 1.0;
+    return waits ? kPollSeconds : dialogs_.open() ? kDialogSeconds : 1.0;
 }
 
 /// Opens the screen, also with another size of the text or another theme.

@@ -3,6 +3,7 @@
 // the command line.
 #pragma once
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <functional>
@@ -99,7 +100,11 @@ struct ViewState {
     std::unique_ptr<TrainProcess> trainer;  // started by the window, which is closed before it ends
     WindowSystem system;
     Window window;
-    std::function<void()> wake = [this] { system.wake(); };  // any thread may call it, while the state lives
+    std::atomic<bool> woken = false;  // by wake(), so the next frame shows news
+    std::function<void()> wake = [this] {
+        woken = true;
+        system.wake();
+    };  // any thread may call it, while the state lives
     OpenedScene scene;
     PanelSettings settings;
     std::string device_name;
