@@ -47,6 +47,13 @@ void plot(const char* name, const std::vector<float>& values, const char* format
     ImGui::PopID();
 }
 
+/// Whether all steps are done. A copied folder does not tell by the times of its files that its run has ended.
+bool has_trained(const live::Update& run) {
+    const live::Status& status = run.status;
+    return status.steps > 0 && status.step >= status.steps &&
+           (status.state == live::State::done || !run.connected);
+}
+
 void show_progress(const live::Update& run) {
     const live::Status& status = run.status;
     std::array<char, 96> text{};
@@ -55,9 +62,8 @@ void show_progress(const live::Update& run) {
                       run.problem.empty() ? "waiting for the first step ..." : "no training is reached");
     } else {
         const char* state = status.state == live::State::paused ? "paused"
-                            : status.state != live::State::done ? "training"
-                            : status.step < status.steps        ? "interrupted"
-                                                                : "done";
+                            : status.state == live::State::done ? "interrupted"
+                                                                : "training";
         std::snprintf(text.data(), text.size(), "%s: step %d of %d, %.0f s", state, status.step, status.steps,
                       status.seconds);
     }
@@ -127,11 +133,20 @@ void choose_training(const PanelFacts& facts, PanelSettings& settings, PanelActi
         settings.train_steps = std::clamp(settings.train_steps, 1, kMostSteps);
 }
 
+void draw_commands(const live::Update& run, PanelActions& actions) {
+    const bool paused = run.status.state == live::State::paused;
+    ImGui::BeginDisabled(run.status.state == live::State::done || !run.connected || !run.status.commands);
+    if (ImGui::Button(paused ? "Resume###pause" : "Pause###pause"))
+        actions.command = paused ? "resume" : "pause";
+    ImGui::SameLine();
+    if (ImGui::Button("Save now")) actions.command = "save";
+    ImGui::EndDisabled();
+}
+
 std::string remark_of(const PanelFacts& facts) {
     const live::Update& run = *facts.run;
     if (!run.problem.empty()) return run.problem;
-    if (run.status.state == live::State::done && run.status.step == run.status.steps)
-        return how_to_share(facts.run_folder);
+    if (has_trained(run)) return how_to_share(facts.run_folder);
     if (run.status.state == live::State::done) return "";
     if (run.connected) return run.status.commands ? "" : "watching; --token lets you pause and save";
     if (facts.scene.points) return "no splats are saved yet; --serve or --save-every lets the picture move";
@@ -143,15 +158,15 @@ std::string remark_of(const PanelFacts& facts) {
 void draw_training(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
     if (!facts.run) return choose_training(facts, settings, actions);
     const live::Update& run = *facts.run;
-    show_progress(run);
-    const bool paused = run.status.state == live::State::paused;
-    ImGui::BeginDisabled(run.status.state == live::State::done || !run.connected || !run.status.commands);
-    if (ImGui::Button(paused ? "Resume###pause" : "Pause###pause"))
-        actions.command = paused ? "resume" : "pause";
-    ImGui::SameLine();
-    if (ImGui::Button("Save now")) actions.command = "save";
-    ImGui::EndDisabled();
-    show_step(facts);
+    if (has_trained(run)) {
+        ImGui::TextUnformatted(("trained: " + core::grouped(uint64_t(run.status.steps)) +
+                                (run.status.steps == 1 ? " step" : " steps"))
+                                   .c_str());
+    } else {
+        show_progress(run);
+        draw_commands(run, actions);
+        show_step(facts);
+    }
     draw_text_box("training remark", remark_of(facts), 0, 3);
     show_curves(run.status);
 }
