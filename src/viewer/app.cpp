@@ -12,7 +12,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/folders.h"
 #include "core/process.h"
 #include "ewa/error.h"
 #include "folders/run_folder.h"
@@ -44,6 +43,7 @@ App::App(const Startup& startup)
       tools_(state_, navigation_, shown_, editor_),
       film_(state_, navigation_, shown_),
       dialogs_(editor_, session_.dialog, state_.wake, [this](const std::string& note) { state_.say(note); }) {
+    dialogs_.views_file = [this] { return film_views(); };
     change_text();
     state_.loop.last_frame = Clock::now();
     state_.message.hint();
@@ -316,6 +316,22 @@ bool App::editing() const {
 bool App::live() const {
     const live::Update* run = session_.live_run.update();
     return run && run->status.state != live::State::done && run->connected;
+}
+
+/// Writes the keys of the film for the page that Publish makes. Empty: there are none.
+std::filesystem::path App::film_views() {
+    std::vector<io::NamedView> keys = navigation_.views;
+    if (keys.empty()) return {};
+    give_times(keys, double(state_.settings.film_seconds));
+    try {
+        if (!film_folder_) film_folder_.emplace("ewa-views-");
+        const std::filesystem::path file = film_folder_->path() / "views.json";
+        io::write_views(file, keys);
+        return file;
+    } catch (const RunError& error) {
+        state_.say(error.what());
+        return {};
+    }
 }
 
 void App::open(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown) {

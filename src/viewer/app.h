@@ -2,7 +2,9 @@
 // The viewer's window thread: turns input into requests, and finished frames into what the window shows.
 #pragma once
 #include <memory>
+#include <optional>
 
+#include "core/folders.h"
 #include "viewer/editor/dialogs.h"
 #include "viewer/editor/edit_panel.h"
 #include "viewer/editor/editor.h"
@@ -48,6 +50,7 @@ class App {
     bool live() const;     // edits go to a training
     void sync_editor();
     void enter_scene();
+    std::filesystem::path film_views();
     void send_edits(const std::vector<edit::Step>& done);
     void open(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown);
 
@@ -63,6 +66,7 @@ class App {
     Tools tools_;
     EditPanel edit_panel_;
     FilmStrip film_;
+    std::optional<core::TemporaryFolder> film_folder_;  // what film_views() writes, while Publish reads it
     Dialogs dialogs_;
     std::shared_ptr<const Gaussians> entered_,
         drawn_;                     // the scene that is edited, and what of it the render thread has
