@@ -182,6 +182,7 @@ void Navigation::add_view(std::optional<double> time) {
     while (find(free) != views.end()) ++free;
     save_view(free);
     views.back().time = time;
+    if (time) state_.say("Key " + std::to_string(free) + " added");
 }
 
 void Navigation::save_view(size_t number) {
