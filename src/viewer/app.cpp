@@ -102,6 +102,9 @@ void App::run() {
         session_.take_live();
         if (!state_.scripted()) sync_editor();
         film_.take();
+        // A drag is one change.
+        if (!ImGui::IsMouseDown(ImGuiMouseButton_Left))
+            view_history_.watch(navigation_.views, editor_.snapshot().done);
         if (loop.redraws > 0) draw();
         shown_.ask();
     }
@@ -156,6 +159,8 @@ void App::handle_key(const KeyPress& press) {
         return;
     }
     const bool undoes = press.control && (key == GLFW_KEY_Z || key == GLFW_KEY_Y);
+    if (undoes && film_.shown && undo_film(key == GLFW_KEY_Y || press.shift))
+        return state_.redraw(Loop::kRedraws);
     if ((editing() || undoes) && tools_.handle_key(press)) return state_.redraw(Loop::kRedraws);
     float& scale = settings.look.splat_scale;
     if (key == GLFW_KEY_MINUS || key == GLFW_KEY_KP_SUBTRACT)
@@ -165,6 +170,13 @@ void App::handle_key(const KeyPress& press) {
     if (key == GLFW_KEY_M) toggle(settings.measure);
     if (key == GLFW_KEY_V) shown_.change_comparison();
     if (!film_.handle_key(press)) navigation_.handle_key(press);
+}
+
+/// Undoes or redoes a change of the film's keys, if it is later than the last edit.
+bool App::undo_film(bool again) {
+    const size_t edits = editor_.snapshot().done;
+    std::vector<io::NamedView>& keys = navigation_.views;
+    return again ? view_history_.redo(keys, edits) : view_history_.undo(keys, edits);
 }
 
 void App::handle_mouse() {

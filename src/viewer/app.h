@@ -14,6 +14,7 @@
 #include "viewer/navigation.h"
 #include "viewer/screen.h"
 #include "viewer/shown.h"
+#include "viewer/view_history.h"
 #include "viewer/view_session.h"
 #include "viewer/view_state.h"
 
@@ -35,6 +36,7 @@ class App {
 
     // Input.
     void handle_key(const KeyPress& press);
+    bool undo_film(bool again);
     void handle_mouse();
     void obey(const PanelActions& actions);
 
@@ -66,6 +68,7 @@ class App {
     Tools tools_;
     EditPanel edit_panel_;
     FilmStrip film_;
+    ViewHistory view_history_{navigation_.views};
     std::optional<core::TemporaryFolder> film_folder_;  // what film_views() writes, while Publish reads it
     Dialogs dialogs_;
     std::shared_ptr<const Gaussians> entered_,
