@@ -103,6 +103,7 @@ void SessionTimes::print(const RenderedFrame* last) const {
 
 void Renders::set_scene(std::shared_ptr<const Gaussians> gaussians, Draft draft) {
     scene_ = thread_.set_scene(std::move(gaussians));
+    marked_ = false;
     set_draft(std::move(draft));
 }
 
@@ -113,6 +114,7 @@ void Renders::set_draft(Draft draft) {
 
 void Renders::set_marks(std::shared_ptr<const std::vector<uint8_t>> marks) {
     ++marks_;
+    marked_ = marks != nullptr;
     thread_.set_marks(std::move(marks));
 }
 

@@ -84,6 +84,7 @@ class Renders {
     void set_draft(Draft draft);
     /// Sets the marks of the scene's splats, as RenderThread::set_marks().
     void set_marks(std::shared_ptr<const std::vector<uint8_t>> marks);
+    bool marked() const { return marked_; }
     /// Asks for the view if it changed, or in full resolution once it has rested. full: always in full
     /// resolution.
     void ask(const Camera& camera, const Look& look, bool full);
@@ -118,7 +119,7 @@ class Renders {
     void send(const RenderRequest& request);
 
     uint64_t scene_ = 0, asked_scene_ = 0;
-    bool has_draft_ = false;
+    bool has_draft_ = false, marked_ = false;
     uint64_t marks_ = 0, asked_marks_ = 0;  // numbers of set_marks()
     RenderRequest asked_;
     Clock::time_point changed_;  // last change of the requested view

@@ -131,6 +131,7 @@ Camera Shown::camera(Size size) const {
 
 Look Shown::look_for(const Camera& camera) const {
     Look look = state_.settings.look;
+    look.plain = plain_wanted();
     if (camera.distortion.none()) return look;
     look.points = false;
     return look;
@@ -233,7 +234,7 @@ std::vector<Layer> Shown::layers() const {
 }
 
 bool Shown::complete() const {
-    return renders.settled() &&
+    return renders.settled() && renders.shown()->request.look.plain == plain_wanted() &&
            (comparison() == Comparison::none || images_.loaded(*navigation_.at_camera)) &&
            (!images_.requested() || images_.compared());
 }

@@ -55,7 +55,7 @@ class Shown {
     Arrangement arrangement() const;
     Camera camera() const { return camera(arrangement().rendering.size()); }  // of the render's place
     Camera camera(Size size) const;
-    /// The look of the settings. If the camera's lens has distortion, splats are not drawn as points.
+    /// The look of the settings, for a screenshot without tints. If the camera's lens has distortion, splats are not drawn as points.
     Look look_for(const Camera& camera) const;
     std::string image_failure() const;    // why the camera has no image; else empty
     const std::optional<double>& psnr();  // for the panel, dB
@@ -70,6 +70,7 @@ class Shown {
     void forget_points();
     std::optional<Camera> requested_camera() const;
     std::optional<ComparisonRequest> comparison_wanted() const;
+    bool plain_wanted() const { return state_.loop.capture && renders.marked(); }
     bool full_colours() const;  // the last frame shows them, as asked
 
     ViewState& state_;

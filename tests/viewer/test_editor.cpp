@@ -121,6 +121,16 @@ TEST_F(Editor, RestoresTheEditsOfASessionThatWasKilled) {
     EXPECT_EQ(saved(session, folder_ / "restored.ply"), half);
 }
 
+TEST_F(Editor, DoesNotTintAScreenshot) {
+    Session session(shots_, arguments());
+    ASSERT_TRUE(session.found());
+    const Image first = screenshot(session);
+    session.send("key Tab key ctrl+a");
+    EXPECT_TRUE(journal_has(2));
+    session.send("sleep 2");
+    EXPECT_EQ(largest_difference(screenshot(session), first), 0);
+}
+
 TEST_F(Editor, MovesTheSelectionAndCleansByTheCommandLine) {
     Session session(shots_, arguments());
     ASSERT_TRUE(session.found());
