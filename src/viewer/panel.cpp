@@ -282,6 +282,18 @@ float footer_height(const PanelFacts& facts) {
            (lines > 0 ? float(lines) * ImGui::GetTextLineHeight() + gap : 0);
 }
 
+/// Keeps which sections of a tab are open, and how far it is scrolled. Another theme or text size begins with a new ImGui.
+void keep_rows(PanelTab tab) {
+    static std::array<ImGuiStorage, 2> sections;
+    static std::array<float, 2> scrolled{};  // in heights of the text
+    ImGui::SetStateStorage(&sections[size_t(tab)]);
+    const float line = ImGui::GetTextLineHeight();
+    if (ImGui::IsWindowAppearing())
+        ImGui::SetScrollY(scrolled[size_t(tab)] * line);
+    else
+        scrolled[size_t(tab)] = ImGui::GetScrollY() / line;
+}
+
 }  // namespace
 
 void label_field(const char* label) {
@@ -345,6 +357,7 @@ PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings,
         const float footer = footer_height(facts);
         const bool low = height < 3 * footer;
         ImGui::BeginChild(editing ? "edits" : "rows", ImVec2(0, low ? 0 : -footer));
+        keep_rows(editing ? PanelTab::edit : PanelTab::view);
         if (editing)
             edit_rows();
         else
