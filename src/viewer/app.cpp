@@ -90,7 +90,7 @@ void App::run() {
             film_.advance(seconds);
             if (const auto dropped = state_.window.take_dropped(); !dropped.empty())
                 open(dropped, state_.scene);
-            dialogs_.take();
+            if (dialogs_.take()) state_.redraw(Loop::kRedraws);
             if (const auto chosen = session_.take_chosen(); !chosen.empty()) open(chosen, {});
             change_text();
         }

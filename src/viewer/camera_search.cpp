@@ -44,8 +44,7 @@ fs::path free_run_folder(const fs::path& input, bool or_own_photos) {
 void CameraSearch::start(const fs::path& photos, const fs::path& folder, const CaptureOptions& options) {
     stop_ = false;
     progress_ = {};
-    found_ = std::async(std::launch::async, [=, this]() -> std::optional<OpenedScene> {
-        const Wake at_end{wake_};
+    found_.start(wake_, [=, this]() -> std::optional<OpenedScene> {
         const Capture capture =
             make_dataset(photos, folder, options, [this](const CaptureProgress& now) { return note(now); });
         if (capture.interrupted) return std::nullopt;

@@ -4,7 +4,6 @@
 #include <atomic>
 #include <filesystem>
 #include <functional>
-#include <future>
 #include <mutex>
 #include <optional>
 
@@ -30,13 +29,13 @@ class CameraSearch {
     /// Starts a search, which makes the dataset `folder` of the photos. No other search may be running.
     void start(const std::filesystem::path& photos, const std::filesystem::path& folder,
                const CaptureOptions& options);
-    bool running() const { return found_.valid(); }
-    bool ended() const { return finished(found_); }
+    bool running() const { return found_.running(); }
+    bool ended() const { return found_.ready(); }
     void cancel() { stop_ = true; }
     CaptureProgress progress() const;
 
     /// Returns the opened dataset once the search has ended. Empty if the search was cancelled. Throws InputError, RunError.
-    std::optional<OpenedScene> take() { return found_.get(); }
+    std::optional<OpenedScene> take() { return found_.take(); }
 
   private:
     bool note(const CaptureProgress& now);
@@ -45,7 +44,7 @@ class CameraSearch {
     std::atomic<bool> stop_ = false;
     mutable std::mutex mutex_;
     CaptureProgress progress_;
-    std::future<std::optional<OpenedScene>> found_;  // its thread ends before the rest
+    Task<std::optional<OpenedScene>> found_;  // its thread ends before the rest
 };
 
 }  // namespace ewa::viewer

@@ -8,7 +8,6 @@
 
 #include "core/process.h"
 #include "ewa/error.h"
-#include "viewer/latest.h"
 
 namespace ewa::viewer {
 namespace {
@@ -55,16 +54,15 @@ void FileDialog::ask(Wanted wanted, const fs::path& proposed) {
     wanted_ = wanted;
     std::error_code unknown;  // dialogs know no current folder
     fs::path begin = proposed.empty() ? fs::path() : fs::absolute(proposed, unknown);
-    answer_ = std::async(std::launch::async, [this, wanted, begin = std::move(begin)] {
-        const Wake at_end{wake_};
+    answer_.start(wake_, [this, wanted, begin = std::move(begin)] {
         fs::path chosen;
         return ask_portal(wanted, begin, stop_, chosen) ? chosen : ask_program(wanted, begin, stop_);
     });
 }
 
 std::optional<fs::path> FileDialog::take() {
-    if (!finished(answer_)) return std::nullopt;
-    fs::path chosen = answer_.get();
+    if (!answer_.ready()) return std::nullopt;
+    fs::path chosen = answer_.take();
     if (chosen.empty()) return std::nullopt;
     return chosen;
 }

@@ -4,9 +4,10 @@
 #include <atomic>
 #include <filesystem>
 #include <functional>
-#include <future>
 #include <optional>
 #include <string_view>
+
+#include "viewer/latest.h"
 
 namespace ewa::viewer {
 
@@ -24,7 +25,7 @@ class FileDialog {
 
     /// Opens the dialog, unless one is open. proposed: for Wanted::save, the file that the dialog begins with.
     void ask(Wanted wanted, const std::filesystem::path& proposed = {});
-    bool open() const { return answer_.valid(); }
+    bool open() const { return answer_.running(); }
     /// What the last dialog asked for. So each part of the window takes its own answers.
     Wanted wanted() const { return wanted_; }
     /// Returns the path that the user has chosen, once. Throws RunError if the system has no such dialog.
@@ -34,7 +35,7 @@ class FileDialog {
     std::function<void()> wake_;
     std::atomic<bool> stop_ = false;
     Wanted wanted_ = Wanted::file;
-    std::future<std::filesystem::path> answer_;  // its thread ends before the rest
+    Task<std::filesystem::path> answer_;  // its thread ends before the rest
 };
 
 /// Asks org.freedesktop.portal.FileChooser on the session bus. Returns false if no portal answers on the bus. chosen: the path;

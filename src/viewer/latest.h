@@ -13,16 +13,35 @@
 
 namespace ewa::viewer {
 
-/// Calls `wake` where it ends.
-struct Wake {
-    const std::function<void()>& wake;
-    ~Wake() { wake(); }
-};
-
 template <class Result>
 bool finished(const std::future<Result>& future) {
     return future.valid() && future.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
 }
+
+/// Work on a thread of its own. The destructor waits until it ends.
+template <class Result>
+class Task {
+  public:
+    /// Starts the work. No other may be running. wake: called on the thread, once ready() is true.
+    template <class Work>
+    void start(std::function<void()> wake, Work work) {
+        std::packaged_task<Result()> task(std::move(work));
+        result_ = task.get_future();
+        thread_ = std::jthread([task = std::move(task), wake = std::move(wake)]() mutable {
+            task();
+            wake();
+        });
+    }
+    /// From start() to take().
+    bool running() const { return result_.valid(); }
+    bool ready() const { return finished(result_); }
+    /// The result of the work, once. Throws what the work has thrown.
+    Result take() { return result_.get(); }
+
+  private:
+    std::future<Result> result_;
+    std::jthread thread_;
+};
 
 /// Work on a thread of its own, of which only the last request matters.
 template <class Request, class Result>

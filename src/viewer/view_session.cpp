@@ -55,19 +55,18 @@ void ViewSession::show_opened(OpenedScene scene) {
 }
 
 void ViewSession::open(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown) {
-    if (opening_.valid()) return state_.say("another file is being opened");
+    if (opening_.running()) return state_.say("another file is being opened");
     if (search.running()) return state_.say("cameras of photos are being found; Esc stops that");
     state_.say("opening " + core::one_line(paths.front().string()));
-    opening_ = std::async(std::launch::async, [this, paths, shown, budget = state_.startup.budget] {
-        const Wake at_end{state_.wake};
+    opening_.start(state_.wake, [paths, shown, budget = state_.startup.budget] {
         return open_dropped(paths, shown, budget);
     });
 }
 
 void ViewSession::take_opened() {
-    if (!finished(opening_)) return;
+    if (!opening_.ready()) return;
     try {
-        OpenedScene scene = opening_.get();
+        OpenedScene scene = opening_.take();
         if (!scene.photos.empty()) return find_cameras(scene.photos);
         const bool same_splats = scene.gaussians == state_.scene.gaussians;
         show_opened(std::move(scene));
@@ -214,8 +213,7 @@ void ViewSession::save(Image&& image) {
         state_.loop.done = true;
         return;
     }
-    saving_ = std::async(std::launch::async, [this, image = std::move(image)]() -> std::string {
-        const Wake at_end{state_.wake};
+    saving_.start(state_.wake, [image = std::move(image)]() -> std::string {
         try {
             const std::filesystem::path path = free_name("ewa-view", ".png");
             save_image(path, image);
@@ -227,18 +225,18 @@ void ViewSession::save(Image&& image) {
 }
 
 void ViewSession::take_saved() {
-    if (finished(saving_)) state_.say(saving_.get());
+    if (saving_.ready()) state_.say(saving_.take());
 }
 
 bool ViewSession::empty() const {
-    return state_.empty() && !opening_.valid() && !search.running() && !live_run.update();
+    return state_.empty() && !opening_.running() && !search.running() && !live_run.update();
 }
 
 std::optional<Headline> ViewSession::headline() const {
     const OpenedScene& scene = state_.scene;
     if (scene.gaussians->size() > 0 || search.running()) return std::nullopt;
     if (!search_failure_.empty() && !scene.dataset) return Headline{"no cameras", search_failure_};
-    if (opening_.valid()) return Headline{"opening ...", ""};
+    if (opening_.running()) return Headline{"opening ...", ""};
     if (const live::Update* run = live_run.update()) {
         if (!run->problem.empty())
             return Headline{run->problem, "The window keeps trying, and shows the training once it answers."};

@@ -2,7 +2,6 @@
 // Work in the background of the window: opening scenes, watching training runs, finding cameras, and saving screenshots.
 #pragma once
 #include <filesystem>
-#include <future>
 #include <optional>
 #include <string>
 #include <vector>
@@ -39,8 +38,8 @@ class ViewSession {
     void take_saved();
     void take_live();  // new splats of the run replace those that are shown
 
-    bool saving() const { return saving_.valid(); }
-    bool waiting() const { return opening_.valid() || saving_.valid() || dialog.open(); }
+    bool saving() const { return saving_.running(); }
+    bool waiting() const { return opening_.running() || saving() || dialog.open(); }
     bool empty() const;  // nothing is open, nor on its way
     /// The text in the middle of the window while it shows no splats.
     std::optional<Headline> headline() const;
@@ -64,8 +63,8 @@ class ViewSession {
     bool offer_answered_ = false;
     bool live_failed_ = false;    // a training that cannot be reached was reported
     std::string search_failure_;  // why photos have no cameras; one line
-    std::future<OpenedScene> opening_;
-    std::future<std::string> saving_;  // a screenshot; the message about it
+    Task<OpenedScene> opening_;
+    Task<std::string> saving_;  // a screenshot; the message about it
 };
 
 }  // namespace ewa::viewer

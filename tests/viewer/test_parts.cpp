@@ -2,12 +2,16 @@
 // The parts of the viewer that are independent of the window: camera, first view, modes, resolution.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
 
+#include "ewa/error.h"
+#include "support/soon.h"
 #include "viewer/byte_image.h"
+#include "viewer/latest.h"
 #include "viewer/measurement.h"
 #include "viewer/renders.h"
 #include "viewer/view_camera.h"
@@ -341,6 +345,26 @@ TEST(Fluency, CountsPicturesOfAMovingCamera) {
     EXPECT_EQ(fluency.count(), 20u);
     EXPECT_NEAR(fluency.seconds(), 2, 1e-6);
     EXPECT_EQ(fluency.by_divisor(), (std::map<int, uint64_t>{{2, 5}, {3, 15}}));
+}
+
+TEST(ATask, WakesOnceItsResultCanBeTaken) {
+    for (const bool fails : {false, true}) {
+        Task<int> task;
+        std::atomic<int> wakes = 0, ready = 0;
+        const auto wake = [&] {
+            ready += task.ready() ? 1 : 0;
+            ++wakes;
+        };
+        task.start(wake, [fails] { return fails ? throw InputError("no") : 3; });
+        EXPECT_TRUE(task.running());
+        EXPECT_TRUE(test::soon([&] { return wakes == 1; }));
+        EXPECT_EQ(ready, 1) << "the window would wake in vain";
+        if (fails)
+            EXPECT_THROW(task.take(), InputError);
+        else
+            EXPECT_EQ(task.take(), 3);
+        EXPECT_FALSE(task.running() || task.ready());
+    }
 }
 
 }  // namespace

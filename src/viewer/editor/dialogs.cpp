@@ -328,15 +328,16 @@ bool Dialogs::open() const {
     return state_->shown != DialogKind::none;
 }
 
-void Dialogs::take() {
+bool Dialogs::take() {
     State& state = *state_;
-    state.path.take(state.files);
-    state.publish.take();
-    if (state.shown != DialogKind::saving || state.editor.saving()) return;
-    state.shown = DialogKind::none;
+    const bool chosen = state.path.take(state.files), published = state.publish.take();
+    if (state.shown != DialogKind::saving || state.editor.saving()) return chosen || published;
     // A save that has failed, and scenes that were not saved, leave unsaved edits.
-    if (state.editor.unsaved()) return void(state.shown = DialogKind::leave);
+    const bool failed = state.editor.unsaved();
+    state.shown = failed ? DialogKind::leave : DialogKind::none;
+    if (failed) return true;
     if (const std::function<void()> go_on = std::exchange(state.go_on, nullptr)) state.pass(go_on);
+    return true;
 }
 
 }  // namespace ewa::viewer

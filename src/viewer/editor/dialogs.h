@@ -30,10 +30,11 @@ class Dialogs {
     void offer_journal(const std::filesystem::path& file, size_t splats);
     /// Draws what is open. Call it once per frame of ImGui.
     void draw();
-    /// Whether a dialog is open. It then has all keys, and the window draws frames.
+    /// Whether a dialog is open. It then has all keys.
     bool open() const;
-    /// Takes the answers of the file dialog and of background work. Call it once per turn of the window's loop.
-    void take();
+    /// Takes the answers of the file dialog and of background work. Call it once per turn of the window's loop. Returns whether
+    /// draw() shows something else than before.
+    bool take();
 
   private:
     struct State;

@@ -5,13 +5,12 @@
 #include <utility>
 
 #include "core/folders.h"
-#include "core/process.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 #include "viewer/editor/edit_words.h"
 #include "viewer/editor/edit_worker.h"
-#include "viewer/latest.h"
+#include "viewer/editor/publish.h"
 
 namespace ewa::viewer {
 namespace {
@@ -27,12 +26,8 @@ struct Part {
 
 /// Runs `ewa`. Throws RunError with what it said.
 void run_ewa_program(const fs::path& program, std::vector<std::string> arguments) {
-    core::Program run;
-    run.command = {program.string()};
-    run.command.insert(run.command.end(), arguments.begin(), arguments.end());
-    run.joined = true;
     std::string said;
-    const core::Ended ended = core::run_program(run, [&](std::string_view text) {
+    const core::Ended ended = run_ewa(program, std::move(arguments), [&](std::string_view text) {
         said += text;
         return true;
     });
@@ -215,8 +210,8 @@ Editor::News Editor::take() {
     }
     for (const auto& scene : scenes_)
         if (std::ranges::find(done.changed, scene->id) != done.changed.end()) scene->unsaved = true;
-    if (finished(saving_)) {
-        const Saved saved = saving_.get();
+    if (saving_.ready()) {
+        const Saved saved = saving_.take();
         news.any = true;
         news.note = saved.note;
         for (const auto& scene : scenes_)
@@ -226,7 +221,7 @@ Editor::News Editor::take() {
 }
 
 void Editor::save(const fs::path& file, bool all) {
-    if (scenes_.empty() || saving_.valid()) return;
+    if (scenes_.empty() || saving_.running()) return;
     std::vector<Part> parts;
     for (size_t i = 0; i < scenes_.size(); ++i) {
         EditedScene& scene = *scenes_[i];
@@ -234,8 +229,7 @@ void Editor::save(const fs::path& file, bool all) {
         parts.push_back({scene.id, scene.file, worker_->state_of(scene.id)});
         scene.unsaved = false;  // edits from now on set it again
     }
-    saving_ = std::async(std::launch::async, [this, file, parts = std::move(parts)]() mutable {
-        const Wake at_end{wake_};
+    saving_.start(wake_, [this, file, parts = std::move(parts)]() mutable {
         try {
             save_parts(program_, parts, file);
             return Saved{"wrote " + fs::absolute(file).string(), {}};

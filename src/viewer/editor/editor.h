@@ -5,7 +5,6 @@
 #include <array>
 #include <filesystem>
 #include <functional>
-#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,6 +15,7 @@
 #include "edit/shapes.h"
 #include "viewer/draft.h"
 #include "viewer/editor/edit_snapshot.h"
+#include "viewer/latest.h"
 
 namespace ewa::viewer {
 
@@ -121,7 +121,7 @@ class Editor {
     // Files.
     /// `ewa convert` replays the edits on the file and writes the result, on a thread of its own. all: joins all scenes that are shown.
     void save(const std::filesystem::path& file, bool all);
-    bool saving() const { return saving_.valid(); }
+    bool saving() const { return saving_.running(); }
     bool unsaved() const;  // any scene has edits that were not saved
     /// The journal of an earlier session, if `file` has one with edits. Throws InputError if it cannot be read.
     static std::optional<edit::ReadJournal> left_journal(const std::filesystem::path& file, size_t splats);
@@ -153,7 +153,7 @@ class Editor {
     std::string note_;
     uint64_t ids_ = 0;  // that were given to scenes
     std::unique_ptr<EditWorker> worker_;
-    std::future<Saved> saving_;  // its thread ends before the rest
+    Task<Saved> saving_;  // its thread ends before the rest
 };
 
 }  // namespace ewa::viewer

@@ -8,7 +8,6 @@
 
 #include "core/folders.h"
 #include "scene/framing.h"
-#include "viewer/latest.h"
 
 namespace ewa::viewer {
 namespace {
@@ -121,13 +120,9 @@ bool FilmWriter::step(Renders& renders, const std::vector<ExtraDone>& done, doub
         numbers_.push_back(renders.ask_extra(request(asked_++)));
     if (written_ < frames_) return false;
     if (!film_) return true;
-    if (!ending_.valid())
-        ending_ = std::async(std::launch::async, [film = film_, wake = wake_] {
-            const Wake at_end{wake};
-            film->finish();
-        });
-    if (!finished(ending_)) return false;
-    ending_.get();
+    if (!ending()) ending_.start(wake_, [film = film_] { film->finish(); });
+    if (!ending_.ready()) return false;
+    ending_.take();
     film_.reset();
     return true;
 }

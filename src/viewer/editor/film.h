@@ -4,7 +4,6 @@
 #include <deque>
 #include <filesystem>
 #include <functional>
-#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,6 +13,7 @@
 #include "image/film_file.h"
 #include "io/datasets/view_list.h"
 #include "scene/camera.h"
+#include "viewer/latest.h"
 #include "viewer/layout.h"
 #include "viewer/renders.h"
 
@@ -78,7 +78,7 @@ class FilmWriter {
     /// Seconds until the last frame. Empty: not known yet.
     std::optional<double> left(double seconds) const { return pace_.left(seconds, frames_); }
     /// Whether ffmpeg still works after the last frame. It cannot be stopped then.
-    bool ending() const { return ending_.valid(); }
+    bool ending() const { return ending_.running(); }
 
   private:
     ExtraRequest request(int index) const;
@@ -91,7 +91,7 @@ class FilmWriter {
     std::deque<uint64_t> numbers_;  // of the renders on their way
     core::Pace pace_;
     std::shared_ptr<image::FilmFile> film_;  // null: a folder
-    std::future<void> ending_;
+    Task<void> ending_;
 };
 
 }  // namespace ewa::viewer

@@ -143,14 +143,15 @@ void PathField::draw(FileDialog& files) {
     asked_ = true;
 }
 
-void PathField::take(FileDialog& files) {
-    if (!asked_) return;
+bool PathField::take(FileDialog& files) {
+    if (!asked_) return false;
     try {
         if (const auto chosen = files.take()) set(*chosen);
     } catch (const std::exception& error) {
         complain(core::one_line(error.what()));
     }
     asked_ = files.open();
+    return !asked_;
 }
 
 }  // namespace ewa::viewer

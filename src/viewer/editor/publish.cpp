@@ -4,13 +4,11 @@
 #include <algorithm>
 
 #include "core/folders.h"
-#include "core/process.h"
 #include "core/text.h"
 #include "edit/edited_splats.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
-#include "viewer/latest.h"
 
 namespace ewa::viewer {
 namespace {
@@ -40,6 +38,13 @@ std::string last_line(std::string_view text) {
 }
 
 }  // namespace
+
+core::Ended run_ewa(const fs::path& program, std::vector<std::string> arguments,
+                    const std::function<bool(std::string_view)>& hear) {
+    arguments.insert(arguments.begin(), program.string());
+    return core::run_program({.command = std::move(arguments), .environment = {}, .log = {}, .joined = true},
+                             hear);
+}
 
 std::vector<std::string> publish_arguments(const PublishOrder& order) {
     // An absolute path is no option, whatever the name.
@@ -84,8 +89,7 @@ void Publisher::start(PublishOrder order) {
     stop_ = false;
     text_.clear();
     started_ = woken_ = Clock::now();
-    result_ = std::async(std::launch::async, [this, order = std::move(order)]() mutable {
-        const Wake at_end{wake_};
+    result_.start(wake_, [this, order = std::move(order)]() mutable {
         try {
             return run(std::move(order));
         } catch (const std::exception& error) {
@@ -102,12 +106,8 @@ Publisher::Result Publisher::run(PublishOrder order) {
         order.splats = nullptr;
     }
     core::make_folder(order.out.parent_path());
-    core::Program program;
-    program.command = publish_arguments(order);
-    program.command.insert(program.command.begin(), program_.string());
-    program.joined = true;
     const core::Ended ended =
-        core::run_program(program, [this](std::string_view piece) { return hear(piece); });
+        run_ewa(program_, publish_arguments(order), [this](std::string_view piece) { return hear(piece); });
     const std::lock_guard lock(mutex_);
     return {ended == core::Ended::done, ended == core::Ended::stopped, text_};
 }
@@ -135,8 +135,8 @@ Publisher::Progress Publisher::progress() const {
 }
 
 std::optional<Publisher::Result> Publisher::take() {
-    if (!finished(result_)) return std::nullopt;
-    return result_.get();
+    if (!result_.ready()) return std::nullopt;
+    return result_.take();
 }
 
 }  // namespace ewa::viewer

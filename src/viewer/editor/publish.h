@@ -5,7 +5,6 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
-#include <future>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -13,9 +12,15 @@
 #include <string_view>
 #include <vector>
 
+#include "core/process.h"
 #include "ewa/gaussians.h"
+#include "viewer/latest.h"
 
 namespace ewa::viewer {
+
+/// Runs `ewa` to its end. hear: gets what it says, as core::run_program gives it. Throws RunError if it cannot be started.
+core::Ended run_ewa(const std::filesystem::path& program, std::vector<std::string> arguments,
+                    const std::function<bool(std::string_view)>& hear);
 
 /// What is published, and where to.
 struct PublishOrder {
@@ -49,7 +54,7 @@ class Publisher {
     /// Starts the work, unless some runs. A scene without a file is written to a temporary one first.
     void start(PublishOrder order);
     void stop() { stop_ = true; }
-    bool running() const { return result_.valid(); }
+    bool running() const { return result_.running(); }
 
     struct Progress {
         std::string text;  // the last line of the program
@@ -76,7 +81,7 @@ class Publisher {
     mutable std::mutex mutex_;
     std::string text_;  // of the program, under the mutex
     Clock::time_point started_{}, woken_{};
-    std::future<Result> result_;  // its thread ends before the rest
+    Task<Result> result_;  // its thread ends before the rest
 };
 
 }  // namespace ewa::viewer

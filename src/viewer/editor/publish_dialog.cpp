@@ -179,15 +179,16 @@ void PublishDialog::start() {
     publisher_.start(std::move(order));
 }
 
-void PublishDialog::take() {
-    path_.take(files_);
+bool PublishDialog::take() {
+    if (!running()) return path_.take(files_);
     const std::optional<Publisher::Result> result = publisher_.take();
-    if (!result) return;
+    if (!result) return true;  // the seconds change
     done_ = result->done;
     text_ = result->stopped                  ? kPublishStopped
             : result->text.empty() && !done_ ? kPublishFailed
                                              : result->text;
     path_.complain({});
+    return true;
 }
 
 }  // namespace ewa::viewer

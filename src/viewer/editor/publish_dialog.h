@@ -19,7 +19,8 @@ class PublishDialog {
     void begin(const std::filesystem::path& views);
     /// Draws the modal. Returns whether it stays open.
     bool draw();
-    void take();
+    /// Returns whether draw() shows something else than before.
+    bool take();
     bool running() const { return publisher_.running(); }
 
   private:
