@@ -15,6 +15,7 @@
 #include "core/process.h"
 #include "ewa/error.h"
 #include "folders/run_folder.h"
+#include "viewer/editor/modal.h"
 #include "viewer/editor/offers.h"
 #include "viewer/editor/toolbar.h"
 
@@ -141,7 +142,11 @@ void App::handle_key(const KeyPress& press) {
     // A text field does not use these keys, so they act while one is edited. The other keys belong to the field.
     // Asked again while the dialog of unsaved edits is open, the window closes. The journal has the edits.
     if (key == GLFW_KEY_Q && press.control) return state_.window.close();
-    if (dialogs_.open()) return;
+    if (dialogs_.open()) {
+        if (key == GLFW_KEY_ENTER || key == GLFW_KEY_KP_ENTER) press_modal(Choice::confirm);
+        if (key == GLFW_KEY_ESCAPE) press_modal(Choice::cancel);
+        return;
+    }
     if (key == GLFW_KEY_S && press.control) return press.shift ? dialogs_.save_as() : dialogs_.save();
     if (key == GLFW_KEY_O && press.control)
         return session_.dialog.ask(press.shift ? Wanted::folder : Wanted::file);

@@ -11,6 +11,7 @@
 #include "core/text.h"
 #include "viewer/editor/dialogs.h"
 #include "viewer/editor/icons.h"
+#include "viewer/editor/modal.h"
 #include "viewer/editor/texts.h"
 #include "viewer/editor/theme.h"
 #include "viewer/overlay.h"
@@ -56,12 +57,7 @@ void draw_open_buttons(Welcome& welcome) {
     const float both = file + style.ItemSpacing.x + folder;
     const bool beside = both <= ImGui::GetContentRegionAvail().x;
     center_item(beside ? both : file);
-    ImGui::PushStyleColor(ImGuiCol_Button, accent());
-    ImGui::PushStyleColor(ImGuiCol_ButtonHovered, accent(0.9f));
-    ImGui::PushStyleColor(ImGuiCol_ButtonActive, accent(0.75f));
-    ImGui::PushStyleColor(ImGuiCol_Text, on_accent());
-    if (ImGui::Button(texts::kOpenAFile)) welcome.wanted = Wanted::file;
-    ImGui::PopStyleColor(4);
+    if (accent_button(texts::kOpenAFile)) welcome.wanted = Wanted::file;
     if (beside)
         ImGui::SameLine();
     else

@@ -131,6 +131,25 @@ TEST_F(Editor, DoesNotTintAScreenshot) {
     EXPECT_EQ(largest_difference(screenshot(session), first), 0);
 }
 
+TEST_F(Editor, SavesUnderAnotherNameAfterAWarning) {
+    const std::string mine = folder_ / "mine.ply", other = folder_ / "other.ply";
+    write_file(mine, "mine");
+    Session session(shots_, arguments());
+    ASSERT_TRUE(session.found());
+    screenshot(session);
+    constexpr int kTries = 6;
+    bool there = false;
+    for (int i = 0; i < kTries && !there; ++i) {
+        session.send("key ctrl+shift+s sleep 1 key ctrl+a type --delay 20 " + mine);
+        session.send("sleep 1 key Return sleep 1 key ctrl+a type --delay 20 " + other);
+        session.send("sleep 1 key Return");
+        there = soon([&] { return std::filesystem::exists(other); }, kSessionPatience / kTries);
+        if (!there) session.send("key Escape sleep 1");
+    }
+    EXPECT_TRUE(there) << "nothing was saved";
+    EXPECT_EQ(file_bytes(mine), "mine");
+}
+
 TEST_F(Editor, MovesTheSelectionAndCleansByTheCommandLine) {
     Session session(shots_, arguments());
     ASSERT_TRUE(session.found());

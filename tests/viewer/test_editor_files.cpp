@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "cli/program.h"
+#include "core/messages.h"
 #include "edit/edited_splats.h"
 #include "ewa/splat_files.h"
 #include "support/soon.h"
@@ -121,6 +122,23 @@ TEST(SaveChoices, EstimateTheSizeOfAFile) {
     const auto usual = double(viewer::usual_bytes(io::row_of(SplatFormat::ply), 2000, 2));
     EXPECT_NEAR(usual / double(fs::file_size(folder / "a.ply")), 1, 0.1);
     EXPECT_EQ(viewer::usual_bytes(io::row_of(SplatFormat::splat), 2000, 3), 64000u);
+}
+
+TEST(SaveChoices, TellWhatWasWritten) {
+    const Folder folder;
+    write_file(folder / "room.html", std::string(1360, ' '));
+    EXPECT_EQ(viewer::wrote_text(folder / "room.html", 73777), "Wrote room.html, 1.36 kB, 73,777 splats");
+    make_splats(folder / "a.ply", 40);
+    fs::create_directories(folder / "levels");
+    const std::string naming = folder / "levels/lod-meta.json";
+    save_splats(naming, load_splats(folder / "a.ply"));
+    uint64_t bytes = 0;
+    for (const std::string& file : files_below(folder / "levels"))
+        bytes += fs::file_size(folder / ("levels/" + file));
+    EXPECT_EQ(viewer::wrote_text(naming, 40), "Wrote levels, " + core::bytes_text(bytes) + ", 40 splats");
+    EXPECT_NE(viewer::wrote_text(folder / "none.ply", 0).find("0 B, 0 splats"), std::string::npos);
+    EXPECT_EQ(viewer::stem_of("guitar.compressed.ply"), "guitar");
+    EXPECT_EQ(viewer::stem_of("a room"), "a room");
 }
 
 TEST(SaveChoices, NeverReplaceTheOriginal) {

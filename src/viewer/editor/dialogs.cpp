@@ -3,6 +3,8 @@
 
 #include <imgui.h>
 
+#include <algorithm>
+#include <cctype>
 #include <set>
 #include <utility>
 
@@ -14,21 +16,26 @@
 #include "viewer/editor/modal.h"
 #include "viewer/editor/publish_dialog.h"
 #include "viewer/editor/save_choices.h"
+#include "viewer/editor/texts.h"
+#include "viewer/editor/theme.h"
 
 namespace ewa::viewer {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char *kSaveAsTitle = "Save as", *kSaveIt = "Save", *kReplaceIt = "Replace",
-                     *kDialogBack = "Cancel", *kScopeActive = "The active scene",
-                     *kScopeAll = "All shown scenes, joined", *kKeepsAll = "It keeps everything.",
-                     *kStillSaving = "the last save is not done yet", *kNothingToSave = "nothing is open";
-constexpr const char *kLeaveTitle = "Unsaved edits", *kDontSave = "Don't save";
-constexpr const char *kJournalTitle = "Edits of an earlier session", *kJournalRestore = "Restore",
-                     *kJournalDiscard = "Discard", *kJournalLater = "Later";
-constexpr const char* kSavingTitle = "Saving";
-constexpr float kFormatLines = 8;
+constexpr float kFormatLines = 9,
+                kFormatShare = 0.35f;  // height of the formats: lines, and at most of the window
+constexpr float kChosenRow = 0.45f;    // opacity of the accent
+
+/// The text with a capital, unless its first word has one.
+std::string sentence(std::string_view text) {
+    std::string words(text);
+    const std::string first = words.substr(0, words.find(' '));
+    if (first == core::lower(first) && !words.empty())
+        words[0] = char(std::toupper(static_cast<unsigned char>(words[0])));
+    return words;
+}
 
 /// The row for a copy of the file: its own format if ewa writes that, or else PLY.
 const io::FormatRow* first_row(const fs::path& file) {
@@ -75,7 +82,8 @@ struct Dialogs::State {
     void save_as();
     void confirm_save();
     void discard_journals() const;
-    void draw_formats();
+    void draw_formats(const Gaussians* splats, size_t count);
+    void draw_losses(const Gaussians& splats) const;
     void draw_save();
     void draw_leave();
     void draw_journal();
@@ -115,8 +123,8 @@ void Dialogs::State::pass(const std::function<void()>& on) {
 }
 
 void Dialogs::State::save_as() {
-    if (editor.scenes() == 0) return say(kNothingToSave);
-    if (editor.saving()) return say(kStillSaving);
+    if (editor.scenes() == 0) return say(texts::files::kNothingToSave);
+    if (editor.saving()) return say(texts::files::kStillSaving);
     row = first_row(scene().file);
     path.set(proposed_file(scene().file, scene().name, *row));
     all = all && editor.scenes() > 1;
@@ -143,50 +151,77 @@ void Dialogs::State::discard_journals() const {
     }
 }
 
-void Dialogs::State::draw_formats() {
-    const Gaussians* splats = all ? editor.splats().get() : editor.snapshot().splats.get();
-    const size_t count = !splats ? 0 : all ? splats->size() : editor.snapshot().left;
-    const float line = ImGui::GetTextLineHeightWithSpacing();
-    constexpr auto kFlags =
-        ImGuiTableFlags_ScrollY | ImGuiTableFlags_SizingFixedFit | ImGuiTableFlags_BordersOuter;
-    if (ImGui::BeginTable("formats", 3, kFlags, ImVec2(modal_width(), kFormatLines * line))) {
-        for (const io::FormatRow& each : io::format_rows()) {
-            if (!each.writable()) continue;
-            ImGui::TableNextColumn();
-            const std::string name = std::string(each.name) + " (" + std::string(each.extension) + ")";
-            if (ImGui::Selectable(
-                    name.c_str(), &each == row,
-                    ImGuiSelectableFlags_SpanAllColumns | ImGuiSelectableFlags_DontClosePopups)) {
-                if (const fs::path typed = path.path(); !typed.empty()) path.set(with_format(typed, each));
-                row = &each;
-            }
-            ImGui::TableNextColumn();
-            ImGui::TextUnformatted(each.purpose.data(), each.purpose.data() + each.purpose.size());
-            ImGui::TableNextColumn();
-            const uint64_t bytes = splats ? usual_bytes(each, count, splats->sh_degree) : 0;
-            ImGui::TextUnformatted(("about " + core::bytes_text(bytes)).c_str());
+void Dialogs::State::draw_formats(const Gaussians* splats, size_t count) {
+    constexpr auto kFlags = ImGuiTableFlags_ScrollY | ImGuiTableFlags_BordersOuter;
+    constexpr auto kRowFlags = ImGuiSelectableFlags_SpanAllColumns | ImGuiSelectableFlags_DontClosePopups;
+    const float height = std::min(kFormatLines * ImGui::GetTextLineHeightWithSpacing(),
+                                  kFormatShare * ImGui::GetIO().DisplaySize.y);
+    if (!ImGui::BeginTable("formats", 3, kFlags, ImVec2(modal_width(), height))) return;
+    ImGui::TableSetupScrollFreeze(0, 1);
+    ImGui::TableSetupColumn(texts::files::kFormat, ImGuiTableColumnFlags_WidthFixed);
+    ImGui::TableSetupColumn(texts::files::kPurpose, ImGuiTableColumnFlags_WidthStretch);
+    ImGui::TableSetupColumn(texts::files::kSize, ImGuiTableColumnFlags_WidthFixed);
+    ImGui::TableHeadersRow();
+    ImGui::PushStyleColor(ImGuiCol_Header, ImU32(accent(kChosenRow)));
+    for (const io::FormatRow& each : io::format_rows()) {
+        if (!each.writable()) continue;
+        const std::string name = sentence(each.name) + " (" + std::string(each.extension) + ")";
+        const std::string purpose = sentence(each.purpose);
+        const uint64_t bytes = splats ? usual_bytes(each, count, splats->sh_degree) : 0;
+        ImGui::TableNextRow();
+        ImGui::TableSetColumnIndex(1);
+        ImGui::PushTextWrapPos(0);
+        ImGui::TextUnformatted(purpose.c_str());
+        ImGui::PopTextWrapPos();
+        const float lines = ImGui::GetItemRectSize().y;
+        ImGui::TableSetColumnIndex(2);
+        ImGui::TextUnformatted((texts::files::kAbout + core::bytes_text(bytes)).c_str());
+        ImGui::TableSetColumnIndex(0);
+        if (ImGui::Selectable(name.c_str(), &each == row, kRowFlags, ImVec2(0, lines))) {
+            if (const fs::path typed = path.path(); !typed.empty()) path.set(with_format(typed, each));
+            row = &each;
         }
-        ImGui::EndTable();
     }
-    const std::vector<std::string> lost = splats ? losses(*row, *splats) : std::vector<std::string>();
-    for (const std::string& text : lost) modal_text("- " + text);
-    if (lost.empty()) modal_text(kKeepsAll);
+    ImGui::PopStyleColor();
+    ImGui::EndTable();
+}
+
+/// What the chosen format does not keep, in the room that the longest of these texts needs.
+void Dialogs::State::draw_losses(const Gaussians& splats) const {
+    const auto text_of = [&](const io::FormatRow& format) {
+        std::string text;
+        for (const std::string& line : losses(format, splats)) text += (text.empty() ? "- " : "\n- ") + line;
+        return text.empty() ? std::string(texts::files::kKeepsAll) : text;
+    };
+    float height = 0;
+    for (const io::FormatRow& each : io::format_rows())
+        if (each.writable())
+            height =
+                std::max(height, ImGui::CalcTextSize(text_of(each).c_str(), nullptr, false, modal_width()).y);
+    const float top = ImGui::GetCursorPosY();
+    modal_text(text_of(*row));
+    reserve(top, height + ImGui::GetStyle().ItemSpacing.y);
 }
 
 void Dialogs::State::draw_save() {
     if (editor.scenes() == 0) return void(shown = DialogKind::none);
-    if (!begin_modal(kSaveAsTitle)) return;
+    if (!begin_modal(texts::files::kSaveAsTitle)) return;
     if (const io::FormatRow* typed = io::row_of_name(path.path()); typed && typed->writable()) row = typed;
-    draw_formats();
-    ImGui::Spacing();
+    const Gaussians* splats = all ? editor.splats().get() : editor.snapshot().splats.get();
+    draw_formats(splats, !splats ? 0 : all ? splats->size() : editor.snapshot().left);
+    if (splats) draw_losses(*splats);
     if (editor.scenes() > 1) {
-        if (ImGui::RadioButton(kScopeActive, !all)) all = false;
+        if (modal_radio(texts::files::kScopeActive, !all)) all = false;
         ImGui::SameLine();
-        if (ImGui::RadioButton(kScopeAll, all)) all = true;
+        if (modal_radio(texts::files::kScopeAll, all)) all = true;
     }
-    path.draw(files);
-    const Choice choice =
-        draw_choices(path.replaces() ? kReplaceIt : kSaveIt, nullptr, kDialogBack, !path.path().empty());
+    if (begin_form()) {
+        form_row(texts::files::kFile);
+        path.draw(&files);
+        end_form();
+    }
+    const char* save = path.replaces() ? texts::files::kReplace : texts::files::kSave;
+    const Choice choice = draw_choices(save, nullptr, texts::files::kCancel, !path.path().empty());
     if (choice == Choice::confirm) confirm_save();
     if (choice == Choice::cancel) {
         go_on = nullptr;
@@ -196,13 +231,13 @@ void Dialogs::State::draw_save() {
 }
 
 void Dialogs::State::draw_leave() {
-    if (!begin_modal(kLeaveTitle)) return;
+    if (!begin_modal(texts::files::kLeaveTitle)) return;
     std::string names;
     for (size_t i = 0; i < editor.scenes(); ++i)
         if (editor.scene(i).unsaved)
             names += (names.empty() ? "" : ", ") + core::one_line(editor.scene(i).name);
-    modal_text(names + " has edits that are not saved.");
-    const Choice choice = draw_choices(kSaveIt, kDontSave, kDialogBack);
+    modal_text(names + texts::files::kUnsavedEdits);
+    const Choice choice = draw_choices(texts::files::kSave, texts::files::kDontSave, texts::files::kCancel);
     if (choice != Choice::none) shown = publish.running() ? DialogKind::publish : DialogKind::none;
     const std::function<void()> then = go_on;
     if (choice == Choice::other || choice == Choice::cancel) go_on = nullptr;
@@ -224,10 +259,11 @@ void Dialogs::State::draw_leave() {
 }
 
 void Dialogs::State::draw_journal() {
-    if (!begin_modal(kJournalTitle)) return;
-    modal_text("ewa-view ended without saving " + core::counted(journal.steps.size(), "edit") + " of " +
+    if (!begin_modal(texts::files::kJournalTitle)) return;
+    modal_text(texts::files::kEndedUnsaved + core::counted(journal.steps.size(), "edit") + " of " +
                core::one_line(journal_file.filename().string()) + ".");
-    const Choice choice = draw_choices(kJournalRestore, kJournalDiscard, kJournalLater);
+    const Choice choice = draw_choices(texts::files::kJournalRestore, texts::files::kJournalDiscard,
+                                       texts::files::kJournalLater);
     if (choice != Choice::none) shown = DialogKind::none;
     end_modal(shown != DialogKind::none);
     if (choice == Choice::confirm) editor.restore(journal);
@@ -237,9 +273,9 @@ void Dialogs::State::draw_journal() {
 }
 
 void Dialogs::State::draw_saving() {
-    if (!begin_modal(kSavingTitle)) return;
-    modal_text("Writing " + core::one_line(last.file.string()) + " ...");
-    if (draw_choices(nullptr, nullptr, kDialogBack) == Choice::cancel) {
+    if (!begin_modal(texts::files::kSavingTitle)) return;
+    modal_text(texts::files::kWriting + core::one_line(last.file.string()) + " ...");
+    if (draw_choices(nullptr, nullptr, texts::files::kCancel) == Choice::cancel) {
         go_on = nullptr;
         shown = DialogKind::none;
     }
@@ -273,8 +309,8 @@ Dialogs::~Dialogs() = default;
 
 void Dialogs::save() {
     State& state = *state_;
-    if (state.editor.scenes() == 0) return state.say(kNothingToSave);
-    if (state.editor.saving()) return state.say(kStillSaving);
+    if (state.editor.scenes() == 0) return state.say(texts::files::kNothingToSave);
+    if (state.editor.saving()) return state.say(texts::files::kStillSaving);
     const EditedScene& scene = state.scene();
     const State::Saved& last = state.last;
     if (last.file.empty() || last.original != scene.file || last.name != scene.name) return state.save_as();
@@ -287,7 +323,7 @@ void Dialogs::save_as() {
 
 void Dialogs::publish() {
     State& state = *state_;
-    if (state.editor.scenes() == 0) return state.say(kNothingToSave);
+    if (state.editor.scenes() == 0) return state.say(texts::files::kNothingToSave);
     state.publish.begin(views_file ? views_file() : fs::path());
     state.shown = DialogKind::publish;
 }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of a modal dialog: a window over all others, a field for a path, and buttons that Enter and Esc press.
+// The parts of a modal dialog: a window over all others, a form, a field for a path, and buttons that Enter and Esc press.
 #pragma once
 #include <array>
 #include <filesystem>
+#include <span>
 #include <string>
 
 #include "viewer/file_dialog.h"
@@ -26,10 +27,29 @@ void modal_text(const std::string& text, bool warning = false);
 /// Text in a box of so many lines, which scrolls if it has more.
 void modal_box(const char* name, const std::string& text, int lines);
 
+/// A radio button with a border. Returns whether it is clicked.
+bool modal_radio(const char* name, bool chosen);
+
+/// A button in the colour of the accent. Returns whether it is clicked.
+bool accent_button(const char* text);
+
+/// Fills the space down to `height` below `top`, a vertical position of the cursor. What follows stays where it is.
+void reserve(float top, float height);
+
+/// Begins a table of fields with their labels. end_form() follows if it returns true.
+bool begin_form();
+/// A row. The next item is its field.
+void form_row(const char* label);
+/// A row with a list of names. chosen: an index, or -1 for a value that has no name. Returns whether it has changed.
+bool form_list(const char* label, std::span<const std::string> names, int& chosen);
+void end_form();
+
 enum class Choice { none, confirm, other, cancel };
 /// Draws the buttons that have a text. Enter presses the focused button, or else `confirm`, and nothing where that has none. Esc
 /// presses `cancel`. enabled: whether `confirm` is.
 Choice draw_choices(const char* confirm, const char* other, const char* cancel, bool enabled = true);
+/// Enter (`confirm`) or Esc (`cancel`), for the modal. ImGui may miss a key that is pressed and released between two frames.
+void press_modal(Choice key);
 
 /// A path that people type, or choose in the desktop's dialog.
 class PathField {
@@ -37,21 +57,21 @@ class PathField {
     void set(const std::filesystem::path& path);
     /// ~/ is the user's folder.
     std::filesystem::path path() const;
-    /// Draws the field and the button "Browse", and below them what is wrong with the path.
-    void draw(FileDialog& files);
+    /// Draws the field, and below it what is wrong with the path. files: of the button "Browse"; null: it has none.
+    void draw(FileDialog* files);
     /// Takes the answer of the dialog that draw() has opened. Returns whether there was one.
     bool take(FileDialog& files);
     /// Sets the path, and returns whether it can be written. An existing file needs a second call, after a warning. refusal: why it
     /// cannot be written; empty: it can.
     bool accept(const std::filesystem::path& out, const std::string& refusal);
-    /// Shows the text until the path changes.
+    /// Shows the text until the path changes. The keys go to the field then.
     void complain(const std::string& problem);
     /// Whether the user was warned that the file is replaced.
     bool replaces() const { return replaces_; }
 
   private:
     std::array<char, 4096> text_{};
-    bool asked_ = false, replaces_ = false;
+    bool asked_ = false, replaces_ = false, focus_ = false;
     std::filesystem::path judged_;  // the path that has the problem
     std::string problem_;
 };

@@ -9,6 +9,7 @@
 #include "core/process.h"
 #include "core/text.h"
 #include "viewer/editor/save_choices.h"
+#include "viewer/editor/texts.h"
 
 namespace ewa::viewer {
 namespace {
@@ -20,20 +21,10 @@ struct PublishKind {
     const char *name, *hint;
 };
 constexpr PublishKind kPublishKinds[] = {
-    {SplatFormat::page, "Web page (one HTML file)",
-     "Opens in any browser, without a network. A server needs this one file."},
-    {SplatFormat::sog, "SOG (small file)", "For SuperSplat, PlayCanvas, Spark and other viewers on the web."},
-    {SplatFormat::sog_levels, "Streamed levels (large scenes)",
-     "A folder for a web server. A viewer loads what it shows, coarse splats first."},
+    {SplatFormat::page, texts::files::kPageName, texts::files::kPageHint},
+    {SplatFormat::sog, texts::files::kSogName, texts::files::kSogHint},
+    {SplatFormat::sog_levels, texts::files::kLevelsName, texts::files::kLevelsHint},
 };
-constexpr const char *kPublishTitle = "Publish", *kPublishIt = "Publish", *kPublishReplace = "Replace",
-                     *kPublishCancel = "Cancel", *kPublishStop = "Stop", *kPublishClose = "Close",
-                     *kPageTitle = "Title", *kWithViews = "With the views of the film",
-                     *kLevelsLabel = "Levels (0: as many as the scene needs)",
-                     *kOpenInBrowser = "Open in browser", *kShowFolder = "Show folder",
-                     *kCopyPath = "Copy path", *kPublishTarget = "File", *kPublishStopped = "Stopped.",
-                     *kPublishFailed = "ewa convert has failed.",
-                     *kPublishBusy = "The last edit is still being done.";
 constexpr int kMostLevels = 16, kPublishLines = 5;
 
 const io::FormatRow& row_of_kind(int kind) {
@@ -53,7 +44,7 @@ void PublishDialog::begin(const fs::path& views) {
     with_views_ = done_ = false;
     problem_.clear();
     text_.clear();
-    const std::string& name = editor_.scene(editor_.active()).name;
+    const std::string name = stem_of(editor_.scene(editor_.active()).name).string();
     const size_t count = std::min(name.size(), title_.size() - 1);
     std::copy_n(name.begin(), count, title_.begin());
     title_[count] = 0;
@@ -67,26 +58,22 @@ void PublishDialog::choose(int kind) {
 }
 
 bool PublishDialog::draw() {
-    if (!begin_modal(kPublishTitle)) return true;
-    if (running())
+    if (!begin_modal(texts::files::kPublish)) return true;
+    const bool works = running(), done = done_;
+    if (works)
         draw_work();
-    else if (done_)
+    else if (done)
         draw_done();
     else
         draw_form();
     bool stays = true;
     switch (draw_buttons()) {
         case Choice::confirm:
-            if (done_)
-                stays = false;
-            else
-                start();
+            done ? open(format() == SplatFormat::page ? out_ : out_.parent_path()) : start();
             break;
         case Choice::cancel:
-            if (running())
-                publisher_.stop();
-            else
-                stays = false;
+            stays = works;
+            publisher_.stop();
             break;
         case Choice::other:
         case Choice::none:
@@ -97,49 +84,62 @@ bool PublishDialog::draw() {
 }
 
 Choice PublishDialog::draw_buttons() {
-    if (running()) return draw_choices(nullptr, nullptr, kPublishStop);
-    if (done_) return draw_choices(kPublishClose, nullptr, nullptr);
-    return draw_choices(path_.replaces() ? kPublishReplace : kPublishIt, nullptr, kPublishCancel,
-                        !path_.path().empty() && !editor_.busy());
+    if (running()) return draw_choices(nullptr, nullptr, texts::files::kStop);
+    if (done_) return draw_choices(texts::files::kOpen, nullptr, texts::files::kClose);
+    return draw_choices(path_.replaces() ? texts::files::kReplace : texts::files::kPublish, nullptr,
+                        texts::files::kCancel, !path_.path().empty() && !editor_.busy());
+}
+
+SplatFormat PublishDialog::format() const {
+    return kPublishKinds[kind_].format;
 }
 
 void PublishDialog::draw_form() {
     for (int i = 0; i < int(std::size(kPublishKinds)); ++i)
-        if (ImGui::RadioButton(kPublishKinds[i].name, kind_ == i)) choose(i);
+        if (modal_radio(kPublishKinds[i].name, kind_ == i)) choose(i);
     ImGui::TextDisabled("%s", kPublishKinds[kind_].hint);
-    ImGui::Spacing();
-    ImGui::TextUnformatted(kPublishTarget);
-    path_.draw(files_);
-    if (kPublishKinds[kind_].format == SplatFormat::page) {
-        ImGui::SetNextItemWidth(modal_width() / 2);
-        ImGui::InputText(kPageTitle, title_.data(), title_.size());
-        if (!views_.empty()) ImGui::Checkbox(kWithViews, &with_views_);
+    if (begin_form()) {
+        form_row(texts::files::kFile);
+        path_.draw(&files_);
+        if (format() == SplatFormat::page) {
+            form_row(texts::files::kTitle);
+            ImGui::InputText("##title", title_.data(), title_.size());
+        } else if (format() == SplatFormat::sog_levels) {
+            form_row(texts::files::kLevels);
+            ImGui::SliderInt("##levels", &levels_, 0, kMostLevels,
+                             levels_ == 0 ? texts::files::kAsManyLevels : "%d", ImGuiSliderFlags_AlwaysClamp);
+        } else {
+            form_row("");
+            ImGui::Dummy(ImVec2(0, ImGui::GetFrameHeight()));
+        }
+        end_form();
     }
-    if (kPublishKinds[kind_].format == SplatFormat::sog_levels) {
-        ImGui::SetNextItemWidth(6 * ImGui::GetTextLineHeight());
-        if (ImGui::InputInt(kLevelsLabel, &levels_)) levels_ = std::clamp(levels_, 0, kMostLevels);
-    }
-    if (editor_.busy()) modal_text(kPublishBusy);
+    // The room for these is there with each kind.
+    const float top = ImGui::GetCursorPosY();
+    if (format() == SplatFormat::page && !views_.empty())
+        ImGui::Checkbox(texts::files::kWithViews, &with_views_);
+    if (editor_.busy()) modal_text(texts::files::kPublishBusy);
+    reserve(top, ImGui::GetFrameHeightWithSpacing());
     if (!text_.empty()) modal_box("error", text_, kPublishLines);
 }
 
 void PublishDialog::draw_work() {
     const Publisher::Progress progress = publisher_.progress();
-    modal_text("Writing " + core::one_line(out_.string()));
+    modal_text(texts::files::kWriting + core::one_line(out_.string()));
     ImGui::ProgressBar(progress.share, ImVec2(modal_width(), 0.4f * ImGui::GetTextLineHeight()), "");
     modal_text(core::duration_text(progress.seconds));
     modal_box("work", progress.text, 2);
 }
 
 void PublishDialog::draw_done() {
-    modal_box("done", text_, kPublishLines);
-    if (kPublishKinds[kind_].format == SplatFormat::page) {
-        if (ImGui::Button(kOpenInBrowser)) open(out_);
-        ImGui::SameLine();
-    }
-    if (ImGui::Button(kShowFolder)) open(out_.parent_path());
+    modal_text(wrote_);
+    if (ImGui::Button(texts::files::kShowFolder)) open(out_.parent_path());
     ImGui::SameLine();
-    if (ImGui::Button(kCopyPath)) ImGui::SetClipboardText(out_.c_str());
+    if (ImGui::Button(texts::files::kCopyPath)) ImGui::SetClipboardText(out_.c_str());
+    if (ImGui::TreeNode(texts::files::kDetails)) {
+        modal_box("done", text_, kPublishLines);
+        ImGui::TreePop();
+    }
     if (!problem_.empty()) modal_text(problem_, true);
 }
 
@@ -166,9 +166,9 @@ void PublishDialog::start() {
     PublishOrder order;
     order.scene = scene.file;
     order.out = out;
-    if (kPublishKinds[kind_].format == SplatFormat::page) order.title = title_.data();
-    if (kPublishKinds[kind_].format == SplatFormat::page && with_views_) order.views = views_;
-    if (kPublishKinds[kind_].format == SplatFormat::sog_levels) order.levels = levels_;
+    if (format() == SplatFormat::page) order.title = title_.data();
+    if (format() == SplatFormat::page && with_views_) order.views = views_;
+    if (format() == SplatFormat::sog_levels) order.levels = levels_;
     const bool journaled = scene.journal && core::is_file(scene.journal->file());
     if (now.done > 0 && journaled) order.edits = scene.journal->file();
     if (scene.file.empty() || (now.done > 0 && !journaled)) {
@@ -176,6 +176,7 @@ void PublishDialog::start() {
         order.states = now.states;
     }
     out_ = out;
+    left_ = now.left;
     publisher_.start(std::move(order));
 }
 
@@ -184,8 +185,9 @@ bool PublishDialog::take() {
     const std::optional<Publisher::Result> result = publisher_.take();
     if (!result) return true;  // the seconds change
     done_ = result->done;
-    text_ = result->stopped                  ? kPublishStopped
-            : result->text.empty() && !done_ ? kPublishFailed
+    if (done_) wrote_ = wrote_text(out_, left_);
+    text_ = result->stopped                  ? texts::files::kStopped
+            : result->text.empty() && !done_ ? texts::files::kFailed
                                              : result->text;
     path_.complain({});
     return true;

@@ -5,6 +5,7 @@
 #include <functional>
 #include <string>
 
+#include "ewa/splat_scene.h"
 #include "viewer/editor/editor.h"
 #include "viewer/editor/modal.h"
 #include "viewer/editor/publish.h"
@@ -29,6 +30,7 @@ class PublishDialog {
     void draw_work();
     void draw_done();
     Choice draw_buttons();
+    SplatFormat format() const;  // the chosen one
     void start();
     void open(const std::filesystem::path& path);
 
@@ -40,7 +42,9 @@ class PublishDialog {
     std::array<char, 256> title_{};
     bool with_views_ = false;
     std::filesystem::path views_, out_;
-    std::string problem_, text_;  // problem_: of opening the result; text_: of the program that has ended
+    size_t left_ = 0;  // splats that are written
+    std::string problem_, text_,
+        wrote_;  // of opening the result; of the program that has ended; what it wrote
     bool done_ = false;
 };
 

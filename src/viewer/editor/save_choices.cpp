@@ -4,38 +4,20 @@
 #include <cmath>
 
 #include "core/folders.h"
+#include "core/messages.h"
 #include "core/outputs.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 #include "folders/run_folder.h"
+#include "viewer/editor/texts.h"
 
 namespace ewa::viewer {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kLostViewDependence = "View-dependent colours (SH) are left out.";
-constexpr const char* kLostWorld = "Positions are rounded to float32 far from the origin.";
-constexpr const char* kLostDensity = "Opacities of the kernel \"density\" are fitted to the usual kernel.";
-constexpr const char* kLostBroken = "Splats with values that are not finite are left out.";
-constexpr const char* kOriginalStays =
-    "This file was opened. The original is never touched: choose another name.";
-constexpr const char* kPartOfOriginal =
-    "The original has its values beside this name. The original is never touched: choose another folder.";
 constexpr const char *kNameless = "scene", *kEdited = "-edited";
-constexpr const char* kIsAFolder = "This is a folder: add a name.";
-
-/// The path without the extension of its format. The folder is left where the format has a whole name, such as meta.json.
-fs::path stem_of(const fs::path& path) {
-    const io::FormatRow* row = io::row_of_name(path);
-    if (!row) return path;
-    if (!row->extension.starts_with('.')) return path.parent_path();
-    std::string name = path.filename().string();
-    const bool usual = core::lower(name).ends_with(row->extension);
-    name.resize(name.size() - (usual ? row->extension : row->other_extension).size());
-    return path.parent_path() / name;
-}
 
 fs::path with_extension(fs::path stem, const io::FormatRow& row) {
     if (!row.extension.starts_with('.')) return stem / row.extension;
@@ -72,13 +54,23 @@ bool is_part_of(const fs::path& file, const fs::path& out) {
 
 }  // namespace
 
+fs::path stem_of(const fs::path& path) {
+    const io::FormatRow* row = io::row_of_name(path);
+    if (!row) return path;
+    if (!row->extension.starts_with('.')) return path.parent_path();
+    std::string name = path.filename().string();
+    const bool usual = core::lower(name).ends_with(row->extension);
+    name.resize(name.size() - (usual ? row->extension : row->other_extension).size());
+    return path.parent_path() / name;
+}
+
 std::vector<std::string> losses(const io::FormatRow& row, const Gaussians& splats) {
     std::vector<std::string> lines;
-    if (row.no_sh && splats.sh_degree > 0) lines.emplace_back(kLostViewDependence);
+    if (row.no_sh && splats.sh_degree > 0) lines.emplace_back(texts::files::kLostViewDependence);
     if (!row.rounding.empty()) lines.emplace_back(row.rounding);
-    if (!row.world && splats.origin != glm::dvec3(0)) lines.emplace_back(kLostWorld);
-    if (!row.density && splats.density) lines.emplace_back(kLostDensity);
-    if (!row.undrawable) lines.emplace_back(kLostBroken);
+    if (!row.world && splats.origin != glm::dvec3(0)) lines.emplace_back(texts::files::kLostWorld);
+    if (!row.density && splats.density) lines.emplace_back(texts::files::kLostDensity);
+    if (!row.undrawable) lines.emplace_back(texts::files::kLostBroken);
     std::string notes;
     if (!row.comments) notes = "comments";
     if (!row.mark) notes += notes.empty() ? "the mark" : " and the mark";
@@ -91,6 +83,18 @@ uint64_t usual_bytes(const io::FormatRow& row, size_t splats, int sh_degree) {
     const int coefficients = (sh_degree + 1) * (sh_degree + 1) - 1;
     return uint64_t(
         std::llround(double(splats) * double(row.splat_bytes[0] + float(coefficients) * row.splat_bytes[1])));
+}
+
+std::string wrote_text(const fs::path& out, size_t splats) {
+    std::error_code error;
+    const io::FormatRow* row = io::row_of_name(out);
+    uint64_t bytes = core::is_file(out) ? fs::file_size(out, error) : 0;
+    if (row && row->values)
+        for (const fs::path& values : row->values(out)) bytes += fs::file_size(values, error);
+    const bool folder = row && !row->extension.starts_with('.');
+    const fs::path name = (folder ? out.parent_path() : out).filename();
+    return texts::files::kWrote + core::one_line(name.string()) + ", " + core::bytes_text(bytes) + ", " +
+           core::grouped(splats) + " splats";
 }
 
 fs::path with_format(const fs::path& path, const io::FormatRow& row) {
@@ -108,7 +112,7 @@ fs::path proposed_file(const fs::path& file, const std::string& name, const io::
 }
 
 std::string refusal(const fs::path& out, const std::vector<fs::path>& originals) {
-    if (core::is_folder(out)) return kIsAFolder;
+    if (core::is_folder(out)) return texts::files::kIsAFolder;
     try {
         const io::FormatRow& row = io::row_to_write(out);
         std::vector<core::NamedFile> written{{"the file", out}}, read;
@@ -119,8 +123,8 @@ std::string refusal(const fs::path& out, const std::vector<fs::path>& originals)
         }
         for (const fs::path& original : originals) {
             if (original.empty()) continue;
-            if (same_file(out, original)) return kOriginalStays;
-            if (is_part_of(original, out)) return kPartOfOriginal;
+            if (same_file(out, original)) return texts::files::kOriginalStays;
+            if (is_part_of(original, out)) return texts::files::kPartOfOriginal;
             const std::vector<core::NamedFile> files = files_of_original(original);
             read.insert(read.end(), files.begin(), files.end());
         }

@@ -17,6 +17,12 @@ std::vector<std::string> losses(const io::FormatRow& row, const Gaussians& splat
 /// The usual size of a file with so many splats, bytes.
 uint64_t usual_bytes(const io::FormatRow& row, size_t splats, int sh_degree);
 
+/// "Wrote room.html, 1.36 MB, 73,777 splats", with the files of its values. A format with a whole name goes by its folder.
+std::string wrote_text(const std::filesystem::path& out, size_t splats);
+
+/// The path without the extension of its format. The folder is left where the format has a whole name, such as meta.json.
+std::filesystem::path stem_of(const std::filesystem::path& path);
+
 /// The path with the extension of the format. A format with a whole name, such as meta.json, has a folder in place of the file.
 std::filesystem::path with_format(const std::filesystem::path& path, const io::FormatRow& row);
 

@@ -219,4 +219,92 @@ inline constexpr const char *kNeedsPinhole =
                             *kShapeSelect = "Select", *kShapeAdd = "Add", *kShapeRemove = "Remove",
                             *kTrueLength = "true length";
 
+// The dialogs of files.
+namespace files {
+
+inline constexpr const char *kSave = "Save", *kReplace = "Replace", *kCancel = "Cancel", *kOpen = "Open",
+                            *kClose = "Close", *kBrowse = "Browse", *kPathHint = "folder/name",
+                            *kFile = "File", *kOther = "Other",
+                            *kWouldReplace = " exists and would be replaced.";
+
+// Save as.
+inline constexpr const char *kSaveAsTitle = "Save as", *kFormat = "Format", *kPurpose = "For",
+                            *kSize = "Size", *kAbout = "about ", *kScopeActive = "The active scene",
+                            *kScopeAll = "All shown scenes, joined", *kKeepsAll = "It keeps everything.",
+                            *kStillSaving = "the last save is not done yet",
+                            *kNothingToSave = "nothing is open";
+inline constexpr const char *kLostViewDependence = "View-dependent colours (SH) are left out.",
+                            *kLostWorld = "Positions are rounded to float32 far from the origin.",
+                            *kLostDensity =
+                                "Opacities of the kernel \"density\" are fitted to the usual kernel.",
+                            *kLostBroken = "Splats with values that are not finite would be left out.";
+inline constexpr const char *kOriginalStays =
+                                "This file was opened. The original is never touched: choose another name.",
+                            *kPartOfOriginal =
+                                "The original has its values beside this name. The original "
+                                "is never touched: choose another folder.",
+                            *kIsAFolder = "This is a folder: add a name.";
+
+// Unsaved edits, and those of a session that has crashed.
+inline constexpr const char *kLeaveTitle = "Unsaved edits", *kDontSave = "Don't save",
+                            *kUnsavedEdits = " has edits that are not saved.", *kSavingTitle = "Saving",
+                            *kWriting = "Writing ", *kJournalTitle = "Edits of an earlier session",
+                            *kJournalRestore = "Restore", *kJournalDiscard = "Discard",
+                            *kJournalLater = "Later", *kEndedUnsaved = "ewa-view ended without saving ";
+
+// Publish.
+inline constexpr const char* kPublish = "Publish";
+inline constexpr const char *kPageName = "Web page (one HTML file)",
+                            *kPageHint =
+                                "Opens in any browser, without a network. A server needs this one "
+                                "file.",
+                            *kSogName = "SOG (small file)",
+                            *kSogHint = "For SuperSplat, PlayCanvas, Spark and other viewers on the web.",
+                            *kLevelsName = "Streamed levels (large scenes)",
+                            *kLevelsHint =
+                                "A folder for a web server. A viewer loads what it shows, coarse "
+                                "splats first.";
+inline constexpr const char *kTitle = "Title", *kWithViews = "With the views of the film",
+                            *kLevels = "Levels", *kAsManyLevels = "as many as the scene needs",
+                            *kPublishBusy = "The last edit is still being done.", *kStop = "Stop",
+                            *kStopped = "Stopped.", *kFailed = "ewa convert has failed.", *kWrote = "Wrote ",
+                            *kShowFolder = "Show folder", *kCopyPath = "Copy path", *kDetails = "Details";
+
+// Open, where the desktop has no dialog.
+inline constexpr const char *kOpenTitle = "Open a file or folder", *kNoSuchFile = "There is no such file.";
+
+}  // namespace files
+
+// The strip of the film, and its dialogs.
+namespace film {
+
+struct Action {
+    const char *name, *hint;
+};
+inline constexpr Action kPlay{"Play", "Space: shows the film in real time"}, kStop{"Stop", "Space: stops"},
+    kAdd{"Add key", "K: this view becomes a key, at the playhead or after the last key"},
+    kReplace{"Replace key", "The key under the playhead gets this view"},
+    kDelete{"Delete key", "Deletes the key under the playhead"},
+    kEven{"Space evenly", "All keys get the same distance in time"}, kSaveFilm{"Save film ...", "Ctrl + K"},
+    kSaveKeys{"Save keys", "Writes the keys to a file, for ewa render --views and ewa convert --views"},
+    kSavePicture{"Save picture ...", "A still of any size"},
+    kHide{"\xc3\x97", "Hides this strip; the keys stay"};
+inline constexpr const char *kSpeed = "Speed", *kLoop = "Loop", *kSmooth = "Smooth", *kLength = "Length",
+                            *kDistance = "New key after",
+                            *kEmpty = "K makes this view the first key of a film",
+                            *kEnding = "ffmpeg ends the film", *kProgress = "%d of %d frames",
+                            *kStopped = "the film was stopped", *kFramesStay = " of its frames are in ";
+inline constexpr const char *kFilmTitle = "Save film", *kPictureTitle = "Save picture", *kPixels = "Pixels",
+                            *kRate = "Frames a second", *kCodec = "Codec",
+                            *kAsTheWindow = "As the window: ", *kFrames = "%d frames, %.1f s";
+inline constexpr const char
+    *kFilmNames =
+        "A film ends in .mp4, .mov, .mkv or .webm. Another name is that of a folder of PNG pictures.",
+    *kPictureNames = "A picture ends in .png, .jpg, .webp or .exr.",
+    *kNoFfmpeg =
+        "ffmpeg is not installed (Debian: apt install ffmpeg), so the frames become a folder of PNG "
+        "pictures.";
+
+}  // namespace film
+
 }  // namespace ewa::viewer::texts
