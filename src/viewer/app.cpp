@@ -42,8 +42,8 @@ App::App(const Startup& startup)
       session_(state_, navigation_, shown_),
       editor_(core::own_program().parent_path() / "ewa", state_.wake, startup.budget),
       tools_(state_, navigation_, shown_, editor_),
-      film_(state_, navigation_, shown_),
-      dialogs_(editor_, session_.dialog, state_.wake, [this](const std::string& note) { state_.say(note); }) {
+      dialogs_(editor_, session_.dialog, state_.wake, [this](const std::string& note) { state_.say(note); }),
+      film_(state_, navigation_, shown_, dialogs_, session_.dialog) {
     dialogs_.views_file = [this] { return film_views(); };
     change_text();
     state_.loop.last_frame = Clock::now();

@@ -67,10 +67,10 @@ class App {
     Editor editor_;
     Tools tools_;
     EditPanel edit_panel_;
+    Dialogs dialogs_;
     FilmStrip film_;
     ViewHistory view_history_{navigation_.views};
     std::optional<core::TemporaryFolder> film_folder_;  // what film_views() writes, while Publish reads it
-    Dialogs dialogs_;
     std::shared_ptr<const Gaussians> entered_,
         drawn_;                     // the scene that is edited, and what of it the render thread has
     std::filesystem::path opened_;  // the last file that was remembered

@@ -45,7 +45,7 @@ const io::FormatRow* first_row(const fs::path& file) {
 
 }  // namespace
 
-enum class DialogKind { none, save, publish, leave, journal, saving };
+enum class DialogKind { none, save, publish, leave, journal, saving, other };
 
 struct Dialogs::State {
     State(Editor& edited, FileDialog& dialog, std::function<void()> wake,
@@ -70,7 +70,8 @@ struct Dialogs::State {
     } last;
     std::set<fs::path> written;  // by this session, so they are no originals
 
-    std::function<void()> go_on;  // after the save; null: nothing
+    std::function<bool()> draw_other;  // a dialog of another part
+    std::function<void()> go_on;       // after the save; null: nothing
     fs::path journal_file;
     edit::ReadJournal journal;
 
@@ -296,6 +297,9 @@ void Dialogs::State::draw_shown() {
             return draw_journal();
         case DialogKind::saving:
             return draw_saving();
+        case DialogKind::other:
+            if (!draw_other()) shown = DialogKind::none;
+            return;
         case DialogKind::none:
             return close_modal();
     }
@@ -346,6 +350,12 @@ void Dialogs::offer_journal(const fs::path& file, size_t splats) {
     } catch (const std::exception& error) {
         state.say(error.what());
     }
+}
+
+void Dialogs::show(std::function<bool()> draw) {
+    if (open()) return;
+    state_->draw_other = std::move(draw);
+    state_->shown = DialogKind::other;
 }
 
 void Dialogs::draw() {

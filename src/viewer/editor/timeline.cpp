@@ -6,41 +6,18 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <glm/matrix.hpp>
 
 #include "core/text.h"
+#include "viewer/editor/panel_controls.h"
+#include "viewer/editor/texts.h"
 
 namespace ewa::viewer {
 namespace {
-
-constexpr const char* kPlayText = "Play";
-constexpr const char* kPlayTip = "Space: shows the film in real time";
-constexpr const char* kStopText = "Stop";
-constexpr const char* kAddText = "Add key";
-constexpr const char* kAddTip = "K: this view becomes a key, at the playhead or after the last key";
-constexpr const char* kReplaceText = "Replace";
-constexpr const char* kReplaceTip = "The key at the playhead gets this view";
-constexpr const char* kDeleteText = "Delete";
-constexpr const char* kDeleteTip = "Deletes the key at the playhead";
-constexpr const char* kEvenText = "Even";
-constexpr const char* kEvenTip = "Spaces the keys evenly";
-constexpr const char* kSaveText = "Save film...";
-constexpr const char* kSaveTip = "Ctrl + K";
-constexpr const char* kPictureText = "Save picture...";
-constexpr const char* kViewsText = "Save keys";
-constexpr const char* kViewsTip = "Writes the keys to a file, for ewa render --views and ewa convert --views";
-constexpr const char* kHideText = "Hide";
-constexpr const char* kSmoothText = "smooth";
-constexpr const char* kLoopText = "loop";
-constexpr const char* kSpeedText = "speed";
-constexpr const char* kLengthText = "length";
-constexpr const char* kDistanceText = "new key after";
-constexpr const char* kEmptyText = "K makes this view the first key of a film";
-constexpr const char* kEndingText = "ffmpeg ends the film";
-constexpr const char* kProgressText = "%d of %d frames";
 
 constexpr std::array kSpeeds{0.25f, 0.5f, 1.0f, 2.0f, 4.0f};
 constexpr double kTickSteps[] = {0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600};
@@ -51,18 +28,26 @@ void fit_in_line(float width) {
     if (ImGui::GetItemRectMax().x + ImGui::GetStyle().ItemSpacing.x + width <= right) ImGui::SameLine();
 }
 
-bool placed_button(const char* text, const char* tip = nullptr) {
-    fit_in_line(ImGui::CalcTextSize(text).x + 2 * ImGui::GetStyle().FramePadding.x);
-    const bool clicked = ImGui::Button(text);
-    if (tip && ImGui::IsItemHovered()) ImGui::SetTooltip("%s", tip);
+bool placed_button(const texts::film::Action& action) {
+    fit_in_line(ImGui::CalcTextSize(action.name).x + 2 * ImGui::GetStyle().FramePadding.x);
+    const bool clicked = ImGui::Button(action.name);
+    ui::show_hint(action.hint);
     return clicked;
 }
 
-/// Room for an item of so many lines' width with a label.
-void place_labelled(float lines, const char* text) {
-    const float width = lines * ImGui::GetTextLineHeight();
-    fit_in_line(width + ImGui::GetStyle().ItemInnerSpacing.x + ImGui::CalcTextSize(text).x);
+/// A label. The next item follows it, as wide as so many lines are high. begins: a line of its own.
+void label_before(const char* text, float lines, bool begins = false) {
+    const float gap = ImGui::GetStyle().ItemInnerSpacing.x, width = lines * ImGui::GetTextLineHeight();
+    if (!begins) fit_in_line(ImGui::CalcTextSize(text).x + gap + width);
+    ImGui::AlignTextToFramePadding();
+    ImGui::TextUnformatted(text);
+    ImGui::SameLine(0, gap);
     ImGui::SetNextItemWidth(width);
+}
+
+void placed_checkbox(const char* text, bool& value) {
+    fit_in_line(ImGui::GetFrameHeight() + ImGui::GetStyle().ItemInnerSpacing.x + ImGui::CalcTextSize(text).x);
+    ImGui::Checkbox(text, &value);
 }
 
 void draw_diamond(const ImVec2& middle, float radius, ImU32 color) {
@@ -77,8 +62,9 @@ double steady_now() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-FilmStrip::FilmStrip(ViewState& state, Navigation& navigation, Shown& shown_renders)
-    : state_(state), navigation_(navigation), shown_(shown_renders) {}
+FilmStrip::FilmStrip(ViewState& state, Navigation& navigation, Shown& shown_renders, Dialogs& dialogs,
+                     FileDialog& files)
+    : state_(state), navigation_(navigation), shown_(shown_renders), dialogs_(dialogs), files_(files) {}
 
 Rectangle FilmStrip::area_above() const {
     Rectangle area = state_.picture_area();
@@ -156,51 +142,49 @@ bool FilmStrip::handle_key(const KeyPress& press) {
 }
 
 void FilmStrip::draw() {
-    if (shown || writing()) {
-        const Rectangle area = state_.picture_area();
-        const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
-        const float left = float(area.x) / scale.x, width = float(area.width) / scale.x;
-        const float height = float(area.height) / scale.y, bottom = float(area.y) / scale.y + height;
-        ImGui::SetNextWindowPos(ImVec2(left, bottom), ImGuiCond_Always, ImVec2(0, 1));
-        ImGui::SetNextWindowSize(ImVec2(width, 0));
-        // In a low window the rows scroll.
-        ImGui::SetNextWindowSizeConstraints(ImVec2(width, 0), ImVec2(width, 0.6f * height));
-        constexpr auto kFlags = ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize |
-                                ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse |
-                                ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing;
-        if (ImGui::Begin("film strip", nullptr, kFlags)) {
-            if (writing()) draw_progress();
-            if (shown) {
-                // Without a time, views are still in the order in which they were saved.
-                give_times(views(), distance());
-                if (!views().empty())
-                    playhead_ = std::clamp(playhead_, *views().front().time, *views().back().time);
-                draw_track();
-                draw_buttons();
-                draw_settings();
-            }
+    if (!shown && !writing()) return;
+    const Rectangle area = state_.picture_area();
+    const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
+    const float left = float(area.x) / scale.x, width = float(area.width) / scale.x;
+    const float height = float(area.height) / scale.y, bottom = float(area.y) / scale.y + height;
+    ImGui::SetNextWindowPos(ImVec2(left, bottom), ImGuiCond_Always, ImVec2(0, 1));
+    ImGui::SetNextWindowSize(ImVec2(width, 0));
+    // In a low window the rows scroll.
+    ImGui::SetNextWindowSizeConstraints(ImVec2(width, 0), ImVec2(width, 0.6f * height));
+    constexpr auto kFlags = ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize |
+                            ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse |
+                            ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing;
+    if (ImGui::Begin("film strip", nullptr, kFlags)) {
+        if (writing()) draw_progress();
+        if (shown) {
+            // Without a time, views are still in the order in which they were saved.
+            give_times(views(), distance());
+            if (!views().empty())
+                playhead_ = std::clamp(playhead_, *views().front().time, *views().back().time);
+            draw_track();
+            draw_buttons();
+            draw_settings();
         }
-        height_ = ImGui::GetWindowHeight();
-        ImGui::End();
     }
-    if (dialog_ == Dialog::film) draw_film_dialog();
-    if (dialog_ == Dialog::picture) draw_picture_dialog();
+    height_ = ImGui::GetWindowHeight();
+    ImGui::End();
 }
 
 void FilmStrip::draw_progress() {
     const double now = steady_now();
     std::array<char, 96> text{};
-    std::snprintf(text.data(), text.size(), kProgressText, writer_->written(), writer_->frames());
-    std::string line = writer_->ending() ? kEndingText : text.data();
+    std::snprintf(text.data(), text.size(), texts::film::kProgress, writer_->written(), writer_->frames());
+    std::string line = writer_->ending() ? texts::film::kEnding : text.data();
     if (const auto left = writer_->left(now); left && !writer_->ending())
         line += ", " + core::duration_text(*left) + " left";
-    const float button = ImGui::CalcTextSize(kStopText).x + 4 * ImGui::GetStyle().FramePadding.x;
+    const float button =
+        ImGui::CalcTextSize(texts::film::kStop.name).x + 4 * ImGui::GetStyle().FramePadding.x;
     ImGui::ProgressBar(float(writer_->written()) / float(writer_->frames()), ImVec2(-button, 0),
                        line.c_str());
     ImGui::SameLine();
     ImGui::BeginDisabled(writer_->ending());
     ImGui::PushID("writing");
-    if (ImGui::Button(kStopText)) writer_.reset();
+    if (ImGui::Button(texts::film::kStop.name)) stop_film();
     ImGui::PopID();
     ImGui::EndDisabled();
 }
@@ -253,10 +237,11 @@ void FilmStrip::draw_track() {
         std::snprintf(label.data(), label.size(), step < 1 ? "%.1f s" : "%.0f s", i * step);
         const float x = scale.at(i * step);
         list.AddLine({x, at.y + line}, {x, bottom}, ImGui::GetColorU32(ImGuiCol_Separator));
-        list.AddText({x, at.y}, quiet, label.data());
+        const float last = at.x + width - ImGui::CalcTextSize(label.data()).x;
+        list.AddText({std::min(x, last), at.y}, quiet, label.data());
     }
     if (views().empty()) {
-        list.AddText({scale.left, middle - 0.5f * line}, quiet, kEmptyText);
+        list.AddText({scale.left, middle - 0.5f * line}, quiet, texts::film::kEmpty);
         return;
     }
     list.AddLine({scale.at(*views().front().time), middle}, {scale.at(end), middle}, quiet,
@@ -270,26 +255,21 @@ void FilmStrip::draw_track() {
 }
 
 void FilmStrip::draw_buttons() {
-    ImGui::BeginDisabled(views().size() < 2);
-    if (ImGui::Button(playing_ ? kStopText : kPlayText)) play(!playing_);
-    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", kPlayTip);
-    ImGui::EndDisabled();
-    if (placed_button(kAddText, kAddTip)) add_key();
-    ImGui::BeginDisabled(!key_at_playhead());
-    if (placed_button(kReplaceText, kReplaceTip)) replace_key();
-    if (placed_button(kDeleteText, kDeleteTip)) forget_key();
-    ImGui::EndDisabled();
-    ImGui::BeginDisabled(views().size() < 2);
-    if (placed_button(kEvenText, kEvenTip)) space_evenly(views());
-    ImGui::EndDisabled();
-    ImGui::BeginDisabled(views().empty() || writing());
-    if (placed_button(kSaveText, kSaveTip)) open_film();
-    ImGui::EndDisabled();
-    ImGui::BeginDisabled(views().empty());
-    if (placed_button(kViewsText, kViewsTip)) navigation_.write_views();
-    ImGui::EndDisabled();
-    if (placed_button(kPictureText)) open_picture();
-    if (placed_button(kHideText)) shown = false;
+    const auto button = [](const texts::film::Action& action, bool enabled) {
+        ImGui::BeginDisabled(!enabled);
+        const bool clicked = placed_button(action);
+        ImGui::EndDisabled();
+        return clicked;
+    };
+    const bool several = views().size() >= 2, on_key = key_at_playhead().has_value();
+    if (button(playing_ ? texts::film::kStop : texts::film::kPlay, several)) play(!playing_);
+    if (button(texts::film::kAdd, true)) add_key();
+    if (button(texts::film::kReplace, on_key)) replace_key();
+    if (button(texts::film::kDelete, on_key)) forget_key();
+    if (button(texts::film::kEven, several)) space_evenly(views());
+    if (button(texts::film::kSaveFilm, !views().empty() && !writing())) open_film();
+    if (button(texts::film::kSaveKeys, !views().empty())) navigation_.write_views();
+    if (button(texts::film::kSavePicture, true)) open_picture();
 }
 
 void FilmStrip::draw_settings() {
@@ -298,25 +278,29 @@ void FilmStrip::draw_settings() {
         std::snprintf(text.data(), text.size(), "%gx", double(speed));
         return std::string(text.data());
     };
-    ImGui::SetNextItemWidth(4.5f * ImGui::GetTextLineHeight());
-    if (ImGui::BeginCombo(kSpeedText, name(speed_).c_str())) {
+    label_before(texts::film::kSpeed, 4.5f, true);
+    if (ImGui::BeginCombo("##speed", name(speed_).c_str())) {
         for (const float speed : kSpeeds)
             if (ImGui::Selectable(name(speed).c_str(), speed == speed_)) speed_ = speed;
         ImGui::EndCombo();
     }
-    fit_in_line(ImGui::GetFrameHeight() + ImGui::CalcTextSize(kLoopText).x);
-    ImGui::Checkbox(kLoopText, &loop_);
-    fit_in_line(ImGui::GetFrameHeight() + ImGui::CalcTextSize(kSmoothText).x);
-    ImGui::Checkbox(kSmoothText, &smooth_);
+    placed_checkbox(texts::film::kLoop, loop_);
+    placed_checkbox(texts::film::kSmooth, smooth_);
     if (views().size() >= 2) {
         float length = float(*views().back().time - *views().front().time);
-        place_labelled(6, kLengthText);
-        if (ImGui::DragFloat(kLengthText, &length, 0.05f, 0.2f, 3600, "%.2f s", ImGuiSliderFlags_AlwaysClamp))
+        label_before(texts::film::kLength, 6);
+        if (ImGui::DragFloat("##length", &length, 0.05f, 0.2f, 3600, "%.2f s", ImGuiSliderFlags_AlwaysClamp))
             stretch(views(), double(length));
     }
-    place_labelled(6, kDistanceText);
-    ImGui::SliderFloat(kDistanceText, &state_.settings.film_seconds, 0.2f, 10, "%.1f s",
+    label_before(texts::film::kDistance, 6);
+    ImGui::SliderFloat("##distance", &state_.settings.film_seconds, 0.2f, 10, "%.1f s",
                        ImGuiSliderFlags_AlwaysClamp);
+    const ImVec2 padding = ImGui::GetStyle().FramePadding;
+    const float width = ImGui::CalcTextSize(texts::film::kHide.name).x + 2 * padding.x;
+    fit_in_line(width);
+    ImGui::SetCursorPosX(ImGui::GetWindowContentRegionMax().x - width);
+    if (ImGui::Button(texts::film::kHide.name)) shown = false;
+    ui::show_hint(texts::film::kHide.hint);
 }
 
 }  // namespace ewa::viewer

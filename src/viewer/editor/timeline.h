@@ -2,13 +2,14 @@
 // The strip of the film at the lower border of the picture: its keys on a timeline, its preview, and the dialogs that save films and
 // pictures.
 #pragma once
-#include <array>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "viewer/editor/dialogs.h"
 #include "viewer/editor/film.h"
+#include "viewer/editor/modal.h"
 #include "viewer/navigation.h"
 #include "viewer/shown.h"
 #include "viewer/view_state.h"
@@ -21,9 +22,9 @@ double steady_now();
 /// The keys of the film are the saved views, in the order of their times.
 class FilmStrip {
   public:
-    FilmStrip(ViewState& state, Navigation& navigation, Shown& shown);
+    FilmStrip(ViewState& state, Navigation& navigation, Shown& shown, Dialogs& dialogs, FileDialog& files);
 
-    /// Draws the strip and the open dialog. Call it once per frame of ImGui.
+    /// Draws the strip. Call it once per frame of ImGui.
     void draw();
     /// Returns whether the key was the strip's.
     bool handle_key(const KeyPress& press);
@@ -45,7 +46,6 @@ class FilmStrip {
     bool shown = false;
 
   private:
-    enum class Dialog { none, film, picture };
     /// Where times are on the screen, in ImGui's coordinates.
     struct Scale {
         float left, width;
@@ -53,7 +53,6 @@ class FilmStrip {
         float at(double time) const { return left + width * float(time / range); }
         double time(float x) const { return range * double((x - left) / width); }
     };
-    using FileName = std::array<char, 1024>;
 
     std::vector<io::NamedView>& views() { return navigation_.views; }
     double distance() const { return double(state_.settings.film_seconds); }
@@ -68,14 +67,18 @@ class FilmStrip {
     void draw_buttons();
     void draw_settings();
     void draw_progress();
-    void draw_film_dialog();
-    void draw_picture_dialog();
-    void start_film();
-    void start_picture();
+    bool draw_film_dialog();
+    bool draw_picture_dialog();
+    bool end_dialog(const char* names, bool (FilmStrip::*start)());
+    bool start_film();
+    bool start_picture();
+    void stop_film();
 
     ViewState& state_;
     Navigation& navigation_;
     Shown& shown_;
+    Dialogs& dialogs_;
+    FileDialog& files_;
     double playhead_ = 1e9;  // s; the end at first, where new keys belong
     double range_ = 0;       // s, of the track
     std::optional<size_t> dragged_;
@@ -83,8 +86,8 @@ class FilmStrip {
     float speed_ = 1;
     Camera last_;       // that the preview has shown
     float height_ = 0;  // of the strip, in ImGui's coordinates
-    Dialog dialog_ = Dialog::none;
-    FileName film_name_{}, picture_name_{};
+    PathField file_;    // of the open dialog
+    bool ffmpeg_ = true;
     FilmOutput output_;
     Size picture_size_{1920, 1080};
     std::unique_ptr<FilmWriter> writer_;
