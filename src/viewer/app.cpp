@@ -92,7 +92,7 @@ void App::run() {
             if (const auto dropped = state_.window.take_dropped(); !dropped.empty())
                 open(dropped, state_.scene);
             if (dialogs_.take()) state_.redraw(Loop::kRedraws);
-            if (const auto chosen = session_.take_chosen(); !chosen.empty()) open(chosen, {});
+            take_chosen();
             change_text();
         }
         session_.take_opened();
@@ -353,6 +353,17 @@ std::filesystem::path App::film_views() {
 
 void App::open(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown) {
     dialogs_.leave([this, paths, shown] { session_.open(paths, shown); });
+}
+
+/// Opens what the user chose in the desktop's dialog. Without one the window asks.
+void App::take_chosen() {
+    if (session_.dialog.wanted() == Wanted::save) return;  // the dialogs of the editor take it
+    try {
+        if (const auto path = session_.dialog.take()) open({*path}, {});
+    } catch (const std::exception& error) {
+        dialogs_.ask_path(error.what(), [this](const std::filesystem::path& path) { open({path}, {}); });
+        state_.redraw(Loop::kRedraws);
+    }
 }
 
 /// The scene that the window shows becomes the one that is edited.

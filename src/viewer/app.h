@@ -51,6 +51,7 @@ class App {
     bool editing() const;  // the keys are those of the tools
     bool live() const;     // edits go to a training
     void sync_editor();
+    void take_chosen();
     void enter_scene();
     std::filesystem::path film_views();
     void send_edits(const std::vector<edit::Step>& done);

@@ -65,6 +65,8 @@ struct Welcome {
     std::optional<Wanted> wanted;
     std::optional<std::filesystem::path> file;
 };
+/// Draws the files that were opened last. Returns the one that is clicked.
+std::optional<std::filesystem::path> draw_recent();
 /// Draws the card of an empty window: what can be dropped, buttons, and the files that were opened last.
 Welcome draw_welcome(const Rectangle& area);
 /// Shows the progress of the search for cameras, and a button. Returns whether the button is clicked.

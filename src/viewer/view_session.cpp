@@ -81,16 +81,6 @@ void ViewSession::take_opened() {
     }
 }
 
-std::vector<std::filesystem::path> ViewSession::take_chosen() {
-    if (dialog.wanted() == Wanted::save) return {};  // the dialogs of the editor take it
-    try {
-        if (const auto path = dialog.take()) return {*path};
-    } catch (const std::exception& error) {
-        state_.say(error.what());
-    }
-    return {};
-}
-
 void ViewSession::find_cameras(const std::filesystem::path& photos) {
     search_failure_.clear();
     state_.message.note.clear();

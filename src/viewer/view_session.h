@@ -32,7 +32,6 @@ class ViewSession {
     /// Writes a screenshot.
     void save(Image&& image);
 
-    std::vector<std::filesystem::path> take_chosen();  // that the user chose in the file dialog; empty: none
     void take_opened();
     void take_found();
     void take_saved();

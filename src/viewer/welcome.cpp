@@ -65,21 +65,6 @@ void draw_open_buttons(Welcome& welcome) {
     if (ImGui::Button(texts::kOpenAFolder)) welcome.wanted = Wanted::folder;
 }
 
-void draw_recent(Welcome& welcome) {
-    static std::vector<std::filesystem::path> recent;  // as of the time when the card appeared
-    if (ImGui::IsWindowAppearing()) recent = recent_files();
-    if (recent.empty()) return;
-    ImGui::Spacing();
-    ImGui::TextDisabled("%s", texts::kRecent);
-    for (size_t i = 0; i < std::min(recent.size(), kCardFiles); ++i) {
-        const std::filesystem::path& file = recent[i];
-        ImGui::PushID(int(i));
-        if (ImGui::Selectable(core::one_line(file.filename().string()).c_str())) welcome.file = file;
-        if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", core::one_line(file.string()).c_str());
-        ImGui::PopID();
-    }
-}
-
 void draw_help_group(const char* name, std::span<const texts::HelpRow> rows, float keys) {
     ImGui::TextDisabled("%s", name);
     if (!ImGui::BeginTable(name, 2, ImGuiTableFlags_SizingFixedFit)) return;
@@ -121,6 +106,25 @@ void draw_help_groups(int columns) {
 
 }  // namespace
 
+std::optional<std::filesystem::path> draw_recent() {
+    static std::vector<std::filesystem::path> recent;  // as of the time when the window appeared
+    std::optional<std::filesystem::path> chosen;
+    if (ImGui::IsWindowAppearing()) recent = recent_files();
+    if (recent.empty()) return chosen;
+    ImGui::Spacing();
+    ImGui::TextDisabled("%s", texts::kRecent);
+    for (size_t i = 0; i < std::min(recent.size(), kCardFiles); ++i) {
+        const std::filesystem::path& file = recent[i];
+        ImGui::PushID(int(i));
+        if (ImGui::Selectable(core::one_line(file.filename().string()).c_str(), false,
+                              ImGuiSelectableFlags_DontClosePopups))
+            chosen = file;
+        if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", core::one_line(file.string()).c_str());
+        ImGui::PopID();
+    }
+    return chosen;
+}
+
 Welcome draw_welcome(const Rectangle& area) {
     Welcome welcome;
     const ImVec2 low = gui_point(area.x, area.y), high = gui_point(area.x + area.width, area.y + area.height);
@@ -147,7 +151,7 @@ Welcome draw_welcome(const Rectangle& area) {
         center_text(texts::kDropExplanation, true);
         ImGui::Dummy({0, 0.3f * line});
         draw_open_buttons(welcome);
-        draw_recent(welcome);
+        welcome.file = draw_recent();
         center_text(texts::kKeysLine, true);
     }
     ImGui::End();

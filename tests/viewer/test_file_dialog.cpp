@@ -246,5 +246,24 @@ TEST_F(OpenKeys, AndTheButtonsOpenWhatIsChosen) {
     expect_silent(session.quit());
 }
 
+TEST_F(OpenKeys, TakeATypedPathWithoutADialog) {
+    Session session(shots_, {"--size", "640x480"},
+                    {{"PATH", folder_ / "bin"}, {"DBUS_SESSION_BUS_ADDRESS", kNoBus}});
+    ASSERT_TRUE(session.found());
+    EXPECT_EQ(range_of(screenshot(session)), 0);
+    // A key that comes before the dialog has the focus is lost, so the dialog is opened again.
+    constexpr int kTries = 6;
+    bool there = false;
+    for (int i = 0; i < kTries && !there; ++i) {
+        session.send("key ctrl+o sleep 2 key ctrl+a type --delay 20 " + splats_);
+        session.send("sleep 1 key Return");
+        there = soon([&] { return fs::exists(config_ + "/ewa/recent.json"); }, kSessionPatience / kTries);
+        if (!there) session.send("key Escape sleep 1");
+    }
+    EXPECT_TRUE(there) << "nothing was opened";
+    EXPECT_GT(range_of(screenshot(session)), 0.3f);
+    expect_silent(session.quit());
+}
+
 }  // namespace
 }  // namespace ewa::test

@@ -18,6 +18,7 @@
 #include "viewer/editor/save_choices.h"
 #include "viewer/editor/texts.h"
 #include "viewer/editor/theme.h"
+#include "viewer/overlay.h"
 
 namespace ewa::viewer {
 namespace {
@@ -86,6 +87,7 @@ struct Dialogs::State {
     void draw_formats(const Gaussians* splats, size_t count);
     void draw_losses(const Gaussians& splats) const;
     void draw_save();
+    bool draw_open(const std::function<void(const fs::path&)>& open);
     void draw_leave();
     void draw_journal();
     void draw_saving();
@@ -231,6 +233,29 @@ void Dialogs::State::draw_save() {
     end_modal(shown != DialogKind::none);
 }
 
+bool Dialogs::State::draw_open(const std::function<void(const fs::path&)>& open) {
+    if (!begin_modal(texts::files::kOpenTitle)) return true;
+    if (begin_form()) {
+        form_row(texts::files::kFile);
+        path.draw(nullptr);
+        end_form();
+    }
+    std::optional<fs::path> chosen = draw_recent();
+    if (chosen) path.set(*chosen);
+    const Choice choice =
+        draw_choices(texts::files::kOpen, nullptr, texts::files::kCancel, !path.path().empty());
+    if (choice == Choice::confirm) chosen = path.path();
+    std::error_code error;
+    if (chosen && !fs::exists(*chosen, error)) {
+        path.complain(texts::files::kNoSuchFile);
+        chosen.reset();
+    }
+    const bool stays = choice != Choice::cancel && !chosen;
+    end_modal(stays);
+    if (chosen) open(*chosen);
+    return stays;
+}
+
 void Dialogs::State::draw_leave() {
     if (!begin_modal(texts::files::kLeaveTitle)) return;
     std::string names;
@@ -298,7 +323,7 @@ void Dialogs::State::draw_shown() {
         case DialogKind::saving:
             return draw_saving();
         case DialogKind::other:
-            if (!draw_other()) shown = DialogKind::none;
+            if (!draw_other() && shown == DialogKind::other) shown = DialogKind::none;
             return;
         case DialogKind::none:
             return close_modal();
@@ -350,6 +375,12 @@ void Dialogs::offer_journal(const fs::path& file, size_t splats) {
     } catch (const std::exception& error) {
         state.say(error.what());
     }
+}
+
+void Dialogs::ask_path(const std::string& why, std::function<void(const fs::path&)> open) {
+    state_->path.set({});
+    state_->path.complain(core::one_line(why));
+    show([state = state_.get(), open = std::move(open)] { return state->draw_open(open); });
 }
 
 void Dialogs::show(std::function<bool()> draw) {

@@ -28,6 +28,8 @@ class Dialogs {
     void leave(std::function<void()> go_on);
     /// Asks whether to restore the edits of a crashed session, if the file has some.
     void offer_journal(const std::filesystem::path& file, size_t splats);
+    /// Asks for a file or folder where the desktop has no dialog, then calls `open`. why: what is shown first.
+    void ask_path(const std::string& why, std::function<void(const std::filesystem::path&)> open);
     /// Opens a dialog of another part, unless one is open. draw: draws it as a modal, and returns whether it stays open.
     void show(std::function<bool()> draw);
     /// Draws what is open. Call it once per frame of ImGui.
