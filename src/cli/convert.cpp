@@ -22,6 +22,7 @@
 #include "core/folders.h"
 #include "core/messages.h"
 #include "core/text.h"
+#include "edit/journal.h"
 #include "edit/steps.h"
 #include "ewa/error.h"
 #include "ewa/render_options.h"
@@ -250,6 +251,9 @@ bool edit_scene(const ConvertArguments& arguments, Work& work, std::optional<fol
     std::vector<edit::Edit> edits = arguments.editing.edits;
     if (!picture.empty()) std::erase_if(edits, [](const edit::Edit& edit) { return bool(edit.change); });
     const Gaussians before = picture.empty() ? Gaussians() : work.gaussians;
+    for (const fs::path& journal : arguments.editing.journals)
+        for (std::string& remark : edit::journal_remarks(journal, work.gaussians.size()))
+            work.lost.push_back(std::move(remark));
     const edit::Applied applied = edit::apply(work.gaussians, edits, cameras_of(run));
     work.lost.insert(work.lost.end(), applied.remarks.begin(), applied.remarks.end());
     for (const std::string& warning : applied.warnings) core::warn(core::one_line(warning));

@@ -51,6 +51,18 @@ std::string quoted(const std::string& word) {
 
 }  // namespace
 
+std::vector<Words> edits_of(std::span<const Step> steps) {
+    std::vector<Words> all;
+    for (const Step& step : steps) all.insert(all.end(), step.edits.begin(), step.edits.end());
+    return all;
+}
+
+std::vector<Words> lasting_edits(std::span<const Step> steps) {
+    std::vector<Words> edits = edits_of(steps);
+    while (!edits.empty() && edits.back().name == "select") edits.pop_back();
+    return edits;
+}
+
 History::History(std::shared_ptr<const Gaussians> splats, Cameras cameras)
     : splats_(std::move(splats), std::move(cameras)) {}
 
@@ -114,12 +126,6 @@ bool History::redo() {
     ++version_;
     values_version_ += before.values;
     return true;
-}
-
-std::vector<Words> History::edits() const {
-    std::vector<Words> all;
-    for (size_t i = 0; i < done_; ++i) all.insert(all.end(), steps_[i].edits.begin(), steps_[i].edits.end());
-    return all;
 }
 
 uint64_t History::bytes() const {

@@ -3,6 +3,7 @@
 #pragma once
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -24,12 +25,18 @@ struct Step {
     bool operator==(const Step&) const = default;
 };
 
+/// The edits of the steps, in order.
+std::vector<Words> edits_of(std::span<const Step> steps);
+
+/// The edits up to the last one that does more than select. Two states with the same lasting edits need no save between them.
+std::vector<Words> lasting_edits(std::span<const Step> steps);
+
 class History {
   public:
     explicit History(std::shared_ptr<const Gaussians> splats, Cameras cameras = {});
 
     /// Performs a step, and drops the steps that were undone. Throws InputError, and changes nothing, for an edit that cannot be
-    /// read or done. Only edits of a selection are allowed (Row::selects). Returns whether any splat has changed.
+    /// read or done. Only edits of a selection are allowed. Returns whether any splat has changed.
     bool perform(const Step& step);
     bool undo();  // false: there is nothing to undo
     bool redo();
@@ -38,8 +45,8 @@ class History {
     const std::shared_ptr<const Gaussians>& first() const { return splats_.first(); }  // without any edit
     const std::vector<Step>& steps() const { return steps_; }                          // the undone ones too
     size_t done() const { return done_; }  // steps that are in effect
-    /// The edits in effect, in order.
-    std::vector<Words> edits() const;
+    std::span<const Step> in_effect() const { return {steps_.data(), done_}; }
+    std::vector<Words> edits() const { return edits_of(in_effect()); }
     /// Rises with every change. The number of values changes only if splats() has others.
     uint64_t version() const { return version_; }
     uint64_t values_version() const { return values_version_; }

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "edit/journal.h"
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -11,6 +15,8 @@
 
 #include "core/folders.h"
 #include "core/json_field.h"
+#include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 
 namespace ewa::edit {
@@ -21,18 +27,35 @@ using Json = nlohmann::ordered_json;
 constexpr uint64_t kFormat = 1;
 constexpr uintmax_t kMostBytes = 256u << 20;
 
+/// Names of files may be no UTF-8.
+std::string line_of(const Json& json) {
+    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 std::string head_line(const JournalHead& head) {
-    return Json{{"ewa_edits", kFormat}, {"file", head.file}, {"splats", head.splats}}.dump();
+    Json json{{"ewa_edits", kFormat}, {"file", head.file}, {"splats", head.splats}};
+    if (!head.time.empty()) {
+        json["bytes"] = head.bytes;
+        json["time"] = head.time;
+    }
+    return line_of(json);
 }
 
 std::string step_line(const Step& step) {
     Json edits = Json::array();
     for (const Words& words : step.edits)
         edits.push_back(words.value.empty() ? Json{words.name} : Json{words.name, words.value});
-    return Json{{"step", step.title}, {"edits", std::move(edits)}}.dump();
+    return line_of(Json{{"step", step.title}, {"edits", std::move(edits)}});
 }
 
-/// where: the file and the line, for errors.
+Edit parsed(const Words& words) {
+    Edit edit = parse(words.name, words.value);
+    const auto row = std::ranges::find(rows(), std::string_view(words.name), &Row::name);
+    if (!words.value.empty() && row != rows().end() && *row->value == 0)
+        throw InputError("--" + words.name + " takes no value");
+    return edit;
+}
+
 Step step_of(const core::JsonField& line) {
     Step step{line.text("step"), {}};
     for (const nlohmann::json& item : line.list("edits")) {
@@ -41,22 +64,33 @@ Step step_of(const core::JsonField& line) {
         if (!texts) throw InputError(line.where() + ": an edit is not a list of its name and its value");
         step.edits.push_back(
             {item.front().get<std::string>(), item.size() == 2 ? item.back().get<std::string>() : ""});
+        try {
+            parsed(step.edits.back());
+        } catch (const InputError& error) {
+            throw InputError(line.where() + ": " + error.what());
+        }
     }
     return step;
 }
 
 /// Steps as a history has them: undone ones stay until another step is done.
 struct Replayed {
-    std::vector<Step> steps;
+    ReadJournal journal;
     size_t done = 0;
 
     void take(const core::JsonField& line) {
+        std::vector<Step>& steps = journal.steps;
         if (line.has("undo")) {
-            if (done == 0) throw InputError(line.where() + ": there is nothing to undo");
+            if (done == journal.separated) throw InputError(line.where() + ": there is nothing to undo");
             --done;
         } else if (line.has("redo")) {
             if (done == steps.size()) throw InputError(line.where() + ": there is nothing to redo");
             ++done;
+        } else if (line.has("saved")) {
+            journal.saved = lasting_edits({steps.data(), done});
+        } else if (line.has("separated")) {
+            journal.separated = done;
+            journal.separated_at = size_t(line.whole("separated", UINT32_MAX));
         } else {
             steps.resize(done);
             steps.push_back(step_of(line));
@@ -64,6 +98,15 @@ struct Replayed {
         }
     }
 };
+
+JournalHead read_head(const core::JsonField& line) {
+    if (line.whole("ewa_edits", UINT32_MAX) != kFormat)
+        throw InputError(line.where() + ": written by a later version of ewa-view");
+    JournalHead head{line.text("file"), size_t(line.whole("splats", UINT32_MAX))};
+    head.time = line.text("time", "");
+    if (!head.time.empty()) head.bytes = line.whole("bytes", uint64_t(1) << 53);
+    return head;
+}
 
 std::string whole_text(const std::filesystem::path& file) {
     std::error_code error;
@@ -80,76 +123,137 @@ std::string whole_text(const std::filesystem::path& file) {
 
 }  // namespace
 
+JournalHead head_of(const std::filesystem::path& file, size_t splats) {
+    JournalHead head{file.filename().string(), splats};
+    std::error_code error;
+    const auto time = std::filesystem::last_write_time(file, error);
+    if (error) return head;
+    head.bytes = std::filesystem::file_size(file, error);
+    if (!error) head.time = std::to_string(time.time_since_epoch().count());
+    return head;
+}
+
+bool same_version(const JournalHead& head, const JournalHead& file) {
+    return head.splats == file.splats &&
+           (head.time.empty() || (head.time == file.time && head.bytes == file.bytes));
+}
+
 ReadJournal read_journal(const std::filesystem::path& file) {
     const std::string text = whole_text(file);
-    ReadJournal journal;
     Replayed replayed;
+    ReadJournal& journal = replayed.journal;
     size_t number = 0;
+    bool headed = false;
     for (size_t begin = 0; begin < text.size();) {
-        const size_t end = text.find('\n', begin);
-        if (end == std::string::npos) break;  // cut off
-        const std::string where = file.string() + ": line " + std::to_string(++number);
-        const core::JsonField line =
-            core::JsonField::of_text(std::string_view(text).substr(begin, end - begin), where);
+        const size_t end = std::min(text.find('\n', begin), text.size());
+        const std::string_view words = std::string_view(text).substr(begin, end - begin);
         begin = end + 1;
-        if (number > 1) {
-            replayed.take(line);
-            continue;
+        ++number;
+        if (core::trim(words).empty()) continue;
+        if (end == text.size()) {
+            journal.cut_off = true;
+            break;
         }
-        if (line.whole("ewa_edits", UINT32_MAX) != kFormat)
-            throw InputError(where + ": written by a later version of ewa-view");
-        journal.head = {line.text("file"), size_t(line.whole("splats", UINT32_MAX))};
+        const core::JsonField line =
+            core::JsonField::of_text(words, file.string() + ": line " + std::to_string(number));
+        if (std::exchange(headed, true))
+            replayed.take(line);
+        else
+            journal.head = read_head(line);
     }
-    if (number == 0) throw InputError(file.string() + ": no journal of edits: its first line is missing");
-    replayed.steps.resize(replayed.done);
-    journal.steps = std::move(replayed.steps);
-    return journal;
+    if (!headed) throw InputError(file.string() + ": no journal of edits: its first line is missing");
+    journal.steps.resize(replayed.done);
+    return std::move(replayed.journal);
 }
 
 std::vector<Edit> edits_of_journal(const std::filesystem::path& file) {
     std::vector<Edit> edits;
-    for (const Step& step : read_journal(file).steps)
-        for (const Words& words : step.edits) try {
-                edits.push_back(parse(words.name, words.value));
-            } catch (const InputError& error) {
-                throw InputError(file.string() + ": " + error.what());
-            }
+    for (const Words& words : edits_of(read_journal(file).steps)) edits.push_back(parsed(words));
     return edits;
 }
 
-std::filesystem::path journal_of(const std::filesystem::path& file) {
-    return file.string() + ".edits";
+std::vector<std::string> journal_remarks(const std::filesystem::path& file, size_t splats) {
+    const ReadJournal journal = read_journal(file);
+    std::vector<std::string> remarks;
+    if (journal.cut_off)
+        remarks.push_back("--edits: the last line of " + file.string() + " is cut off and skipped");
+    if (journal.head.splats != splats)
+        remarks.push_back("--edits: these edits were made on " + core::counted(journal.head.splats, "splat") +
+                          ", and the scene has " + std::to_string(splats));
+    return remarks;
+}
+
+std::filesystem::path journal_of(const std::filesystem::path& file, size_t part) {
+    return file.string() + (part < 2 ? "" : "." + std::to_string(part)) + ".edits";
+}
+
+void set_aside(const std::filesystem::path& journal) {
+    std::error_code ignored;
+    std::filesystem::rename(journal, journal.string() + ".before", ignored);
 }
 
 struct Journal::File {
-    std::FILE* stream = nullptr;
-    ~File() {
-        if (stream) std::fclose(stream);
+    int descriptor = -1;
+
+    /// more: flags of open(2). File systems without locks open the file too.
+    File(const std::filesystem::path& file, int more)
+        : descriptor(::open(file.c_str(), O_RDWR | O_CLOEXEC | more, 0666)) {
+        if (descriptor < 0) throw RunError(core::one_line(file.string()) + ": " + std::strerror(errno));
+        if (flock(descriptor, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
+        ::close(descriptor);
+        throw RunError("another window edits this file");
     }
+    File(const File&) = delete;
+    File& operator=(const File&) = delete;
+    ~File() { ::close(descriptor); }
 };
 
+bool in_use(const std::filesystem::path& journal) {
+    const int descriptor = ::open(journal.c_str(), O_RDONLY | O_CLOEXEC);
+    if (descriptor < 0) return false;
+    const bool used = flock(descriptor, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+    ::close(descriptor);
+    return used;
+}
+
 Journal::Journal(std::filesystem::path file, const JournalHead& head, bool go_on)
-    : file_(std::move(file)), open_(std::make_unique<File>()) {
-    uintmax_t whole = 0;
+    : file_(std::move(file)), open_(std::make_unique<File>(file_, O_CREAT)) {
+    const std::string text = whole_text(file_);
     if (go_on) {
         // A line that a crash has cut off would join the next one.
-        const size_t end = whole_text(file_).rfind('\n');
-        whole = end == std::string::npos ? 0 : end + 1;
-        std::filesystem::resize_file(file_, whole);
+        whole_ = text.rfind('\n') + 1;  // npos + 1 is 0
+        std::filesystem::resize_file(file_, whole_);
+        if (lseek(open_->descriptor, 0, SEEK_END) < 0)
+            throw RunError(core::one_line(file_.string()) + ": " + std::strerror(errno));
+    } else if (!text.empty()) {
+        set_aside(file_);
+        open_ = std::make_unique<File>(file_, O_CREAT | O_EXCL);
     }
-    open_->stream = std::fopen(file_.c_str(), whole > 0 ? "ab" : "wb");
-    if (!open_->stream) throw RunError(file_.string() + ": " + std::strerror(errno));
-    if (whole == 0) append(head_line(head));
+    if (whole_ == 0) append(head_line(head));
 }
 
 Journal::~Journal() = default;
 
 void Journal::append(const std::string& line) {
-    if (!open_->stream) return;
+    if (!open_ || broken_) return;
     const std::string text = line + '\n';
-    if (std::fwrite(text.data(), 1, text.size(), open_->stream) != text.size() ||
-        std::fflush(open_->stream) != 0)
-        throw RunError(file_.string() + ": cannot be written: " + std::strerror(errno));
+    for (size_t written = 0; written < text.size();) {
+        const ssize_t count = ::write(open_->descriptor, text.data() + written, text.size() - written);
+        if (count < 0 && errno == EINTR) continue;
+        if (count > 0) {
+            written += size_t(count);
+            continue;
+        }
+        const std::string reason = std::strerror(errno);
+        broken_ = true;
+        std::error_code ignored;
+        if (whole_ == 0)
+            std::filesystem::remove(file_, ignored);
+        else
+            std::filesystem::resize_file(file_, whole_, ignored);
+        throw RunError(core::one_line(file_.string()) + " cannot be written: " + reason);
+    }
+    whole_ += text.size();
 }
 
 void Journal::did(const Step& step) {
@@ -164,8 +268,17 @@ void Journal::redid() {
     append(R"({"redo":1})");
 }
 
+void Journal::separated(size_t at) {
+    append("{\"separated\":" + std::to_string(at) + "}");
+}
+
+void Journal::saved() {
+    if (broken_) return remove();
+    append(R"({"saved":1})");
+}
+
 void Journal::remove() {
-    open_ = std::make_unique<File>();
+    if (!std::exchange(open_, nullptr)) return;
     std::error_code ignored;
     std::filesystem::remove(file_, ignored);
 }

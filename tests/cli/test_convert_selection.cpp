@@ -73,6 +73,13 @@ TEST_F(ConvertSelection, ReplaysAJournal) {
     write_file(journal, "{\"ewa_edits\":1,\"file\":\"splats.ply\",\"splats\":200}\n{\"redo\":1}\n");
     expect_failure(run_ewa({"convert", splats_, out_, "--edits", journal}), 2,
                    "line 2: there is nothing to redo");
+    write_file(journal,
+               "{\"ewa_edits\":1,\"file\":\"splats.ply\",\"splats\":7}\n"
+               "{\"step\":\"Select\",\"edits\":[[\"select\",\"x=0..\"]]}\n{\"saved\":1}\n\n{\"undo\":");
+    const Outcome replay = run_ewa({"convert", splats_, out_, "--edits", journal});
+    expect_success(replay);
+    EXPECT_NE(replay.out.find("edits were made on 7 splats, and the scene has 200"), std::string::npos);
+    EXPECT_NE(replay.out.find("is cut off, and left out"), std::string::npos);
 }
 
 TEST_F(ConvertSelection, NamesTheShapeThatItCannotRead) {

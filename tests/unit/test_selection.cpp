@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Edits of a selection: shapes, values, undo and redo, and journals.
+// Edits of a selection: shapes, values, undo and redo.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,7 +9,6 @@
 
 #include "edit/edits.h"
 #include "edit/history.h"
-#include "edit/journal.h"
 #include "edit/shapes.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
@@ -426,50 +425,6 @@ TEST(History, GivesTheCommandThatDoesTheSame) {
     EXPECT_EQ(command_line({{"select", "x=0.."}, {"delete", ""}, {"select", "polygon=0,0;view=1"}},
                            "it's.ply", "b.ply"),
               "ewa convert 'it'\\''s.ply' b.ply --select x=0.. --delete --select 'polygon=0,0;view=1'");
-}
-
-TEST(Journal, IsReadBackUpToWhatACrashCutOff) {
-    const test::TempFolder folder;
-    const auto file = folder / "a.ply.edits";
-    EXPECT_EQ(journal_of(folder / "a.ply"), file);
-    const JournalHead head{"a.ply", 300};
-    const Step first = selection("x=0.."), second = step({{"delete", ""}}), third = selection("all");
-    {
-        Journal journal(file, head, false);
-        journal.did(first);
-        journal.did(second);
-        journal.undid();
-        journal.did(third);
-        journal.undid();
-        journal.redid();
-    }
-    const ReadJournal read = read_journal(file);
-    EXPECT_EQ(read.head, head);
-    EXPECT_EQ(read.steps, (std::vector<Step>{first, third}));
-    folder.write("a.ply.edits", test::file_bytes(file) + "{\"step\":\"De");
-    EXPECT_EQ(read_journal(file).steps.size(), 2u);
-    {
-        Journal journal(file, head, true);
-        journal.did(second);
-    }
-    EXPECT_EQ(read_journal(file).steps, (std::vector<Step>{first, third, second}));
-    EXPECT_EQ(edits_of_journal(file).size(), 3u);
-}
-
-TEST(Journal, NamesTheLineThatIsDamaged) {
-    const test::TempFolder folder;
-    const std::string head = "{\"ewa_edits\":1,\"file\":\"a\",\"splats\":3}\n";
-    const auto error_of = [&](const std::string& text) {
-        const auto file = folder.write("j.edits", text);
-        expect_error<InputError>([&] { edits_of_journal(file); }, {"j.edits"});
-    };
-    error_of("");
-    error_of("{\"ewa_edits\":2,\"file\":\"a\",\"splats\":3}\n");
-    error_of(head + "{\"undo\":1}\n");
-    error_of(head + "{\"step\":\"x\",\"edits\":[[]]}\n");
-    error_of(head + "{\"step\":\"x\",\"edits\":[[\"select\",1]]}\n");
-    error_of(head + "{\"step\":\"x\",\"edits\":[[\"glow\"]]}\n");
-    error_of(head + "nonsense\n");
 }
 
 }  // namespace
