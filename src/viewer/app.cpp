@@ -72,7 +72,7 @@ void App::run() {
     Loop& loop = state_.loop;
     while (!loop.done) {
         if (state_.window.closed()) {
-            if (state_.scripted() || dialogs_.open()) break;
+            if (state_.scripted() || dialogs_.leaving()) break;
             state_.window.stay();
             dialogs_.leave([&loop] { loop.done = true; });
             state_.redraw(Loop::kRedraws);
@@ -383,7 +383,7 @@ void App::enter_scene() {
             return all;
         };
     editor_.enter(scene.title, is_file ? file : std::filesystem::path(), entered_, cameras, journaled);
-    if (journaled) dialogs_.offer_journal(file, entered_->size());
+    if (journaled) dialogs_.offer_journals();
 }
 
 /// Lets the editor know of a new scene, and the render thread of edits.

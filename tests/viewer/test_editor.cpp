@@ -75,15 +75,18 @@ TEST_F(Editor, DeletesWhatTheMouseSelectsAndUndoesIt) {
     EXPECT_LT(half.size(), original.size());
     EXPECT_EQ(half, replayed());
 
+    EXPECT_TRUE(journal_has(4)) << "the journal does not know of the save";
     session.send("key ctrl+z key ctrl+z");
-    EXPECT_TRUE(journal_has(5));
+    EXPECT_TRUE(journal_has(6));
     EXPECT_EQ(largest_difference(screenshot(session), first), 0);
     session.send("key ctrl+shift+z key ctrl+y");
-    EXPECT_TRUE(journal_has(7));
+    EXPECT_TRUE(journal_has(8));
     EXPECT_EQ(replayed(), half);
     EXPECT_EQ(file_bytes(scene_), original);
 
-    // There are edits since the last save. Esc stays, Return saves.
+    // The file has other splats. Esc stays, Return saves.
+    session.send("key ctrl+z");
+    EXPECT_TRUE(journal_has(9));
     session.send("key ctrl+q sleep 1 key Escape sleep 1");
     EXPECT_FALSE(session.ended());
     std::filesystem::remove(folder_ / "half.ply");
@@ -94,7 +97,28 @@ TEST_F(Editor, DeletesWhatTheMouseSelectsAndUndoesIt) {
         soon([&] { return std::filesystem::exists(folder_ / "half.ply"); }, kSessionPatience / kTries);
     }
     expect_success(session.quit());
-    EXPECT_EQ(file_bytes(folder_ / "half.ply"), half);
+    EXPECT_EQ(file_bytes(folder_ / "half.ply"), replayed());
+}
+
+TEST_F(Editor, AsksNothingOnceAllIsSaved) {
+    {
+        Session session(shots_, arguments());
+        ASSERT_TRUE(session.found());
+        screenshot(session);
+        delete_half(session);
+        saved(session, folder_ / "half.ply");
+        EXPECT_TRUE(journal_has(4));
+        session.send("key ctrl+z key ctrl+y");
+        EXPECT_TRUE(journal_has(6));
+        expect_success(session.quit());
+    }
+    // The dialog of an earlier session would take the keys.
+    Session session(shots_ + "/..", arguments());
+    ASSERT_TRUE(session.found());
+    screenshot(session);
+    session.send("key Tab key ctrl+a");
+    EXPECT_TRUE(journal_has(2));
+    EXPECT_TRUE(std::filesystem::exists(journal_ + ".before"));
 }
 
 TEST_F(Editor, RestoresTheEditsOfASessionThatWasKilled) {

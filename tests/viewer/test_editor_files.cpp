@@ -97,6 +97,8 @@ TEST(SaveChoices, ProposeANameBesideTheOriginal) {
     EXPECT_EQ(proposed("/a/run/", "run", SplatFormat::sog), "/a/run-edited.sog");
     EXPECT_EQ(proposed("", "part", SplatFormat::sog), "part.sog");
     EXPECT_EQ(proposed("", "", SplatFormat::sog), "scene.sog");
+    EXPECT_EQ(viewer::proposed_file("/a/b.compressed.ply", "b 2", io::row_of(SplatFormat::sog), 2),
+              "/a/b-2.sog");
 }
 
 TEST(SaveChoices, SayWhatAFormatDoesNotKeep) {

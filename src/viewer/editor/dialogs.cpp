@@ -73,8 +73,8 @@ struct Dialogs::State {
 
     std::function<bool()> draw_other;  // a dialog of another part
     std::function<void()> go_on;       // after the save; null: nothing
-    fs::path journal_file;
-    edit::ReadJournal journal;
+    bool offers = false;               // journals are looked for
+    std::vector<Editor::Left> left;
 
     const EditedScene& scene() const { return editor.scene(editor.active()); }
     fs::path target() const;
@@ -83,7 +83,7 @@ struct Dialogs::State {
     void pass(const std::function<void()>& on);
     void save_as();
     void confirm_save();
-    void discard_journals() const;
+    void ask_or_pass();
     void draw_formats(const Gaussians* splats, size_t count);
     void draw_losses(const Gaussians& splats) const;
     void draw_save();
@@ -129,7 +129,7 @@ void Dialogs::State::save_as() {
     if (editor.scenes() == 0) return say(texts::files::kNothingToSave);
     if (editor.saving()) return say(texts::files::kStillSaving);
     row = first_row(scene().file);
-    path.set(proposed_file(scene().file, scene().name, *row));
+    path.set(proposed_file(scene().file, scene().name, *row, scene().part));
     all = all && editor.scenes() > 1;
     shown = DialogKind::save;
 }
@@ -145,13 +145,11 @@ void Dialogs::State::confirm_save() {
     }
 }
 
-/// The edits that the user gives up are not offered again.
-void Dialogs::State::discard_journals() const {
-    for (size_t i = 0; i < editor.scenes(); ++i) {
-        const EditedScene& each = editor.scene(i);
-        std::error_code error;
-        if (each.unsaved && each.journal) fs::remove(each.journal->file(), error);
-    }
+/// Once all edits are done, and no save is on its way.
+void Dialogs::State::ask_or_pass() {
+    if (editor.unsaved()) return void(shown = DialogKind::leave);
+    if (shown == DialogKind::saving) shown = publish.running() ? DialogKind::publish : DialogKind::none;
+    pass(std::exchange(go_on, nullptr));
 }
 
 void Dialogs::State::draw_formats(const Gaussians* splats, size_t count) {
@@ -269,7 +267,7 @@ void Dialogs::State::draw_leave() {
     if (choice == Choice::other || choice == Choice::cancel) go_on = nullptr;
     end_modal(choice == Choice::none || shown != DialogKind::none);
     if (choice == Choice::other) {
-        discard_journals();
+        editor.discard();
         pass(then);
     } else if (choice == Choice::confirm) {
         for (size_t i = 0; i < editor.scenes() && !scene().unsaved; ++i)
@@ -286,21 +284,28 @@ void Dialogs::State::draw_leave() {
 
 void Dialogs::State::draw_journal() {
     if (!begin_modal(texts::files::kJournalTitle)) return;
-    modal_text(texts::files::kEndedUnsaved + core::counted(journal.steps.size(), "edit") + " of " +
-               core::one_line(journal_file.filename().string()) + ".");
+    size_t edits = 0;
+    for (const Editor::Left& each : left) edits += each.journal.steps.size();
+    const fs::path file = scene().file;
+    modal_text(texts::files::kEndedUnsaved + core::counted(edits, "edit") + " of " +
+               core::one_line(file.filename().string()) + ".");
     const Choice choice = draw_choices(texts::files::kJournalRestore, texts::files::kJournalDiscard,
                                        texts::files::kJournalLater);
     if (choice != Choice::none) shown = DialogKind::none;
     end_modal(shown != DialogKind::none);
-    if (choice == Choice::confirm) editor.restore(journal);
     std::error_code error;
-    if (choice == Choice::other) fs::remove(edit::journal_of(journal_file), error);
-    if (choice != Choice::none) journal = {};
+    if (choice == Choice::other)
+        for (const Editor::Left& each : left)
+            if (const fs::path journal = edit::journal_of(file, each.part); !edit::in_use(journal))
+                fs::remove(journal, error);
+    if (choice == Choice::confirm) editor.restore(std::move(left));
+    if (choice != Choice::none) left.clear();
 }
 
 void Dialogs::State::draw_saving() {
     if (!begin_modal(texts::files::kSavingTitle)) return;
-    modal_text(texts::files::kWriting + core::one_line(last.file.string()) + " ...");
+    modal_text(editor.saving() ? texts::files::kWriting + core::one_line(last.file.string()) + " ..."
+                               : std::string(texts::files::kFinishing));
     if (draw_choices(nullptr, nullptr, texts::files::kCancel) == Choice::cancel) {
         go_on = nullptr;
         shown = DialogKind::none;
@@ -359,22 +364,17 @@ void Dialogs::publish() {
 
 void Dialogs::leave(std::function<void()> go_on) {
     State& state = *state_;
-    if (!state.editor.unsaved()) return state.pass(go_on);
     state.go_on = std::move(go_on);
-    state.shown = DialogKind::leave;
+    if (!state.editor.busy() && !state.editor.saving()) return state.ask_or_pass();
+    state.shown = DialogKind::saving;
 }
 
-void Dialogs::offer_journal(const fs::path& file, size_t splats) {
-    State& state = *state_;
-    try {
-        std::optional<edit::ReadJournal> left = Editor::left_journal(file, splats);
-        if (!left || left->steps.empty()) return;
-        state.journal = std::move(*left);
-        state.journal_file = file;
-        state.shown = DialogKind::journal;
-    } catch (const std::exception& error) {
-        state.say(error.what());
-    }
+bool Dialogs::leaving() const {
+    return state_->shown == DialogKind::leave;
+}
+
+void Dialogs::offer_journals() {
+    state_->offers = true;
 }
 
 void Dialogs::ask_path(const std::string& why, std::function<void(const fs::path&)> open) {
@@ -408,13 +408,19 @@ bool Dialogs::open() const {
 bool Dialogs::take() {
     State& state = *state_;
     const bool chosen = state.path.take(state.files), published = state.publish.take();
-    if (state.shown != DialogKind::saving || state.editor.saving()) return chosen || published;
+    if (state.editor.busy() || state.editor.saving()) return chosen || published;
+    bool changed = chosen || published;
+    if (std::exchange(state.offers, false) && state.editor.snapshot().done == 0 && !open()) {
+        state.left = state.editor.left_journals();
+        if (!state.left.empty()) state.shown = DialogKind::journal;
+        changed = true;
+    }
     // A save that has failed, and scenes that were not saved, leave unsaved edits.
-    const bool failed = state.editor.unsaved();
-    state.shown = failed ? DialogKind::leave : DialogKind::none;
-    if (failed) return true;
-    if (const std::function<void()> go_on = std::exchange(state.go_on, nullptr)) state.pass(go_on);
-    return true;
+    if (state.shown == DialogKind::saving) {
+        state.ask_or_pass();
+        changed = true;
+    }
+    return changed;
 }
 
 }  // namespace ewa::viewer

@@ -24,10 +24,12 @@ class Dialogs {
     void publish();  // page, SOG, streamed levels
     /// The views file of the film's keys, for a page; empty: there are none. May be null. publish() calls it.
     std::function<std::filesystem::path()> views_file;
-    /// Asks whether to save unsaved work, then calls `go_on`, unless the user cancels. Calls it at once without unsaved work.
+    /// Asks whether to save unsaved work, in place of another dialog, then calls `go_on`, unless the user cancels. Waits for edits
+    /// and a save that are on their way. Calls it at once if there are none, and no unsaved work.
     void leave(std::function<void()> go_on);
-    /// Asks whether to restore the edits of a crashed session, if the file has some.
-    void offer_journal(const std::filesystem::path& file, size_t splats);
+    bool leaving() const;  // it asks
+    /// Asks whether to restore the edits that a crashed session has left of the active scene, if there are some.
+    void offer_journals();
     /// Asks for a file or folder where the desktop has no dialog, then calls `open`. why: what is shown first.
     void ask_path(const std::string& why, std::function<void(const std::filesystem::path&)> open);
     /// Opens a dialog of another part, unless one is open. draw: draws it as a modal, and returns whether it stays open.

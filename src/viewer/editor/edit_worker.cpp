@@ -4,10 +4,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <limits>
-#include <numeric>
 #include <utility>
 
+#include "core/folders.h"
 #include "edit/edited_splats.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_edit.h"
@@ -18,6 +19,9 @@ namespace {
 
 static_assert(int(edit::kSelected) == kMarkSelected && int(edit::kLocked) == kMarkLocked &&
               int(edit::kHidden) == kMarkHidden && int(edit::kDeleted) == kMarkDeleted);
+
+constexpr auto kPublishPeriod = std::chrono::milliseconds(250);  // while tasks wait
+constexpr const char* kSeparate = "Separate";
 
 /// The `budget` splats that cover most, in order. Null if there are no more than that.
 std::shared_ptr<const std::vector<uint32_t>> draft_rows(const Gaussians& g, size_t budget) {
@@ -58,8 +62,8 @@ EditWorker::EditWorker(std::function<void()> wake, size_t budget)
 EditWorker::~EditWorker() {
     thread_.request_stop();
     thread_.join();
-    for (const auto& [id, scene] : scenes_)
-        if (scene.journal && scene.history->done() == 0) scene.journal->remove();
+    for (auto& [id, scene] : scenes_)
+        if (scene.journal && scene.untouched()) scene.journal->remove();
 }
 
 void EditWorker::post(Task task) {
@@ -70,6 +74,8 @@ void EditWorker::post(Task task) {
 }
 
 void EditWorker::work(const std::stop_token& stop) {
+    using Clock = std::chrono::steady_clock;
+    Clock::time_point published{};
     for (;;) {
         Task task;
         {
@@ -79,41 +85,61 @@ void EditWorker::work(const std::stop_token& stop) {
             task = std::move(tasks_.front());
             tasks_.pop_front();
         }
-        std::string note;
-        try {
-            const auto start = std::chrono::steady_clock::now();
-            task();
-            milliseconds_ =
-                std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-            publish();
-        } catch (const std::exception& error) {
-            note = error.what();
+        const auto start = Clock::now();
+        const auto attempt = [this](const auto& action) {
+            try {
+                action();
+            } catch (const std::exception& error) {
+                note_ = error.what();
+            }
+        };
+        attempt(task);
+        milliseconds_ = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+        bool last = false;
+        {
+            const std::lock_guard lock(mutex_);
+            last = tasks_.empty();
+        }
+        // A thousand undos are one change.
+        if (last || Clock::now() - published > kPublishPeriod) {
+            attempt([this] { publish(); });
+            published = Clock::now();
+            last = true;
         }
         {
             const std::lock_guard lock(mutex_);
-            done_.any = true;
-            if (!note.empty()) done_.note = note;
-            --pending_;
+            done_.any |= last;
+            if (!note_.empty()) done_.note = std::exchange(note_, {});
+            ++finished_;
         }
         wake_();
     }
 }
 
+/// An opening scene is not published before it is there.
 void EditWorker::publish() {
+    if (scenes_.empty()) return;
     join();
     const auto present = snapshot();
     const auto bits = marks();
+    std::vector<SceneState> states;
+    for (auto& [id, scene] : scenes_) {
+        const bool unsaved = scene.unsaved();
+        if (!unsaved && std::exchange(scene.unmarked, false))
+            record(scene, [](edit::Journal& journal) { journal.saved(); });
+        states.push_back({id, unsaved, scene.journaled});
+    }
     const std::lock_guard lock(mutex_);
+    if (period_ != next_period_) return;
     done_.snapshot = present;
     done_.splats = joined_;
     done_.draft = draft_;
     done_.marks = bits;
     done_.preview_count =
         previewed_.empty() ? std::nullopt : std::optional(size_t(std::ranges::count(previewed_, true)));
-    for (edit::Step& step : steps_) done_.steps.push_back(std::move(step));
-    steps_.clear();
-    done_.changed.insert(done_.changed.end(), changed_.begin(), changed_.end());
-    changed_.clear();
+    std::ranges::move(std::exchange(steps_, {}), std::back_inserter(done_.steps));
+    std::ranges::move(std::exchange(moves_, {}), std::back_inserter(done_.moves));
+    done_.scenes = std::move(states);
 }
 
 /// Joins the scenes that are shown, if they or their values have changed.
@@ -204,26 +230,111 @@ void EditWorker::find_preview() {
     previewed_ = std::move(flags);
 }
 
-void EditWorker::add(uint64_t id, std::shared_ptr<const Gaussians> splats, edit::Cameras cameras) {
-    post([this, id, splats = std::move(splats), cameras = std::move(cameras)] {
-        scenes_[id] = {std::make_shared<edit::History>(splats, cameras), nullptr, cameras, true};
-    });
-}
-
-void EditWorker::add_selection(uint64_t id, uint64_t of) {
-    post([this, id, of] {
-        const Scene& from = scenes_.at(of);
-        auto copy = std::make_shared<edit::History>(*from.history);
-        copy->perform({"Separate", {{"unlock", ""}, {"unhide", ""}, {"select", "invert"}, {"delete", ""}}});
-        scenes_[id] = {std::move(copy), nullptr, from.cameras, true};
-    });
-}
-
-void EditWorker::remove(uint64_t id) {
-    post([this, id] {
-        scenes_.erase(id);
+void EditWorker::add(uint64_t id, std::shared_ptr<const Gaussians> splats, edit::Cameras cameras,
+                     Place place) {
+    post([this, id, splats = std::move(splats), cameras = std::move(cameras), place = std::move(place)] {
+        scenes_[id] = {std::make_shared<edit::History>(splats, cameras), cameras, place};
+        active_ = id;
+        preview_.clear();
         previewed_.clear();
     });
+}
+
+void EditWorker::separate(uint64_t id, uint64_t of, Place place) {
+    post([this, id, of, place = std::move(place)] {
+        moves_.emplace_back(id, false);  // unless all goes well
+        const auto found = scenes_.find(of);
+        if (found == scenes_.end()) return;
+        Scene& from = found->second;
+        Scene part{std::make_shared<edit::History>(*from.history), from.cameras, place};
+        part.history->perform(
+            {kSeparate, {{"unlock", ""}, {"unhide", ""}, {"select", "invert"}, {"delete", ""}}});
+        part.least = part.history->done();
+        const edit::Step step{kSeparate, {{"delete", ""}}};
+        if (!from.history->perform(step)) return;
+        part.from = of;
+        part.from_step = from.history->done();
+        write_journal(part);
+        record(from, [&](edit::Journal& journal) { journal.did(step); });
+        steps_.push_back(step);
+        scenes_[id] = std::move(part);
+        moves_.pop_back();
+        if (!previewed_.empty()) find_preview();
+    });
+}
+
+void EditWorker::restore(uint64_t id, uint64_t of, Place place, edit::ReadJournal journal) {
+    post([this, id, of, place = std::move(place), journal = std::move(journal)] {
+        const auto from = scenes_.find(of);
+        if (from == scenes_.end()) return;
+        if (id != of)
+            scenes_[id] = {
+                std::make_shared<edit::History>(from->second.history->first(), from->second.cameras),
+                from->second.cameras, place};
+        Scene& scene = scenes_.at(id);
+        size_t done = 0;
+        bool whole = true;
+        try {
+            for (; done < journal.steps.size(); ++done) whole &= scene.history->perform(journal.steps[done]);
+        } catch (const std::exception& error) {
+            whole = false;
+            note_ = "restored " + std::to_string(done) + " of " + std::to_string(journal.steps.size()) +
+                    " edits: " + error.what();
+        }
+        scene.least = std::min(journal.separated, scene.history->done());
+        scene.saved = journal.saved;
+        if (id != of && journal.separated_at > 0) {
+            scene.from = of;
+            scene.from_step = journal.separated_at;
+        }
+        // A journal has the edits of its history, and no others.
+        scene.goes_on = whole && core::is_file(edit::journal_of(scene.place.file, scene.place.part));
+        if (!scene.goes_on) return write_journal(scene);
+        record(scene, [](edit::Journal&) {});
+    });
+}
+
+void EditWorker::remove(uint64_t id, bool discard) {
+    post([this, id, discard] {
+        const auto found = scenes_.find(id);
+        if (found == scenes_.end()) return;
+        Scene& scene = found->second;
+        if (scene.journal && (scene.untouched() || (discard && scene.unsaved()))) scene.journal->remove();
+        scenes_.erase(found);
+        std::erase_if(scenes_,
+                      [id](const auto& each) { return each.second.closed && each.second.from == id; });
+        previewed_.clear();
+    });
+}
+
+void EditWorker::clear() {
+    {
+        const std::lock_guard lock(mutex_);
+        ++next_period_;
+        done_ = {};
+    }
+    post([this] {
+        for (auto& [id, scene] : scenes_)
+            if (scene.journal && scene.untouched()) scene.journal->remove();
+        scenes_.clear();
+        previewed_.clear();
+        steps_.clear();
+        moves_.clear();
+        joined_.reset();
+        draft_ = {};
+        drag_.reset();
+        ++period_;
+    });
+}
+
+void EditWorker::discard() {
+    auto promise = std::make_shared<std::promise<void>>();
+    post([this, promise] {
+        for (auto& [id, scene] : scenes_)
+            if (scene.journal && scene.unsaved()) scene.journal->remove();
+        promise->set_value();
+    });
+    promise->get_future().wait();
 }
 
 void EditWorker::activate(uint64_t id) {
@@ -240,41 +351,107 @@ void EditWorker::show(uint64_t id, bool shown) {
     });
 }
 
-void EditWorker::change(uint64_t id, const std::shared_ptr<edit::Journal>& journal,
-                        const std::function<void(Scene&)>& edit) {
-    post([this, id, journal, edit] {
+void EditWorker::change(uint64_t id, const std::function<void(Scene&)>& edit) {
+    post([this, id, edit] {
         const auto found = scenes_.find(id);
-        if (found == scenes_.end()) return;
-        found->second.journal = journal;
+        if (found == scenes_.end() || found->second.closed) return;
         const uint64_t before = found->second.history->version();
         edit(found->second);
-        if (found->second.history->version() == before) return;
-        // A selection alone is no work to save.
-        const auto changes = [](const edit::Words& words) { return words.name != "select"; };
-        if (std::ranges::any_of(found->second.history->edits(), changes)) changed_.push_back(id);
-        if (!previewed_.empty()) find_preview();
+        if (found->second.history->version() != before && !previewed_.empty()) find_preview();
     });
 }
 
-void EditWorker::perform(uint64_t id, std::vector<edit::Step> steps, std::shared_ptr<edit::Journal> journal) {
-    change(id, journal, [this, steps = std::move(steps)](Scene& scene) {
-        for (const edit::Step& step : steps) {
-            if (!scene.history->perform(step)) continue;
-            steps_.push_back(step);
-            if (scene.journal) scene.journal->did(step);
+/// Writes to the journal of a scene, from its first edit on. A journal that cannot be written changes nothing but that.
+void EditWorker::record(Scene& scene, const std::function<void(edit::Journal&)>& write) {
+    if (!scene.journaled && !scene.journal) return;
+    const Place& place = scene.place;
+    try {
+        if (!scene.journal) {
+            scene.journal = std::make_unique<edit::Journal>(edit::journal_of(place.file, place.part),
+                                                            place.head, scene.goes_on);
+            // Scenes of an earlier session were separated from other edits than these.
+            const bool first = place.part == 1 && scene.history->done() == 1 && !scene.goes_on;
+            for (size_t part = 2; first && part <= edit::kMostParts; ++part)
+                edit::set_aside(edit::journal_of(place.file, part));
+        }
+        write(*scene.journal);
+    } catch (const std::exception& error) {
+        scene.journaled = false;
+        note_ = std::string(scene.journal ? "edits are no longer kept" : "edits are not kept") +
+                " beside the file: " + error.what();
+    }
+}
+
+/// Writes the whole journal again, from the history.
+void EditWorker::write_journal(Scene& scene) {
+    const auto from = scenes_.find(scene.from);
+    // The step of a scene that was itself separated is no step of the file's journal.
+    const size_t at = from == scenes_.end() || from->second.least > 0 ? 0 : scene.from_step;
+    scene.journal.reset();
+    scene.goes_on = false;
+    record(scene, [&](edit::Journal& journal) {
+        size_t done = 0;
+        for (const edit::Step& step : scene.history->in_effect()) {
+            journal.did(step);
+            if (++done == scene.least) journal.separated(at);
         }
     });
+    scene.unmarked = !scene.saved.empty();
 }
 
-void EditWorker::undo(uint64_t id, std::shared_ptr<edit::Journal> journal) {
-    change(id, journal, [](Scene& scene) {
-        if (scene.history->undo() && scene.journal) scene.journal->undid();
+/// A scene that was separated by this step of `of` goes where the step is undone, and comes where it is redone.
+void EditWorker::follow(uint64_t of, size_t step, bool undone) {
+    for (auto& [id, part] : scenes_) {
+        if (part.from != of || part.from_step != step || part.closed == undone) continue;
+        const auto own = part.history->in_effect().subspan(part.least);
+        if (undone && !edit::lasting_edits(own).empty()) {
+            note_ = "the separated scene has edits of its own, and stays";
+            continue;
+        }
+        part.closed = undone;
+        part.shown = !undone;
+        moves_.emplace_back(id, !undone);
+        if (!undone) {
+            write_journal(part);
+        } else if (part.journal) {
+            part.journal->remove();
+        }
+    }
+}
+
+void EditWorker::perform(uint64_t id, edit::Step step) {
+    change(id, [this, id, step = std::move(step)](Scene& scene) {
+        if (!scene.history->perform(step)) return;
+        steps_.push_back(step);
+        // Steps that were undone are dropped, and with them the scenes that they had separated.
+        for (auto& [each, part] : scenes_)
+            if (part.from == id && part.from_step >= scene.history->done()) part.from = 0;
+        std::erase_if(scenes_, [](const auto& each) { return each.second.closed && each.second.from == 0; });
+        record(scene, [&](edit::Journal& journal) { journal.did(step); });
     });
 }
 
-void EditWorker::redo(uint64_t id, std::shared_ptr<edit::Journal> journal) {
-    change(id, journal, [](Scene& scene) {
-        if (scene.history->redo() && scene.journal) scene.journal->redid();
+void EditWorker::undo(uint64_t id) {
+    change(id, [this, id](Scene& scene) {
+        const size_t step = scene.history->done();
+        if (step <= scene.least || !scene.history->undo()) return;
+        record(scene, [](edit::Journal& journal) { journal.undid(); });
+        follow(id, step, true);
+    });
+}
+
+void EditWorker::redo(uint64_t id) {
+    change(id, [this, id](Scene& scene) {
+        if (!scene.history->redo()) return;
+        record(scene, [](edit::Journal& journal) { journal.redid(); });
+        follow(id, scene.history->done(), false);
+    });
+}
+
+void EditWorker::saved(uint64_t id, const std::vector<edit::Step>& steps) {
+    change(id, [edits = edit::lasting_edits(steps)](Scene& scene) {
+        scene.saved = edits;
+        scene.unmarked = true;
     });
 }
 
@@ -303,22 +480,18 @@ std::future<EditWorker::State> EditWorker::state_of(uint64_t id) {
         const auto found = scenes_.find(id);
         if (found == scenes_.end()) return promise->set_value({});
         const edit::History& history = *found->second.history;
-        promise->set_value({history.edits(), history.first()});
+        const auto steps = history.in_effect();
+        promise->set_value({{steps.begin(), steps.end()}, history.first(), history.splats().left()});
     });
     return promise->get_future();
 }
 
 EditWorker::Done EditWorker::take() {
     const std::lock_guard lock(mutex_);
-    return std::exchange(done_, Done{.snapshot = {},
-                                     .splats = {},
-                                     .draft = {},
-                                     .marks = {},
-                                     .preview_count = done_.preview_count,
-                                     .steps = {},
-                                     .changed = {},
-                                     .note = {},
-                                     .any = false});
+    pending_ -= std::exchange(finished_, 0);
+    Done fresh;
+    fresh.preview_count = done_.preview_count;
+    return std::exchange(done_, std::move(fresh));
 }
 
 }  // namespace ewa::viewer

@@ -28,28 +28,52 @@ class EditWorker {
     /// Drops the tasks that wait, and removes journals without edits.
     ~EditWorker();
 
+    /// Where a scene keeps its journal: beside the file it was opened from. file: empty: nowhere.
+    struct Place {
+        std::filesystem::path file;
+        size_t part = 1;  // more: the scene was separated from another one of the file
+        edit::JournalHead head;
+    };
+
     // Tasks. scene: EditedScene::id.
-    void add(uint64_t scene, std::shared_ptr<const Gaussians> splats, edit::Cameras cameras);
-    /// Adds a scene with the history of another one, whose splats are those that `of` has selected.
-    void add_selection(uint64_t scene, uint64_t of);
-    void remove(uint64_t scene);
+    /// Adds a scene and makes it the active one.
+    void add(uint64_t scene, std::shared_ptr<const Gaussians> splats, edit::Cameras cameras, Place place);
+    /// The selection of `of` becomes a scene with the same history, and leaves `of`.
+    void separate(uint64_t scene, uint64_t of, Place place);
+    /// Performs the steps of a journal, and continues it. A scene that is not there yet has the first splats of `of`.
+    void restore(uint64_t scene, uint64_t of, Place place, edit::ReadJournal journal);
+    /// discard: its unsaved edits are lost, and with them its journal.
+    void remove(uint64_t scene, bool discard);
+    /// Removes all scenes. What was done before is not taken any more.
+    void clear();
+    /// Removes the journals of scenes with unsaved edits, before it returns.
+    void discard();
     void activate(uint64_t scene);
     void show(uint64_t scene, bool shown);
-    /// journal: gets a line for what is done; null: none.
-    void perform(uint64_t scene, std::vector<edit::Step> steps, std::shared_ptr<edit::Journal> journal);
-    void undo(uint64_t scene, std::shared_ptr<edit::Journal> journal);
-    void redo(uint64_t scene, std::shared_ptr<edit::Journal> journal);
+    void perform(uint64_t scene, edit::Step step);
+    void undo(uint64_t scene);
+    void redo(uint64_t scene);
+    /// These edits of state_of() are in a file that was saved.
+    void saved(uint64_t scene, const std::vector<edit::Step>& steps);
     void preview(const std::string& selection);
     void drag(const std::optional<glm::dmat4>& transform);  // a newer one replaces one that waits
 
-    /// The edits in effect and the splats of a scene, once all tasks before are done.
+    /// The steps in effect and the splats of a scene, once all tasks before are done.
     struct State {
-        std::vector<edit::Words> edits;
+        std::vector<edit::Step> steps;
         std::shared_ptr<const Gaussians> first;  // without edits
+        size_t left = 0;                         // splats with edits
     };
     std::future<State> state_of(uint64_t scene);
 
-    bool busy() const { return pending_ > 0; }
+    bool busy() const { return pending_ > 0; }  // there are tasks whose results were not taken
+
+    /// What the list of scenes shows of one.
+    struct SceneState {
+        uint64_t id;
+        bool unsaved;    // its lasting edits are others than at the last save
+        bool journaled;  // its journal has all edits
+    };
 
     /// What has been done since the last take().
     struct Done {
@@ -59,7 +83,9 @@ class EditWorker {
         std::shared_ptr<const std::vector<uint8_t>> marks;
         std::optional<size_t> preview_count;
         std::vector<edit::Step> steps;
-        std::vector<uint64_t> changed;  // scenes with edits that were done, undone or redone
+        std::vector<SceneState> scenes;
+        std::vector<std::pair<uint64_t, bool>>
+            moves;  // scenes that an undo has closed (false), or a redo opened
         std::string note;
         bool any = false;
     };
@@ -68,15 +94,29 @@ class EditWorker {
   private:
     struct Scene {
         std::shared_ptr<edit::History> history;
-        std::shared_ptr<edit::Journal> journal;
         edit::Cameras cameras;
+        Place place;
+        bool journaled = !place.file.empty();
+        std::unique_ptr<edit::Journal> journal = {};  // null: there are no edits, or they are not kept
+        bool goes_on = false;                         // its journal is that of an earlier session
         bool shown = true;
+        size_t least = 0;                     // steps that undo leaves
+        uint64_t from = 0;                    // the scene that it was separated from; 0: none
+        size_t from_step = 0;                 // by this step of it
+        bool closed = false;                  // that step was undone
+        std::vector<edit::Words> saved = {};  // lasting edits of the last save
+        bool unmarked = false;                // the journal does not know of that save
+        std::vector<edit::Words> lasting() const { return edit::lasting_edits(history->in_effect()); }
+        bool untouched() const { return lasting().empty() && saved.empty(); }
+        bool unsaved() const { return !closed && lasting() != saved; }
     };
     using Task = std::function<void()>;
     void post(Task task);
     void work(const std::stop_token& stop);
-    void change(uint64_t scene, const std::shared_ptr<edit::Journal>& journal,
-                const std::function<void(Scene&)>& edit);
+    void change(uint64_t scene, const std::function<void(Scene&)>& edit);
+    void record(Scene& scene, const std::function<void(edit::Journal&)>& write);
+    void write_journal(Scene& scene);
+    void follow(uint64_t of, size_t step, bool undone);
     void publish();
     void join();
     std::shared_ptr<const EditSnapshot> snapshot() const;
@@ -97,10 +137,14 @@ class EditWorker {
     Draft draft_;  // of the joined splats, if they are more than the budget
     double milliseconds_ = 0;
     std::vector<edit::Step> steps_;
-    std::vector<uint64_t> changed_;
+    std::vector<std::pair<uint64_t, bool>> moves_;
+    std::string note_;
+    uint64_t period_ = 0;  // number of clear() so far
 
     std::atomic<int> pending_ = 0;
     std::mutex mutex_;
+    int finished_ = 0;  // tasks since the last take()
+    uint64_t next_period_ = 0;
     std::condition_variable_any waits_;
     std::deque<Task> tasks_;
     std::optional<std::optional<glm::dmat4>> next_drag_;

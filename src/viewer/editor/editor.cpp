@@ -19,9 +19,10 @@ namespace fs = std::filesystem;
 
 /// A scene to save, once its edits are known.
 struct Part {
-    uint64_t id;
-    fs::path file;  // empty: the splats are in no file
-    std::future<EditWorker::State> state;
+    EditedScene scene;
+    std::future<EditWorker::State> future;
+    EditWorker::State state = {};
+    bool as_opened = true;
 };
 
 /// Runs `ewa`. Throws RunError with what it said.
@@ -36,35 +37,53 @@ void run_ewa_program(const fs::path& program, std::vector<std::string> arguments
 }
 
 /// The arguments of ewa convert for one scene. folder: for temporary files.
-std::vector<std::string> conversion(const Part& part, const EditWorker::State& state, const fs::path& folder,
-                                    const fs::path& out) {
-    fs::path file = part.file;
-    if (file.empty()) {
-        file = folder / (std::to_string(part.id) + ".first.ply");
-        save_splats(file, *state.first, SaveOptions());
+std::vector<std::string> conversion(const Part& part, const fs::path& folder, const fs::path& out) {
+    fs::path file = part.scene.file;
+    const std::string name = std::to_string(part.scene.id);
+    if (file.empty() || !part.as_opened) {
+        file = folder / (name + ".first.ply");
+        save_splats(file, *part.state.first, SaveOptions());
     }
     std::vector<std::string> words{"convert", file.string(), out.string(), "--quiet"};
-    if (state.edits.empty()) return words;
-    const fs::path journal = folder / (std::to_string(part.id) + ".edits");
-    edit::Journal(journal, {file.filename().string(), state.first->size()}, false)
-        .did({"Saved", state.edits});
+    if (part.state.steps.empty()) return words;
+    const fs::path journal = folder / (name + ".edits");
+    edit::Journal writer(journal, {file.filename().string(), part.state.first->size()}, false);
+    for (const edit::Step& step : part.state.steps) writer.did(step);
     words.insert(words.end(), {"--edits", journal.string()});
     return words;
 }
 
-void save_parts(const fs::path& program, std::vector<Part>& parts, const fs::path& out) {
-    const core::TemporaryFolder folder("ewa-save");
-    std::vector<std::string> join{"convert"};
+/// Writes the scenes, joined. Returns what the user should know.
+std::string save_parts(const fs::path& program, std::vector<Part>& parts, const fs::path& out) {
+    std::string note = "wrote " + core::one_line(fs::absolute(out).string());
+    std::vector<const Part*> filled;
     for (Part& part : parts) {
-        const EditWorker::State state = part.state.get();
-        if (!state.first) throw RunError("the scene is closed");
-        if (parts.size() == 1) return run_ewa_program(program, conversion(part, state, folder.path(), out));
-        const fs::path one = folder.path() / (std::to_string(part.id) + ".ply");
-        run_ewa_program(program, conversion(part, state, folder.path(), one));
-        join.push_back(one.string());
+        part.state = part.future.get();
+        if (!part.state.first) throw RunError("the scene is closed");
+        part.as_opened = part.scene.as_opened();
+        if (!part.as_opened)
+            note += "; " + core::one_line(part.scene.file.filename().string()) +
+                    " has changed on disk, and these are the splats that were opened";
+        if (part.state.left > 0 || parts.size() == 1) filled.push_back(&part);
+    }
+    if (filled.empty()) throw RunError("all scenes are empty");
+    const core::TemporaryFolder folder("ewa-save");
+    if (filled.size() == 1) {
+        run_ewa_program(program, conversion(*filled.front(), folder.path(), out));
+        return note;
+    }
+    std::vector<std::string> join{"convert"};
+    for (const Part* part : filled) {
+        join.push_back((folder.path() / (std::to_string(part->scene.id) + ".ply")).string());
+        run_ewa_program(program, conversion(*part, folder.path(), join.back()));
     }
     join.insert(join.end(), {out.string(), "--quiet"});
     run_ewa_program(program, join);
+    return note;
+}
+
+EditWorker::Place place_of(const EditedScene& scene) {
+    return {scene.journaled ? scene.file : fs::path(), scene.part, scene.head};
 }
 
 }  // namespace
@@ -76,18 +95,25 @@ Editor::Editor(fs::path program, std::function<void()> wake, size_t budget)
 
 Editor::~Editor() = default;
 
+bool EditedScene::as_opened() const {
+    return edit::same_version(head, edit::head_of(file, head.splats));
+}
+
 void Editor::insert(std::unique_ptr<EditedScene> scene, std::shared_ptr<const Gaussians> splats,
                     edit::Cameras cameras) {
     scene->id = ++ids_;
-    worker_->add(scene->id, std::move(splats), std::move(cameras));
+    scene->head = edit::head_of(scene->file, splats->size());
+    worker_->add(scene->id, std::move(splats), std::move(cameras), place_of(*scene));
     scenes_.push_back(std::move(scene));
-    activate(scenes_.size() - 1);
+    active_ = scenes_.size() - 1;
 }
 
 void Editor::clear() {
-    for (const auto& scene : scenes_) worker_->remove(scene->id);
+    worker_->clear();
     scenes_.clear();
+    closed_.clear();
     active_ = 0;
+    snapshot_ = std::make_shared<EditSnapshot>();
     settings.tool = Tool::view;
 }
 
@@ -123,48 +149,49 @@ void Editor::show(size_t scene, bool shown) {
 
 void Editor::close(size_t scene) {
     if (scene >= scenes_.size() || scenes_.size() == 1) return;
-    worker_->remove(scenes_[scene]->id);
+    worker_->remove(scenes_[scene]->id, true);
     scenes_.erase(scenes_.begin() + std::ptrdiff_t(scene));
     activate(active_ > scene || active_ == scenes_.size() ? active_ - 1 : active_);
 }
 
-void Editor::separate() {
-    if (scenes_.empty() || snapshot_->selected == 0) return;
-    EditedScene& from = now();
-    auto scene = std::make_unique<EditedScene>();
-    scene->id = ++ids_;
-    scene->name = from.name + " " + std::to_string(scenes_.size() + 1);
-    scene->file = from.file;
-    scene->unsaved = true;
-    worker_->add_selection(scene->id, from.id);
-    perform({"Separate", {{"delete", ""}}});
-    scenes_.push_back(std::move(scene));
+/// Moves a scene from the list, or back.
+void Editor::move(uint64_t id, bool opens) {
+    auto &from = opens ? closed_ : scenes_, &to = opens ? scenes_ : closed_;
+    const auto found = std::ranges::find(from, id, [](const auto& scene) { return scene->id; });
+    if (found == from.end()) return;
+    const auto active = active_ < scenes_.size() ? scenes_[active_]->id : 0;
+    to.push_back(std::move(*found));
+    from.erase(found);
+    const auto again = std::ranges::find(scenes_, active, [](const auto& scene) { return scene->id; });
+    activate(again == scenes_.end() ? 0 : size_t(again - scenes_.begin()));
 }
 
-/// The journal of a scene's file, from its first edit on. A folder that cannot be written is said once.
-void Editor::open_journal(EditedScene& scene, bool go_on) {
-    if (!scene.journaled || scene.journal) return;
-    const fs::path file = edit::journal_of(scene.file);
-    std::error_code none;
-    if (!go_on && core::is_file(file))
-        fs::rename(file, file.string() + ".before", none);  // of an earlier session
-    try {
-        scene.journal = std::make_shared<edit::Journal>(
-            file,
-            edit::JournalHead{scene.file.filename().string(),
-                              snapshot_->states ? snapshot_->states->size() : 0},
-            go_on);
-    } catch (const std::exception& error) {
-        scene.journaled = false;
-        note_ = std::string("edits are not kept in a journal: ") + error.what();
-    }
+/// Another scene of the active one's file.
+EditedScene& Editor::add_part(size_t part) {
+    auto scene = std::make_unique<EditedScene>(now());
+    scene->id = ++ids_;
+    scene->part = part;
+    scene->name += " " + std::to_string(part);
+    scene->shown = true;
+    scene->journaled &= part <= edit::kMostParts;
+    return *scenes_.emplace_back(std::move(scene));
+}
+
+void Editor::separate() {
+    if (scenes_.empty() || snapshot_->selected == 0) return;
+    const EditedScene& from = now();
+    size_t part = 1;
+    for (const auto* list : {&scenes_, &closed_})
+        for (const auto& scene : *list)
+            if (scene->file == from.file) part = std::max(part, scene->part);
+    const EditedScene& added = add_part(part + 1);
+    worker_->separate(added.id, from.id, place_of(added));
 }
 
 void Editor::perform(edit::Step step) {
     if (scenes_.empty()) return;
     if (step.title.empty()) step.title = selection_title(step.edits.front().value);
-    open_journal(now(), false);
-    worker_->perform(now().id, {std::move(step)}, now().journal);
+    worker_->perform(now().id, std::move(step));
 }
 
 void Editor::select(const std::string& shape) {
@@ -177,11 +204,11 @@ void Editor::select(const std::string& shape) {
 }
 
 void Editor::undo() {
-    if (!scenes_.empty()) worker_->undo(now().id, now().journal);
+    if (!scenes_.empty()) worker_->undo(now().id);
 }
 
 void Editor::redo() {
-    if (!scenes_.empty()) worker_->redo(now().id, now().journal);
+    if (!scenes_.empty()) worker_->redo(now().id);
 }
 
 void Editor::preview(const std::string& selection) {
@@ -208,14 +235,18 @@ Editor::News Editor::take() {
         draft_ = done.draft;
         marks_ = done.marks;
     }
-    for (const auto& scene : scenes_)
-        if (std::ranges::find(done.changed, scene->id) != done.changed.end()) scene->unsaved = true;
+    for (const auto& [id, opens] : done.moves) move(id, opens);
+    for (const EditWorker::SceneState& state : done.scenes)
+        for (const auto& scene : scenes_)
+            if (scene->id == state.id) {
+                scene->unsaved = state.unsaved;
+                scene->journaled = state.journaled;
+            }
     if (saving_.ready()) {
         const Saved saved = saving_.take();
         news.any = true;
         news.note = saved.note;
-        for (const auto& scene : scenes_)
-            if (std::ranges::find(saved.failed, scene->id) != saved.failed.end()) scene->unsaved = true;
+        for (const auto& [id, steps] : saved.scenes) worker_->saved(id, steps);
     }
     return news;
 }
@@ -223,20 +254,16 @@ Editor::News Editor::take() {
 void Editor::save(const fs::path& file, bool all) {
     if (scenes_.empty() || saving_.running()) return;
     std::vector<Part> parts;
-    for (size_t i = 0; i < scenes_.size(); ++i) {
-        EditedScene& scene = *scenes_[i];
-        if (all ? !scene.shown : i != active_) continue;
-        parts.push_back({scene.id, scene.file, worker_->state_of(scene.id)});
-        scene.unsaved = false;  // edits from now on set it again
-    }
+    for (size_t i = 0; i < scenes_.size(); ++i)
+        if (all ? scenes_[i]->shown : i == active_)
+            parts.push_back({*scenes_[i], worker_->state_of(scenes_[i]->id)});
     saving_.start(wake_, [this, file, parts = std::move(parts)]() mutable {
         try {
-            save_parts(program_, parts, file);
-            return Saved{"wrote " + fs::absolute(file).string(), {}};
-        } catch (const std::exception& error) {
-            Saved saved{error.what(), {}};
-            for (const Part& part : parts) saved.failed.push_back(part.id);
+            Saved saved{save_parts(program_, parts, file), {}};
+            for (Part& part : parts) saved.scenes.emplace_back(part.scene.id, std::move(part.state.steps));
             return saved;
+        } catch (const std::exception& error) {
+            return Saved{error.what(), {}};
         }
     });
 }
@@ -245,25 +272,52 @@ bool Editor::unsaved() const {
     return std::ranges::any_of(scenes_, [](const auto& scene) { return scene->unsaved; });
 }
 
-std::optional<edit::ReadJournal> Editor::left_journal(const fs::path& file, size_t splats) {
-    const fs::path path = edit::journal_of(file);
-    if (!core::is_file(path)) return std::nullopt;
-    edit::ReadJournal journal = edit::read_journal(path);
-    if (journal.head.splats != splats || journal.steps.empty()) return std::nullopt;
-    return journal;
+void Editor::discard() {
+    worker_->discard();
 }
 
-void Editor::restore(const edit::ReadJournal& journal) {
+std::vector<Editor::Left> Editor::left_journals() {
+    std::vector<Left> left;
+    if (scenes_.empty() || !now().journaled) return left;
+    bool unsaved = false;
+    for (size_t part = 1; part <= edit::kMostParts; ++part) {
+        const fs::path file = edit::journal_of(now().file, part);
+        if (!core::is_file(file)) continue;
+        const std::string name = core::one_line(file.filename().string());
+        if (edit::in_use(file)) {
+            note_ = "another window edits this file; edits here are not kept beside it";
+            return {};
+        }
+        try {
+            edit::ReadJournal journal = edit::read_journal(file);
+            if (part > 1 && !journal.unsaved()) continue;
+            if (!edit::same_version(journal.head, now().head)) {
+                if (!journal.unsaved()) continue;
+                edit::set_aside(file);
+                note_ = "the file has changed since it was edited; its edits are in " + name + ".before";
+                continue;
+            }
+            unsaved = unsaved || journal.unsaved();
+            left.push_back({part, std::move(journal)});
+        } catch (const std::exception& error) {
+            note_ = error.what();
+        }
+    }
+    if (!unsaved) left.clear();
+    return left;
+}
+
+void Editor::restore(std::vector<Left> left) {
     if (scenes_.empty()) return;
-    worker_->perform(now().id, journal.steps, nullptr);
-    open_journal(now(), true);
+    for (Left& each : left) {
+        const EditedScene& scene = each.part == 1 ? now() : add_part(each.part);
+        worker_->restore(scene.id, now().id, place_of(scene), std::move(each.journal));
+    }
 }
 
 std::string Editor::command() const {
     if (scenes_.empty()) return "";
-    std::vector<edit::Words> words;
-    for (size_t i = 0; i < snapshot_->done; ++i)
-        words.insert(words.end(), snapshot_->steps[i].edits.begin(), snapshot_->steps[i].edits.end());
+    const auto words = edit::edits_of({snapshot_->steps.data(), snapshot_->done});
     const fs::path& file = scenes_[active_]->file;
     return edit::command_line(words, file.empty() ? "splats.ply" : file.string(), "edited.ply");
 }

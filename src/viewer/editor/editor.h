@@ -55,11 +55,16 @@ struct EditSettings {
 struct EditedScene {
     std::string name;
     std::filesystem::path file;  // that was opened; empty: none
-    bool journaled = false;      // the file gets a journal, once there are edits
+    size_t part = 1;             // more: it was separated from another scene of the file
+    edit::JournalHead head;      // of the file, as it was when it was opened
+    bool journaled = false;      // all edits are in the journal; it is there once there are edits
     uint64_t id = 0;
-    std::shared_ptr<edit::Journal> journal;  // null: there are no edits, or the folder cannot be written
     bool shown = true;
     bool unsaved = false;
+
+    std::filesystem::path journal() const { return edit::journal_of(file, part); }
+    /// Whether the file still has the splats that were opened.
+    bool as_opened() const;
 };
 
 class EditWorker;
@@ -84,7 +89,7 @@ class Editor {
     void activate(size_t scene);
     void show(size_t scene, bool shown);
     void close(size_t scene);
-    /// The selection becomes a scene of its own: this history and --select invert --delete.
+    /// The selection becomes a scene of its own: this history and --select invert --delete. Undo takes it back.
     void separate();
 
     // Edits of the active scene, in the background and in order. An error is News::note.
@@ -101,7 +106,7 @@ class Editor {
     /// While a gizmo is dragged: the transform of the selection that is drawn. Empty: none. The edit itself is perform().
     void drag(const std::optional<glm::dmat4>& transform);
 
-    bool busy() const;  // edits are being done
+    bool busy() const;  // edits are being done, or take() has not taken them yet
     /// Takes what has been done. Call it once per turn of the window's loop, before anything reads snapshot().
     struct News {
         bool any = false, marks = false;  // marks: splats() and marks() may be others
@@ -113,19 +118,27 @@ class Editor {
     const EditSnapshot& snapshot() const { return *snapshot_; }
     /// The splats of all scenes that are shown, joined: what the render thread gets.
     std::shared_ptr<const Gaussians> splats() const { return drawn_; }
-    /// Of splats(); without splats if there are no more than the budget.
+    /// The draft of splats(); without splats if there are no more than the budget.
     const Draft& draft() const { return draft_; }
     /// ewa::Mark bits of splats(); null: none.
     std::shared_ptr<const std::vector<uint8_t>> marks() const { return marks_; }
 
     // Files.
-    /// `ewa convert` replays the edits on the file and writes the result, on a thread of its own. all: joins all scenes that are shown.
+    /// `ewa convert` replays the edits on the file and writes the result, on a thread of its own. If the file has changed since it
+    /// was opened, the splats that were opened take its place. all: joins all scenes that are shown.
     void save(const std::filesystem::path& file, bool all);
     bool saving() const { return saving_.running(); }
     bool unsaved() const;  // any scene has edits that were not saved
-    /// The journal of an earlier session, if `file` has one with edits. Throws InputError if it cannot be read.
-    static std::optional<edit::ReadJournal> left_journal(const std::filesystem::path& file, size_t splats);
-    void restore(const edit::ReadJournal& journal);
+    void discard();        // removes the journals of unsaved edits
+    /// The journals that an earlier session has left of the active scene's file and its parts. Empty if all of its edits were
+    /// saved. An error is News::note. Call it while the editor is not busy.
+    struct Left {
+        size_t part;
+        edit::ReadJournal journal;
+    };
+    std::vector<Left> left_journals();
+    /// Performs the edits in the active scene, and in a scene for each part.
+    void restore(std::vector<Left> left);
     /// The ewa convert line of the active scene's edits.
     std::string command() const;
 
@@ -134,15 +147,17 @@ class Editor {
   private:
     struct Saved {
         std::string note;
-        std::vector<uint64_t> failed;  // scenes that are not saved
+        std::vector<std::pair<uint64_t, std::vector<edit::Step>>> scenes;  // that are saved, with their edits
     };
     EditedScene& now() { return *scenes_[active_]; }
     void insert(std::unique_ptr<EditedScene> scene, std::shared_ptr<const Gaussians> splats,
                 edit::Cameras cameras);
-    void open_journal(EditedScene& scene, bool go_on);
+    EditedScene& add_part(size_t part);
+    void move(uint64_t id, bool opens);
 
     std::filesystem::path program_;
     std::vector<std::unique_ptr<EditedScene>> scenes_;
+    std::vector<std::unique_ptr<EditedScene>> closed_;  // by undo
     size_t active_ = 0;
     std::shared_ptr<const EditSnapshot> snapshot_ = std::make_shared<EditSnapshot>();
     std::shared_ptr<const Gaussians> drawn_;

@@ -54,7 +54,7 @@ void PublishDialog::begin(const fs::path& views) {
 void PublishDialog::choose(int kind) {
     kind_ = kind;
     const EditedScene& scene = editor_.scene(editor_.active());
-    path_.set(proposed_file(scene.file, scene.name, row_of_kind(kind)));
+    path_.set(proposed_file(scene.file, scene.name, row_of_kind(kind), scene.part));
 }
 
 bool PublishDialog::draw() {
@@ -169,9 +169,9 @@ void PublishDialog::start() {
     if (format() == SplatFormat::page) order.title = title_.data();
     if (format() == SplatFormat::page && with_views_) order.views = views_;
     if (format() == SplatFormat::sog_levels) order.levels = levels_;
-    const bool journaled = scene.journal && core::is_file(scene.journal->file());
-    if (now.done > 0 && journaled) order.edits = scene.journal->file();
-    if (scene.file.empty() || (now.done > 0 && !journaled)) {
+    const bool replays = scene.as_opened() && (now.done == 0 || scene.journaled);
+    if (now.done > 0 && replays) order.edits = scene.journal();
+    if (scene.file.empty() || !replays) {
         order.splats = now.splats;
         order.states = now.states;
     }

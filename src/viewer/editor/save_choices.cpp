@@ -101,13 +101,13 @@ fs::path with_format(const fs::path& path, const io::FormatRow& row) {
     return io::row_of_name(path) == &row ? path : with_extension(stem_of(path), row);
 }
 
-fs::path proposed_file(const fs::path& file, const std::string& name, const io::FormatRow& row) {
+fs::path proposed_file(const fs::path& file, const std::string& name, const io::FormatRow& row, size_t part) {
     if (file.empty()) return with_extension(stem_of(name), row);
     std::error_code error;
     fs::path stem = fs::absolute(file, error).lexically_normal();
     if (!stem.has_filename()) stem = stem.parent_path();  // of a folder
     stem = stem_of(stem);
-    stem += kEdited;
+    stem += part > 1 ? "-" + std::to_string(part) : kEdited;
     return with_extension(stem, row);
 }
 

@@ -27,9 +27,9 @@ std::filesystem::path stem_of(const std::filesystem::path& path);
 std::filesystem::path with_format(const std::filesystem::path& path, const io::FormatRow& row);
 
 /// The first proposal for a copy of the scene: beside its file, under another name. file: empty for a scene without one, whose
-/// name then counts.
+/// name then counts. part: EditedScene::part.
 std::filesystem::path proposed_file(const std::filesystem::path& file, const std::string& name,
-                                    const io::FormatRow& row);
+                                    const io::FormatRow& row, size_t part = 1);
 
 /// Why the file cannot be written; empty: it can. originals: the files that were opened, which are never replaced.
 std::string refusal(const std::filesystem::path& out, const std::vector<std::filesystem::path>& originals);

@@ -250,7 +250,8 @@ inline constexpr const char *kLeaveTitle = "Unsaved edits", *kDontSave = "Don't 
                             *kUnsavedEdits = " has edits that are not saved.", *kSavingTitle = "Saving",
                             *kWriting = "Writing ", *kJournalTitle = "Edits of an earlier session",
                             *kJournalRestore = "Restore", *kJournalDiscard = "Discard",
-                            *kJournalLater = "Later", *kEndedUnsaved = "ewa-view ended without saving ";
+                            *kJournalLater = "Later", *kEndedUnsaved = "ewa-view ended without saving ",
+                            *kFinishing = "The last edits are being done ...";
 
 // Publish.
 inline constexpr const char* kPublish = "Publish";
