@@ -18,6 +18,7 @@
 #include "viewer/editor/modal.h"
 #include "viewer/editor/offers.h"
 #include "viewer/editor/toolbar.h"
+#include "viewer/latest.h"
 
 namespace ewa::viewer {
 namespace {
@@ -31,6 +32,12 @@ constexpr float kScaleStep = 1.25f, kLeastScale = 0.05f, kMostScale = 2;
 
 void toggle(bool& setting) {
     setting = !setting;
+}
+
+/// The file of an opened scene's splats; empty if they are in no single one.
+std::filesystem::path file_of(const OpenedScene& scene) {
+    const std::filesystem::path file = scene.run.empty() ? scene.path : scene.run / folders::kSplatsFile;
+    return core::is_file(file) ? file : std::filesystem::path();
 }
 
 }  // namespace
@@ -119,7 +126,8 @@ void App::run() {
 double App::patience() const {
     if (state_.loop.redraws > 0 || navigation_.flying() || state_.settings.turntable || film_.playing())
         return 1.0 / 60;
-    const bool waits = shown_.renders.reduced() || session_.waiting() || editor_.busy() || editor_.saving();
+    const bool waits = shown_.renders.reduced() || session_.waiting() || editor_.busy() || editor_.saving() ||
+                       added_.running();
     return waits ? kPollSeconds : dialogs_.open() ? kDialogSeconds : 1.0;
 }
 
@@ -357,11 +365,18 @@ void App::open(const std::vector<std::filesystem::path>& paths, const OpenedScen
 
 /// Opens what the user chose in the desktop's dialog. Without one the window asks.
 void App::take_chosen() {
-    if (session_.dialog.wanted() == Wanted::save) return;  // the dialogs of the editor take it
+    const Wanted wanted = session_.dialog.wanted();
+    if (wanted == Wanted::save) return;  // the dialogs of the editor take it
+    const auto take = [this, wanted](const std::filesystem::path& path) {
+        if (wanted == Wanted::scene)
+            added_.start(state_.wake, [path] { return open_scene(path, {}); });
+        else
+            open({path}, {});
+    };
     try {
-        if (const auto path = session_.dialog.take()) open({*path}, {});
+        if (const auto path = session_.dialog.take()) take(*path);
     } catch (const std::exception& error) {
-        dialogs_.ask_path(error.what(), [this](const std::filesystem::path& path) { open({path}, {}); });
+        dialogs_.ask_path(error.what(), take);
         state_.redraw(Loop::kRedraws);
     }
 }
@@ -373,8 +388,8 @@ void App::enter_scene() {
     drafted_ = nullptr;
     marked_ = false;
     if (scene.points || entered_->size() == 0) return editor_.clear();
-    const std::filesystem::path file = scene.run.empty() ? scene.path : scene.run / folders::kSplatsFile;
-    const bool is_file = core::is_file(file), journaled = is_file && !live();
+    const std::filesystem::path file = file_of(scene);
+    const bool journaled = !file.empty() && !live();
     edit::Cameras cameras;
     if (scene.dataset && !scene.run.empty())
         cameras = [dataset = scene.dataset] {
@@ -382,8 +397,22 @@ void App::enter_scene() {
             for (const Frame& frame : dataset->frames) all.push_back(frame.camera);
             return all;
         };
-    editor_.enter(scene.title, is_file ? file : std::filesystem::path(), entered_, cameras, journaled);
+    editor_.enter(scene.title, file, entered_, cameras, journaled);
     if (journaled) dialogs_.offer_journals();
+}
+
+/// Opens a file beside those that are edited.
+void App::add_scene() {
+    if (std::exchange(editor_.wants_scene, false) && !added_.running()) session_.dialog.ask(Wanted::scene);
+    try {
+        if (!added_.ready()) return;
+        const OpenedScene scene = added_.take();
+        if (scene.points || scene.gaussians->size() == 0) throw InputError(scene.title + " has no splats");
+        editor_.add(scene.title, file_of(scene), scene.gaussians);
+        dialogs_.offer_journals();
+    } catch (const std::exception& error) {
+        state_.say(error.what());
+    }
 }
 
 /// Lets the editor know of a new scene, and the render thread of edits.
@@ -391,6 +420,7 @@ void App::sync_editor() {
     const OpenedScene& scene = state_.scene;
     if (!scene.path.empty() && scene.path != opened_) remember_file(opened_ = scene.path);
     if (scene.gaussians != entered_) enter_scene();
+    if (editor_.scenes() > 0) add_scene();
     const Editor::News news = editor_.take();
     if (news.any) state_.redraw(Loop::kRedraws);
     if (!news.note.empty()) state_.say(news.note);

@@ -54,6 +54,7 @@ class App {
     void take_chosen();
     void enter_scene();
     std::filesystem::path film_views();
+    void add_scene();
     void send_edits(const std::vector<edit::Step>& done);
     void open(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown);
 
@@ -78,6 +79,7 @@ class App {
     std::shared_ptr<const Gaussians> drafted_;  // the draft of it that the render thread has
     bool marked_ = false;                       // the render thread has marks
     Tool last_tool_ = Tool::view;
+    Task<OpenedScene> added_;  // that is being opened beside the others
 };
 
 }  // namespace ewa::viewer

@@ -11,7 +11,7 @@
 
 namespace ewa::viewer {
 
-enum class Wanted { file, folder, save };
+enum class Wanted { file, folder, save, scene };  // scene: a file that is added to those that are open
 
 /// Asks through the desktop's portal, or without one through the program zenity or kdialog. Runs on a thread of its own.
 class FileDialog {

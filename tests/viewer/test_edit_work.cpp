@@ -269,6 +269,22 @@ TEST_F(EditWork, JoinsScenesOfWhichOneIsEmpty) {
     EXPECT_FALSE(editor_->unsaved());
 }
 
+TEST_F(EditWork, EditsAnotherFileBesideTheFirst) {
+    const std::string other = folder_ / "b.ply";
+    make_splats(other, 50, 2);
+    editor_->add("b.ply", other, std::make_shared<const Gaussians>(load_splats(other)));
+    settle(*editor_);
+    EXPECT_EQ(left(), 50u);
+    EXPECT_EQ(editor_->splats()->size(), 450u);
+    delete_right();
+    EXPECT_TRUE(fs::exists(other + ".edits"));
+    EXPECT_FALSE(fs::exists(scene_ + ".edits"));
+    const size_t rest = left();
+    EXPECT_LT(rest, 50u);
+    EXPECT_EQ(saved(), rest);
+    EXPECT_EQ(saved(true), 400 + rest);
+}
+
 TEST(EditWorker, PublishesManyUndosOnce) {
     std::atomic<bool> held = false;
     std::mutex mutex;

@@ -113,7 +113,6 @@ void Editor::clear() {
     scenes_.clear();
     closed_.clear();
     active_ = 0;
-    snapshot_ = std::make_shared<EditSnapshot>();
     settings.tool = Tool::view;
 }
 
@@ -131,7 +130,7 @@ void Editor::add(const std::string& name, const fs::path& file, std::shared_ptr<
     auto scene = std::make_unique<EditedScene>();
     scene->name = name;
     scene->file = file;
-    scene->journaled = true;
+    scene->journaled = !file.empty();
     insert(std::move(scene), std::move(splats), {});
 }
 

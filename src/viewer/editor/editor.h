@@ -80,9 +80,11 @@ class Editor {
     /// Replaces all scenes by this one. journaled: it is a file of its own, and gets a journal.
     void enter(const std::string& name, const std::filesystem::path& file,
                std::shared_ptr<const Gaussians> splats, edit::Cameras cameras, bool journaled);
+    /// Adds a scene of another file, which becomes the active one. file: empty: the splats are in none.
     void add(const std::string& name, const std::filesystem::path& file,
              std::shared_ptr<const Gaussians> splats);
-    void clear();  // there is nothing to edit
+    bool wants_scene = false;  // the user asks for a file to add
+    void clear();              // there is nothing to edit
     size_t scenes() const { return scenes_.size(); }
     const EditedScene& scene(size_t i) const { return *scenes_[i]; }
     size_t active() const { return active_; }

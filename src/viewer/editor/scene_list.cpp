@@ -96,6 +96,7 @@ void draw_scenes(Editor& editor) {
         if (close_button(scene.unsaved)) closed = i;
         ImGui::PopID();
     }
+    if (ui::button_line({{say::kAddScene}}) == 0) editor.wants_scene = true;
     ImGui::PopID();
     if (closed) editor.close(*closed);
 }
