@@ -36,7 +36,7 @@ void move_origin(Gaussians& splats, const glm::dvec3& origin) {
     splats.origin = origin;
 }
 
-/// Of a reset, the splats have the first values already.
+/// A reset finds the first values in `splats`.
 void apply_edit(Gaussians& splats, const ValueEdit& edit, const glm::dvec3& origin) {
     if (std::holds_alternative<Reset>(edit)) move_origin(splats, origin);
     if (const auto* matrix = std::get_if<glm::dmat4>(&edit)) transform_about(splats, *matrix, origin);
@@ -78,19 +78,19 @@ void adjust_splats(Gaussians& gaussians, const Adjustment& a) {
     if (a.opacity != 1) scale_opacities(gaussians, double(a.opacity));
 }
 
+Gaussians splats_left(const Gaussians& gaussians, const std::vector<uint8_t>& states) {
+    std::vector<uint32_t> left;
+    for (size_t i = 0; i < states.size(); ++i)
+        if ((states[i] & kDeleted) == 0) left.push_back(uint32_t(i));
+    return left.size() == gaussians.size() ? gaussians : scene::rows_of(gaussians, left);
+}
+
 EditedSplats::EditedSplats(std::shared_ptr<const Gaussians> splats, Cameras cameras)
     : first_(std::move(splats)), now_(first_), cameras_(std::move(cameras)), states_(first_->size()) {}
 
 Cameras EditedSplats::cameras() const {
     const auto moves = [](const Group& group) { return std::holds_alternative<glm::dmat4>(group.edit); };
     return std::ranges::any_of(groups_, moves) ? Cameras() : cameras_;
-}
-
-Gaussians EditedSplats::result() const {
-    std::vector<uint32_t> left;
-    for (size_t i = 0; i < size(); ++i)
-        if ((states_[i] & kDeleted) == 0) left.push_back(uint32_t(i));
-    return left.size() == size() ? *now_ : scene::rows_of(*now_, left);
 }
 
 size_t EditedSplats::count(uint8_t bits) const {

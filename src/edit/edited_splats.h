@@ -40,6 +40,9 @@ struct Reset {
 /// An edit of values: an affine transform in the world, a change of colours, or a reset.
 using ValueEdit = std::variant<glm::dmat4, Adjustment, Reset>;
 
+/// The splats whose state is not kDeleted, in order. states: one for each splat.
+Gaussians splats_left(const Gaussians& gaussians, const std::vector<uint8_t>& states);
+
 class EditedSplats {
   public:
     /// cameras: of the run that trained the splats; for the filter `views`.
@@ -53,7 +56,7 @@ class EditedSplats {
     /// Empty once splats have moved.
     Cameras cameras() const;
     /// The splats that are not deleted, in order.
-    Gaussians result() const;
+    Gaussians result() const { return splats_left(*now_, states_); }
 
     bool selectable(size_t i) const { return (states_[i] & (kLocked | kHidden | kDeleted)) == 0; }
     /// Whether an edit of the selection changes splat i.

@@ -28,10 +28,6 @@ double scale_of(const Gaussians& g, size_t i, bool largest) {
     return std::exp(double(largest ? high : low));
 }
 
-double color_of(const Gaussians& g, size_t i, size_t channel) {
-    return shared::COLOR_OFFSET + shared::SH_C0 * g.sh[g.sh_stride() * i + channel];
-}
-
 double opacity_of(const Gaussians& g, size_t i) {
     return 1 / (1 + std::exp(-double(g.opacity_logits[i])));
 }
@@ -43,9 +39,9 @@ constexpr Column kColumns[] = {
     {"opacity", opacity_of},
     {"scale", [](const Gaussians& g, size_t i) { return scale_of(g, i, true); }, true},
     {"thickness", [](const Gaussians& g, size_t i) { return scale_of(g, i, false); }, true},
-    {"red", [](const Gaussians& g, size_t i) { return color_of(g, i, 0); }},
-    {"green", [](const Gaussians& g, size_t i) { return color_of(g, i, 1); }},
-    {"blue", [](const Gaussians& g, size_t i) { return color_of(g, i, 2); }},
+    {"red", [](const Gaussians& g, size_t i) { return color_of(g, i).r; }},
+    {"green", [](const Gaussians& g, size_t i) { return color_of(g, i).g; }},
+    {"blue", [](const Gaussians& g, size_t i) { return color_of(g, i).b; }},
 };
 
 /// Whether each splat meets the condition.
@@ -126,6 +122,11 @@ Filter filter_of_views(const Range& range, const std::string& what) {
 
 }  // namespace
 
+glm::dvec3 color_of(const Gaussians& gaussians, size_t i) {
+    const float* sh = &gaussians.sh[gaussians.sh_stride() * i];
+    return shared::COLOR_OFFSET + shared::SH_C0 * glm::dvec3(sh[0], sh[1], sh[2]);
+}
+
 std::span<const Column> columns() {
     return kColumns;
 }
@@ -173,7 +174,8 @@ Gaussians with_removed_in_red(const Gaussians& all, const std::vector<uint32_t>&
     for (size_t i = 0; i < all.size(); ++i) {
         const bool stays = next < left.size() && left[next] == i;
         next += stays;
-        const double light = (color_of(all, i, 0) + color_of(all, i, 1) + color_of(all, i, 2)) / 3;
+        const glm::dvec3 color = color_of(all, i);
+        const double light = (color.r + color.g + color.b) / 3;
         for (size_t c = 0; c < 3; ++c)
             shown.sh[3 * i + c] =
                 float(((stays ? 0.1 + 0.5 * light : kRed[c]) - shared::COLOR_OFFSET) / shared::SH_C0);

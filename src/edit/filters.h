@@ -23,6 +23,8 @@ struct Column {
     double (*value)(const Gaussians&, size_t);  // of a splat
     bool decades = false;                       // the values spread over powers of ten
 };
+/// The colour of a splat without what depends on the view.
+glm::dvec3 color_of(const Gaussians& gaussians, size_t i);
 /// All columns but kViews.
 std::span<const Column> columns();
 /// The column whose values depend on cameras: scene::views_of_splats.

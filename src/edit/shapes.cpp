@@ -12,9 +12,7 @@
 #include "core/text.h"
 #include "core/typing.h"
 #include "edit/view_shapes.h"
-#include "ewa/error.h"
 #include "scene/splat_groups.h"
-#include "shared/constants.h"
 
 namespace ewa::edit {
 namespace {
@@ -65,11 +63,6 @@ std::vector<bool> taken(const EditedSplats& all, const Part& part, const std::ve
     return result;
 }
 
-glm::dvec3 color_of_splat(const Gaussians& g, size_t i) {
-    const float* sh = &g.sh[g.sh_stride() * i];
-    return shared::COLOR_OFFSET + shared::SH_C0 * glm::dvec3(sh[0], sh[1], sh[2]);
-}
-
 bool like(const glm::dvec3& a, const glm::dvec3& b, double tolerance) {
     return std::abs(a.x - b.x) <= tolerance && std::abs(a.y - b.y) <= tolerance &&
            std::abs(a.z - b.z) <= tolerance;
@@ -110,9 +103,9 @@ Shape flood(const glm::dvec3& point, double tolerance) {
         const Part everything = whole(all);
         const auto nearest = nearest_to(everything, point);
         if (!nearest) return std::vector<bool>(all.size());
-        const glm::dvec3 color = color_of_splat(everything.splats, *nearest);
+        const glm::dvec3 color = color_of(everything.splats, *nearest);
         const Part part =
-            part_of(all, [&](size_t i) { return like(color_of_splat(*all.splats(), i), color, tolerance); });
+            part_of(all, [&](size_t i) { return like(color_of(*all.splats(), i), color, tolerance); });
         const auto seed = nearest_to(part, point);  // none if its colour is not finite
         return taken(all, part, seed ? group_at(part, *seed) : std::vector<bool>());
     };
@@ -159,7 +152,7 @@ Shape shape_of_color(const glm::dvec3& color, double tolerance) {
     return [=](const EditedSplats& all) {
         std::vector<bool> flags(all.size());
         for (size_t i = 0; i < flags.size(); ++i)
-            flags[i] = like(color_of_splat(*all.splats(), i), color, tolerance);
+            flags[i] = like(color_of(*all.splats(), i), color, tolerance);
         return flags;
     };
 }

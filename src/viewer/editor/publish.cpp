@@ -7,7 +7,6 @@
 #include "core/text.h"
 #include "edit/edited_splats.h"
 #include "ewa/error.h"
-#include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
 
 namespace ewa::viewer {
@@ -17,18 +16,6 @@ namespace fs = std::filesystem;
 
 constexpr auto kWakePeriod = std::chrono::milliseconds(300);
 constexpr size_t kMostPublishText = 1u << 20;  // bytes
-
-/// Writes the splats that are left.
-void write_left(const PublishOrder& order, const fs::path& file) {
-    Gaussians splats = *order.splats;
-    if (order.states) {
-        std::vector<uint32_t> left;
-        for (size_t i = 0; i < order.states->size(); ++i)
-            if (((*order.states)[i] & edit::kDeleted) == 0) left.push_back(uint32_t(i));
-        keep_splats(splats, left);
-    }
-    save_splats(file, splats);
-}
 
 /// The last line that is not empty.
 std::string last_line(std::string_view text) {
@@ -102,7 +89,8 @@ Publisher::Result Publisher::run(PublishOrder order) {
     std::optional<core::TemporaryFolder> folder;
     if (order.splats) {
         order.scene = folder.emplace("ewa-publish-").path() / "scene.ply";
-        write_left(order, order.scene);
+        save_splats(order.scene,
+                    order.states ? edit::splats_left(*order.splats, *order.states) : *order.splats);
         order.splats = nullptr;
     }
     core::make_folder(order.out.parent_path());
