@@ -36,7 +36,8 @@ int status_of(const std::string& who, const Action& action) {
     } catch (const RunError& error) {
         return fail(who, error.what(), kFailed);
     } catch (const std::bad_alloc&) {
-        return fail(who, "out of host memory; try --downscale or a smaller scene", kFailed);
+        return fail(who, "out of host memory; try a smaller scene, or --downscale where the command has it",
+                    kFailed);
     } catch (const std::exception& error) {
         return fail(who, std::string("unexpected failure: ") + error.what(), kFailed);
     }
