@@ -25,7 +25,8 @@ struct Selection {
 ///   polygon=x,y,x,y,...;view=VIEW     centres inside this polygon in the image of a view, px
 ///   brush=R,x,y,x,y,...;view=VIEW     centres within R px of this line
 ///     Both may end in ;front (only splats that others do not cover) and ;extent (any part of a splat, to 2 standard deviations).
-///   color=r,g,b,T                     colours within T of this one in each channel, 0 to 1
+///     Their numbers are up to 1e9.
+///   color=r,g,b,T                     colours within T >= 0 of this one in each channel, 0 to 1
 ///   flood=x,y,z,T                     the splats that touch the nearest one to this point, and so on, with colours within T of its
 ///   cluster=x,y,z                     the group of touching splats that the nearest one to this point is in
 ///   floaters                          groups of fewer than 10 touching splats
