@@ -244,7 +244,7 @@ void App::panel() {
         .times = state_.loop.times,
         .up = navigation_.view.up(),
         .at_camera = navigation_.at_camera,
-        .width = float(state_.panel_width()) / std::max(1e-3f, ImGui::GetIO().DisplayFramebufferScale.x),
+        .place = state_.panel_area(),
         .over_picture = !state_.panel_fits(),
     };
     std::function<void()> rows = [this] {
@@ -253,7 +253,10 @@ void App::panel() {
         if (edit_panel_.take_redraw()) state_.redraw();
     };
     if (editor_.scenes() == 0) rows = nullptr;
+    const float text = state_.settings.text_scale;
     obey(draw_panel(facts, state_.settings, rows));
+    // The row that changes it stays in view.
+    if (state_.settings.text_scale != text) state_.panel_beside = state_.panel_over = true;
 }
 
 void App::obey(const PanelActions& actions) {

@@ -8,6 +8,7 @@ namespace ewa::viewer {
 namespace {
 
 constexpr Size kLeastWindow{1100, 880};  // where the desktop has room
+constexpr double kLeastPanel = 18;       // in heights of the text
 constexpr double kShare = 0.92;          // of the desktop: the window's frame takes some
 
 }  // namespace
@@ -20,9 +21,14 @@ Rectangle fitted(Size shape, const Rectangle& space) {
     return {space.x + (space.width - width) / 2, space.y + (space.height - height) / 2, width, height};
 }
 
+int panel_width(int window, double text_height) {
+    const double usual = kPanelWidth * text_height, most = kMostPanel * window;
+    return int(most >= kLeastPanel * text_height ? std::min(usual, most) : usual);
+}
+
 Rectangle free_area(Size window, int panel) {
     const int width = std::max(1, window.width), height = std::max(1, window.height);
-    if (panel <= 0 || panel > width / 2) return {0, 0, width, height};
+    if (panel <= 0 || panel > kMostPanel * width) return {0, 0, width, height};
     return {panel, 0, width - panel, height};
 }
 

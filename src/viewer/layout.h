@@ -20,9 +20,14 @@ Rectangle fitted(Size shape, const Rectangle& space);
 
 inline constexpr double kTextHeight = 16;     // of the panel's text, at a content scale of 1
 inline constexpr double kPanelWidth = 19;     // in heights of the text
+inline constexpr double kMostPanel = 0.45;    // share of the window's width
+inline constexpr double kBarsNeed = 22;       // in heights of the text: the least side of a picture with bars
 inline constexpr Size kUsualSize{1280, 800};  // of a picture that no camera sets
 
-/// The part of the window that the panel does not cover. A panel wider than half of the window lies over the picture, so
+/// The width of the panel in a window of this width. It is less than usual where that leaves the bars of the editor room.
+int panel_width(int window, double text_height);
+
+/// The part of the window that the panel does not cover. A panel wider than kMostPanel of the window lies over the picture, so
 /// this part is the whole window. panel: the panel's width; 0: it is hidden.
 Rectangle free_area(Size window, int panel);
 

@@ -14,6 +14,7 @@
 #include "core/text.h"
 #include "viewer/editor/texts.h"
 #include "viewer/editor/theme.h"
+#include "viewer/overlay.h"
 
 namespace ewa::viewer {
 namespace {
@@ -339,9 +340,11 @@ glm::dvec3 next_up(const glm::dvec3& up) {
 PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings,
                         const std::function<void()>& edit_rows) {
     PanelActions actions;
-    const float height = ImGui::GetIO().DisplaySize.y;
-    ImGui::SetNextWindowPos(ImVec2(0, 0));
-    ImGui::SetNextWindowSize(ImVec2(facts.width, height));
+    const Rectangle& place = facts.place;
+    const ImVec2 size = gui_point(place.width, place.height);
+    const float height = size.y;
+    ImGui::SetNextWindowPos(gui_point(place.x, place.y));
+    ImGui::SetNextWindowSize(size);
     ImGui::SetNextWindowBgAlpha(facts.over_picture ? 0.93f : 1.0f);
     constexpr auto kFlags = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
                             ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus |

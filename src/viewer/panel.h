@@ -33,7 +33,7 @@ struct PanelFacts {
     const SessionTimes& times;
     glm::dvec3 up;
     std::optional<int> at_camera;  // the camera that the view is at
-    float width;                   // of the panel, in ImGui's coordinates
+    Rectangle place;               // of the panel, px of the framebuffer
     bool over_picture;             // the panel lies over the picture, which shines through
 };
 

@@ -71,11 +71,17 @@ double ViewState::text_height() const {
 }
 
 int ViewState::panel_width() const {
-    return int(kPanelWidth * text_height());
+    return viewer::panel_width(window.framebuffer().width, text_height());
 }
 
 bool ViewState::panel_fits() const {
     return free_area(window.framebuffer(), panel_width()).x > 0;
+}
+
+Rectangle ViewState::panel_area() const {
+    Rectangle area = panel_fits() ? Rectangle{0, 0, 0, window.framebuffer().height} : picture_area();
+    area.width = panel_fits() ? panel_width() : std::min(panel_width(), area.width);
+    return area;
 }
 
 Rectangle ViewState::frame_area() const {
@@ -83,9 +89,8 @@ Rectangle ViewState::frame_area() const {
 }
 
 bool ViewState::bars_shown() const {
-    constexpr double kLeast = 22;  // heights of the text: of a window that has room for bars
     const Rectangle area = frame_area();
-    return !scripted() && !empty() && std::min(area.width, area.height) >= kLeast * text_height();
+    return !scripted() && !empty() && std::min(area.width, area.height) >= kBarsNeed * text_height();
 }
 
 Rectangle ViewState::picture_area() const {

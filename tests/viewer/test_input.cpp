@@ -64,7 +64,7 @@ TEST_F(Input, ADenseDisplayHasLargerText) {
     const XClient display(display_.name());
     int widths[2] = {};
     for (const int dense : {0, 1}) {
-        if (dense) display.set_resources("Xft.dpi:\t192\n");
+        if (dense) display.set_resources("Xft.dpi:\t168\n");
         Session session(shots_, {splats_, "--cameras", cameras_, "--size", "1260x340"});
         ASSERT_TRUE(session.found());
         widths[dense] = 1260 - screenshot(session).width;
@@ -78,7 +78,7 @@ TEST_F(Input, ADenseDisplayHasLargerText) {
         expect_silent(session.quit());
     }
     EXPECT_GT(widths[0], 200);
-    EXPECT_NEAR(double(widths[1]) / widths[0], 2, 0.05);
+    EXPECT_NEAR(double(widths[1]) / widths[0], 1.75, 0.05);
 }
 
 /// Beside the picture where there is room; else over it, and only when it is asked for.
@@ -117,10 +117,10 @@ TEST_F(Input, TheTextHasTheSizeOfTheSettings) {
     const XClient display(display_.name());
     std::vector<Image> panels;
     for (const std::string& fonts : {std::string("/usr/local/share:/usr/share"), folder_ / "data"}) {
-        Session session(shots_, {splats_, "--size", "1000x500"},
+        Session session(shots_, {splats_, "--size", "1100x500"},
                         {{"XDG_DATA_DIRS", fonts}, {"XDG_DATA_HOME", folder_ / "none"}});
         ASSERT_TRUE(session.found());
-        const int panel = 1000 - screenshot(session).width;
+        const int panel = 1100 - screenshot(session).width;
         EXPECT_EQ(panel, int(19 * 16 * 1.5));
         const auto window = display.window_titled("ewa");
         ASSERT_TRUE(window);

@@ -19,10 +19,21 @@ using test::Variable;
 TEST(Layout, ThePictureIsBesideThePanel) {
     EXPECT_EQ(free_area({1100, 800}, 300), (Rectangle{300, 0, 800, 800}));
     EXPECT_EQ(free_area({1100, 800}, 0), (Rectangle{0, 0, 1100, 800}));
-    EXPECT_EQ(free_area({600, 800}, 300), (Rectangle{300, 0, 300, 800}));
-    EXPECT_EQ(free_area({599, 800}, 300), (Rectangle{0, 0, 599, 800}))
+    EXPECT_EQ(free_area({667, 800}, 300), (Rectangle{300, 0, 367, 800}));
+    EXPECT_EQ(free_area({666, 800}, 300), (Rectangle{0, 0, 666, 800}))
         << "too narrow: the panel lies over it";
     EXPECT_EQ(free_area({0, 0}, 300), (Rectangle{0, 0, 1, 1}));
+}
+
+TEST(Layout, ThePanelLeavesTheBarsRoom) {
+    EXPECT_EQ(panel_width(1280, 16), 304);
+    EXPECT_EQ(panel_width(640, 16), 288);
+    EXPECT_EQ(panel_width(1280, 32), 576);
+    EXPECT_EQ(panel_width(600, 16), 304) << "it lies over the picture";
+    for (int width = 100; width < 1000; ++width) {
+        const Rectangle area = free_area({width, 800}, panel_width(width, 16));
+        EXPECT_GE(area.width, std::min(width, int(kBarsNeed * 16))) << width;
+    }
 }
 
 TEST(Layout, PlacesKeepTheImagesAspectRatio) {
