@@ -12,6 +12,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/folders.h"
 #include "core/process.h"
 #include "ewa/error.h"
 #include "folders/run_folder.h"
@@ -51,7 +52,6 @@ App::App(const Startup& startup)
       tools_(state_, navigation_, shown_, editor_),
       dialogs_(editor_, session_.dialog, state_.wake, [this](const std::string& note) { state_.say(note); }),
       film_(state_, navigation_, shown_, dialogs_, session_.dialog) {
-    dialogs_.views_file = [this] { return film_views(); };
     change_text();
     state_.loop.last_frame = Clock::now();
     state_.message.hint();
@@ -110,9 +110,6 @@ void App::run() {
         session_.take_live();
         if (!state_.scripted()) sync_editor();
         film_.take();
-        // A drag is one change.
-        if (!ImGui::IsMouseDown(ImGuiMouseButton_Left))
-            view_history_.watch(navigation_.views, editor_.snapshot().done);
         if (loop.redraws > 0) draw();
         shown_.ask();
     }
@@ -172,8 +169,6 @@ void App::handle_key(const KeyPress& press) {
         return;
     }
     const bool undoes = press.control && (key == GLFW_KEY_Z || key == GLFW_KEY_Y);
-    if (undoes && film_.shown && undo_film(key == GLFW_KEY_Y || press.shift))
-        return state_.redraw(Loop::kRedraws);
     if ((editing() || undoes) && tools_.handle_key(press)) return state_.redraw(Loop::kRedraws);
     float& scale = settings.look.splat_scale;
     if (key == GLFW_KEY_MINUS || key == GLFW_KEY_KP_SUBTRACT)
@@ -183,13 +178,6 @@ void App::handle_key(const KeyPress& press) {
     if (key == GLFW_KEY_M) toggle(settings.measure);
     if (key == GLFW_KEY_V) shown_.change_comparison();
     if (!film_.handle_key(press)) navigation_.handle_key(press);
-}
-
-/// Undoes or redoes a change of the film's keys, if it is later than the last edit.
-bool App::undo_film(bool again) {
-    const size_t edits = editor_.snapshot().done;
-    std::vector<io::NamedView>& keys = navigation_.views;
-    return again ? view_history_.redo(keys, edits) : view_history_.undo(keys, edits);
 }
 
 void App::handle_mouse() {
@@ -344,22 +332,6 @@ bool App::editing() const {
 bool App::live() const {
     const live::Update* run = session_.live_run.update();
     return run && run->status.state != live::State::done && run->connected;
-}
-
-/// Writes the keys of the film for the page that Publish makes. Empty: there are none.
-std::filesystem::path App::film_views() {
-    std::vector<io::NamedView> keys = navigation_.views;
-    if (keys.empty()) return {};
-    give_times(keys, double(state_.settings.film_seconds));
-    try {
-        if (!film_folder_) film_folder_.emplace("ewa-views-");
-        const std::filesystem::path file = film_folder_->path() / "views.json";
-        io::write_views(file, keys);
-        return file;
-    } catch (const RunError& error) {
-        state_.say(error.what());
-        return {};
-    }
 }
 
 void App::open(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown) {

@@ -2,9 +2,7 @@
 // The viewer's window thread: turns input into requests, and finished frames into what the window shows.
 #pragma once
 #include <memory>
-#include <optional>
 
-#include "core/folders.h"
 #include "viewer/editor/dialogs.h"
 #include "viewer/editor/edit_panel.h"
 #include "viewer/editor/editor.h"
@@ -14,7 +12,6 @@
 #include "viewer/navigation.h"
 #include "viewer/screen.h"
 #include "viewer/shown.h"
-#include "viewer/view_history.h"
 #include "viewer/view_session.h"
 #include "viewer/view_state.h"
 
@@ -36,7 +33,6 @@ class App {
 
     // Input.
     void handle_key(const KeyPress& press);
-    bool undo_film(bool again);
     void handle_mouse();
     void obey(const PanelActions& actions);
 
@@ -53,7 +49,6 @@ class App {
     void sync_editor();
     void take_chosen();
     void enter_scene();
-    std::filesystem::path film_views();
     void add_scene();
     void send_edits(const std::vector<edit::Step>& done);
     void open(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown);
@@ -71,8 +66,6 @@ class App {
     EditPanel edit_panel_;
     Dialogs dialogs_;
     FilmStrip film_;
-    ViewHistory view_history_{navigation_.views};
-    std::optional<core::TemporaryFolder> film_folder_;  // what film_views() writes, while Publish reads it
     std::shared_ptr<const Gaussians> entered_,
         drawn_;                     // the scene that is edited, and what of it the render thread has
     std::filesystem::path opened_;  // the last file that was remembered

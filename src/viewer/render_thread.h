@@ -25,7 +25,6 @@ struct Look {
     int sh_degree = kMaxShDegree;
     float splat_scale = 1;
     bool points = false;  // in place of the kernel
-    bool plain = false;   // without the tints of marks
     int nearest = RenderOptions().nearest;
     std::shared_ptr<const SkyMap> sky = nullptr;  // in place of the background; null: none
     bool plain = false;                           // marks hide splats, but do not tint them

@@ -12,7 +12,6 @@
 #include "viewer/opening.h"
 #include "viewer/session.h"
 #include "viewer/variable.h"
-#include "viewer/view_history.h"
 
 namespace ewa::viewer {
 namespace {
@@ -75,36 +74,6 @@ TEST(FilmKeys, AreAddedAtThePlayhead) {
     EXPECT_EQ(time_for_key(views, 2, 3), 5);
     EXPECT_EQ(time_for_key(views, 0.5, 3), 0.5);
     EXPECT_EQ(time_for_key(views, 0, 3), 1) << "there is a key";
-}
-
-TEST(FilmKeys, AreUndoneAmongTheEdits) {
-    Views views = views_at({0, 1, 2});
-    ViewHistory history(views);
-    EXPECT_FALSE(history.undo(views, 0));
-    give_times(views, 1);
-    history.watch(views, 0);
-    views.erase(views.begin());
-    history.watch(views, 0);
-    // An edit of the scene.
-    views[1].time = 7;
-    history.watch(views, 1);
-    EXPECT_TRUE(history.undo(views, 1));
-    EXPECT_EQ(io::times_of(views, 0), (std::vector<double>{1, 2}));
-    EXPECT_FALSE(history.undo(views, 1)) << "the edit came after it";
-    EXPECT_FALSE(history.redo(views, 0)) << "the edit comes before it";
-    EXPECT_TRUE(history.undo(views, 0));
-    EXPECT_EQ(order_of(views), "123");
-    EXPECT_TRUE(history.redo(views, 0));
-    EXPECT_EQ(order_of(views), "23");
-    EXPECT_TRUE(history.redo(views, 1));
-    EXPECT_EQ(io::times_of(views, 0), (std::vector<double>{1, 7}));
-    EXPECT_FALSE(history.redo(views, 1));
-    // A new change ends the ones that were undone.
-    EXPECT_TRUE(history.undo(views, 1));
-    views.clear();
-    EXPECT_FALSE(history.redo(views, 1));
-    EXPECT_TRUE(history.undo(views, 1));
-    EXPECT_EQ(order_of(views), "23");
 }
 
 TEST(FilmPath, HasFramesFromTheFirstKeyToTheLast) {
