@@ -92,6 +92,10 @@ TEST(SaveChoices, ProposeANameBesideTheOriginal) {
         return viewer::proposed_file(file, name, io::row_of(format)).string();
     };
     EXPECT_EQ(proposed("/a/b.ply", "b", SplatFormat::ply), "/a/b-edited.ply");
+    EXPECT_EQ(proposed("/a/b-edited.sog", "b", SplatFormat::ply), "/a/b-edited-2.ply");
+    EXPECT_EQ(proposed("/a/b-edited-9.sog", "b", SplatFormat::ply), "/a/b-edited-10.ply");
+    EXPECT_EQ(proposed("/a/b-edited-x.ply", "b", SplatFormat::ply), "/a/b-edited-x-edited.ply");
+    EXPECT_EQ(proposed("/a/b-edited7.ply", "b", SplatFormat::ply), "/a/b-edited7-edited.ply");
     EXPECT_EQ(proposed("/a/b.ply", "b", SplatFormat::sog_levels), "/a/b-edited/lod-meta.json");
     EXPECT_EQ(proposed("/a/b/meta.json", "b", SplatFormat::page), "/a/b-edited.html");
     EXPECT_EQ(proposed("/a/run/", "run", SplatFormat::sog), "/a/run-edited.sog");

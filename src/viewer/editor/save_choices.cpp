@@ -2,6 +2,7 @@
 #include "viewer/editor/save_choices.h"
 
 #include <cmath>
+#include <cstring>
 
 #include "core/folders.h"
 #include "core/messages.h"
@@ -107,7 +108,16 @@ fs::path proposed_file(const fs::path& file, const std::string& name, const io::
     fs::path stem = fs::absolute(file, error).lexically_normal();
     if (!stem.has_filename()) stem = stem.parent_path();  // of a folder
     stem = stem_of(stem);
-    stem += part > 1 ? "-" + std::to_string(part) : kEdited;
+    if (part > 1) return with_extension(stem += "-" + std::to_string(part), row);
+    stem += kEdited;
+    // An edited file gets the next number in place of another ending.
+    const std::string whole = stem.string(), again = whole.substr(0, whole.size() - std::strlen(kEdited));
+    const size_t at = again.rfind(kEdited), end = at + std::strlen(kEdited);
+    if (at == std::string::npos) return with_extension(stem, row);
+    const bool first = end == again.size();
+    const auto number = first ? 1 : core::parse_integer<unsigned>(again.substr(end + 1));
+    if (number && (first || again[end] == '-'))
+        stem = again.substr(0, end) + "-" + std::to_string(*number + 1);
     return with_extension(stem, row);
 }
 
