@@ -109,6 +109,7 @@ void App::run() {
         session_.take_saved();
         session_.take_live();
         if (!state_.scripted()) sync_editor();
+        film_.edits = editor_.snapshot().done;
         film_.take();
         if (loop.redraws > 0) draw();
         shown_.ask();
@@ -169,6 +170,7 @@ void App::handle_key(const KeyPress& press) {
         return;
     }
     const bool undoes = press.control && (key == GLFW_KEY_Z || key == GLFW_KEY_Y);
+    if (undoes && film_.undo(key == GLFW_KEY_Z && !press.shift)) return state_.redraw(Loop::kRedraws);
     if ((editing() || undoes) && tools_.handle_key(press)) return state_.redraw(Loop::kRedraws);
     float& scale = settings.look.splat_scale;
     if (key == GLFW_KEY_MINUS || key == GLFW_KEY_KP_SUBTRACT)

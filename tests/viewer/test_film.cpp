@@ -141,6 +141,27 @@ TEST(FilmWriter, GivesFfmpegItsFrames) {
     EXPECT_FALSE(std::filesystem::exists(folder / "stopped.mp4"));
 }
 
+TEST(AKeyHistory, UndoesKeysAmongTheEditsOfSplats) {
+    std::vector<io::NamedView> views = views_at({0, 1, 2});
+    KeyHistory history;
+    const KeyHistory::Place before{"a.ply", 3}, later{"a.ply", 4}, other{"b.ply", 3};
+    EXPECT_FALSE(history.step(true, views, before)) << "nothing was changed";
+    history.remember(views, before);
+    views.pop_back();
+    EXPECT_FALSE(history.step(true, views, later)) << "the edit is undone first";
+    EXPECT_FALSE(history.step(true, views, other));
+    EXPECT_EQ(views.size(), 2u);
+    EXPECT_TRUE(history.step(true, views, before));
+    EXPECT_EQ(views.size(), 3u);
+    EXPECT_FALSE(history.step(true, views, before));
+    EXPECT_TRUE(history.step(false, views, before));
+    EXPECT_EQ(views.size(), 2u);
+    EXPECT_TRUE(history.step(true, views, before));
+    history.remember(views, before);
+    space_evenly(views);
+    EXPECT_FALSE(history.step(false, views, before)) << "another change was made";
+}
+
 }  // namespace
 }  // namespace ewa::viewer
 

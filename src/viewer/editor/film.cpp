@@ -67,6 +67,19 @@ double time_for_key(const Views& views, double playhead, double distance) {
     return std::max(playhead, 0.0);
 }
 
+void KeyHistory::remember(const Views& views, const Place& now) {
+    before_.emplace_back(now, views);
+    after_.clear();
+}
+
+bool KeyHistory::step(bool back, Views& views, const Place& now) {
+    Changes &from = back ? before_ : after_, &to = back ? after_ : before_;
+    if (from.empty() || from.back().first != now) return false;
+    to.emplace_back(now, std::exchange(views, std::move(from.back().second)));
+    from.pop_back();
+    return true;
+}
+
 FilmPath::FilmPath(const Views& views, double distance, bool smooth)
     : times_(io::times_of(views, distance)), smooth_(smooth), even_(smooth && !views.front().time) {
     for (const io::NamedView& view : views) keys_.push_back(view.camera);

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/progress.h"
@@ -32,6 +33,21 @@ void space_evenly(std::vector<io::NamedView>& views);
 void stretch(std::vector<io::NamedView>& views, double length);
 /// The time of a key that is added at the playhead: there, halfway to the next key if one is there, or `distance` seconds after the last.
 double time_for_key(const std::vector<io::NamedView>& views, double playhead, double distance);
+
+/// The changes of a film's keys, for undo. They stand among the edits of the splats.
+class KeyHistory {
+  public:
+    /// The file of the scene, and its edits that are done.
+    using Place = std::pair<std::filesystem::path, size_t>;
+    /// Call it before a change.
+    void remember(const std::vector<io::NamedView>& views, const Place& now);
+    /// Undoes the last change (back), or does it again. Returns false where an edit or another scene came after it, or there is none.
+    bool step(bool back, std::vector<io::NamedView>& views, const Place& now);
+
+  private:
+    using Changes = std::vector<std::pair<Place, std::vector<io::NamedView>>>;
+    Changes before_, after_;
+};
 
 class FilmPath {
   public:

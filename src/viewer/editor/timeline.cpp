@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstdio>
 #include <glm/matrix.hpp>
+#include <utility>
 
 #include "core/text.h"
 #include "viewer/editor/panel_controls.h"
@@ -92,6 +93,7 @@ void FilmStrip::show(double time) {
 void FilmStrip::add_key() {
     shown = true;
     give_times(views(), distance());
+    remember();
     const double time = time_for_key(views(), playhead_, distance());
     navigation_.add_view(time);
     give_times(views(), distance());
@@ -101,6 +103,7 @@ void FilmStrip::add_key() {
 void FilmStrip::replace_key() {
     const auto key = key_at_playhead();
     if (!key) return;
+    remember();
     io::NamedView& view = views()[*key];
     const io::NamedView now = navigation_.here();
     view.camera = now.camera;
@@ -108,7 +111,10 @@ void FilmStrip::replace_key() {
 }
 
 void FilmStrip::forget_key() {
-    if (const auto key = key_at_playhead()) views().erase(views().begin() + std::ptrdiff_t(*key));
+    const auto key = key_at_playhead();
+    if (!key) return;
+    remember();
+    views().erase(views().begin() + std::ptrdiff_t(*key));
 }
 
 void FilmStrip::play(bool on) {
@@ -195,6 +201,7 @@ void FilmStrip::use_mouse(const Scale& scale) {
     if (ImGui::IsItemActivated()) {
         play(false);
         dragged_.reset();
+        moved_ = false;
         float least = 0.5f * ImGui::GetTextLineHeight();
         for (size_t i = 0; i < views().size(); ++i) {
             const float away = std::abs(scale.at(*views()[i].time) - x);
@@ -209,6 +216,7 @@ void FilmStrip::use_mouse(const Scale& scale) {
     const double time = std::clamp(scale.time(x), 0.0, scale.range);
     if (!dragged_) return show(time);
     if (!ImGui::IsMouseDragging(ImGuiMouseButton_Left, kStillPixels)) return;
+    if (!std::exchange(moved_, true)) remember();
     dragged_ = move_key(views(), *dragged_, time);
     playhead_ = *views()[*dragged_].time;
 }
@@ -266,7 +274,10 @@ void FilmStrip::draw_buttons() {
     if (button(texts::film::kAdd, true)) add_key();
     if (button(texts::film::kReplace, on_key)) replace_key();
     if (button(texts::film::kDelete, on_key)) forget_key();
-    if (button(texts::film::kEven, several)) space_evenly(views());
+    if (button(texts::film::kEven, several)) {
+        remember();
+        space_evenly(views());
+    }
     if (button(texts::film::kSaveFilm, !views().empty() && !writing())) open_film();
     if (button(texts::film::kSaveKeys, !views().empty())) navigation_.write_views();
     if (button(texts::film::kSavePicture, true)) open_picture();
@@ -289,8 +300,10 @@ void FilmStrip::draw_settings() {
     if (views().size() >= 2) {
         float length = float(*views().back().time - *views().front().time);
         label_before(texts::film::kLength, 6);
-        if (ImGui::DragFloat("##length", &length, 0.05f, 0.2f, 3600, "%.2f s", ImGuiSliderFlags_AlwaysClamp))
-            stretch(views(), double(length));
+        const bool changed =
+            ImGui::DragFloat("##length", &length, 0.05f, 0.2f, 3600, "%.2f s", ImGuiSliderFlags_AlwaysClamp);
+        if (ImGui::IsItemActivated()) remember();
+        if (changed) stretch(views(), double(length));
     }
     label_before(texts::film::kDistance, 6);
     ImGui::SliderFloat("##distance", &state_.settings.film_seconds, 0.2f, 10, "%.1f s",

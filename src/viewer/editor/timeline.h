@@ -28,6 +28,8 @@ class FilmStrip {
     void draw();
     /// Returns whether the key was the strip's.
     bool handle_key(const KeyPress& press);
+    /// Undoes the last change of the keys (back), or does it again, unless the strip is hidden or an edit came after it.
+    bool undo(bool back) { return shown && history_.step(back, views(), place()); }
     /// Moves the preview by so many seconds of the clock.
     void advance(double seconds);
     /// Takes what the render thread has written, and asks for more. Call it once per turn of the window's loop.
@@ -44,6 +46,7 @@ class FilmStrip {
     Rectangle area_above() const;
 
     bool shown = false;
+    size_t edits = 0;  // of the scene that are done, by the editor's history
 
   private:
     /// Where times are on the screen, in ImGui's coordinates.
@@ -58,6 +61,8 @@ class FilmStrip {
     double distance() const { return double(state_.settings.film_seconds); }
     FilmPath path() const { return {navigation_.views, distance(), smooth_}; }
     std::optional<size_t> key_at_playhead() const;
+    KeyHistory::Place place() const { return {state_.scene.path, edits}; }
+    void remember() { history_.remember(views(), place()); }
     void show(double time);
     void replace_key();
     void forget_key();
@@ -82,6 +87,8 @@ class FilmStrip {
     double playhead_ = 1e9;  // s; the end at first, where new keys belong
     double range_ = 0;       // s, of the track
     std::optional<size_t> dragged_;
+    bool moved_ = false;  // the dragged key
+    KeyHistory history_;
     bool playing_ = false, loop_ = false, smooth_ = true;
     float speed_ = 1;
     Camera last_;       // that the preview has shown
