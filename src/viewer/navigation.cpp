@@ -204,8 +204,7 @@ void Navigation::write_views() {
         if (std::ranges::any_of(views, [](const io::NamedView& saved) { return saved.time.has_value(); }))
             give_times(views, double(state_.settings.film_seconds));
         io::write_views(file, views);
-        state_.say("wrote " + std::filesystem::absolute(file).string() +
-                   "; --views opens it, and with ewa convert it makes a page play the film");
+        state_.say("wrote " + std::filesystem::absolute(file).string());
     } catch (const RunError& error) {
         state_.say(error.what());
     }

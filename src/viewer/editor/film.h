@@ -34,7 +34,7 @@ void stretch(std::vector<io::NamedView>& views, double length);
 /// The time of a key that is added at the playhead: there, halfway to the next key if one is there, or `distance` seconds after the last.
 double time_for_key(const std::vector<io::NamedView>& views, double playhead, double distance);
 
-/// The changes of a film's keys, for undo. They stand among the edits of the splats.
+/// The changes of a film's keys, for undo. Edits of the splats may come between them.
 class KeyHistory {
   public:
     /// The file of the scene, and its edits that are done.

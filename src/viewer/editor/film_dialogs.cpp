@@ -6,7 +6,6 @@
 #include <iterator>
 #include <utility>
 
-#include "core/folders.h"
 #include "core/outputs.h"
 #include "core/process.h"
 #include "core/text.h"
@@ -57,6 +56,19 @@ std::string refused(const char* name, const fs::path& file, const fs::path& scen
 }
 
 }  // namespace
+
+fs::path FilmStrip::views_file() {
+    if (views().size() < 2) return {};
+    try {
+        if (!folder_) folder_.emplace("ewa-views-");
+        give_times(views(), distance());
+        io::write_views(folder_->path() / "views.json", views());
+        return folder_->path() / "views.json";
+    } catch (const std::exception& error) {
+        state_.say(error.what());
+        return {};
+    }
+}
 
 void FilmStrip::open_picture() {
     file_.set(fs::absolute(free_name("ewa-picture", ".png")));

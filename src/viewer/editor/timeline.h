@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "core/folders.h"
 #include "viewer/editor/dialogs.h"
 #include "viewer/editor/film.h"
 #include "viewer/editor/modal.h"
@@ -35,6 +36,8 @@ class FilmStrip {
     /// Takes what the render thread has written, and asks for more. Call it once per turn of the window's loop.
     void take();
 
+    /// Writes the keys to a temporary file for the film of a page. Empty: there are fewer than two, or they cannot be written.
+    std::filesystem::path views_file();
     void open_film();
     void open_picture();
     void add_key();
@@ -89,6 +92,7 @@ class FilmStrip {
     std::optional<size_t> dragged_;
     bool moved_ = false;  // the dragged key
     KeyHistory history_;
+    std::optional<core::TemporaryFolder> folder_;  // of views_file()
     bool playing_ = false, loop_ = false, smooth_ = true;
     float speed_ = 1;
     Camera last_;       // that the preview has shown
