@@ -82,7 +82,7 @@ class RenderThread::Scene {
     Image color(const Full& full);
     /// Returns why the render could not be written or taken, or null.
     std::exception_ptr draw_extra(const ExtraRequest& request);
-    std::optional<glm::dvec3> point_at(const Probe& probe);
+    SurfacePoint point_at(const Probe& probe);
 
   private:
     void put(const Gaussians& scene, std::optional<Renderer>& renderer);
@@ -196,7 +196,8 @@ std::shared_ptr<const RenderedFrame> RenderThread::Scene::draw(const RenderReque
     return finished;
 }
 
-std::optional<glm::dvec3> RenderThread::Scene::point_at(const Probe& probe) {
+SurfacePoint RenderThread::Scene::point_at(const Probe& probe) {
+    SurfacePoint point{.number = probe.number, .use = probe.use, .place = {}};
     const Camera& full = probe.camera;
     const int divisor =
         probe.use == PointUse::look_at ? std::max(1, std::min(full.width, full.height) / kProbeSide) : 1;
@@ -207,8 +208,15 @@ std::optional<glm::dvec3> RenderThread::Scene::point_at(const Probe& probe) {
     const Image depth = renderer_->render(camera, options).median_depth;
     const int x = std::clamp(int(probe.pixel.x * camera.width / full.width), 0, camera.width - 1);
     const int y = std::clamp(int(probe.pixel.y * camera.height / full.height), 0, camera.height - 1);
-    if (!(*depth.at(x, y) > 0)) return std::nullopt;
-    return world_point(camera, x + 0.5, y + 0.5, *depth.at(x, y));
+    if (!(*depth.at(x, y) > 0)) return point;
+    point.place = world_point(camera, x + 0.5, y + 0.5, *depth.at(x, y));
+    if (probe.use != PointUse::color) return point;
+    options.drawing = Drawing::color;
+    options.plain_colors = true;
+    options.render.sh_degree = 0;  // as --select color compares them
+    const Rendering colors = renderer_->render(camera, options);
+    for (int c = 0; c < 3; ++c) point.color[c] = double(colors.color.at(x, y)[c] / *colors.alpha.at(x, y));
+    return point;
 }
 
 Image RenderThread::Scene::color(const Full& full) {
@@ -350,8 +358,8 @@ bool RenderThread::next(const std::stop_token& stop, Work& work) {
     return true;
 }
 
-void RenderThread::answer(const Probe& probe, const std::optional<glm::dvec3>& place) {
-    report([&](News& news) { news.points.push_back({probe.number, probe.use, place}); });
+void RenderThread::answer(const SurfacePoint& point) {
+    report([&](News& news) { news.points.push_back(point); });
 }
 
 void RenderThread::carry_out(Work& work) {
@@ -361,7 +369,7 @@ void RenderThread::carry_out(Work& work) {
     if (scene_->open()) report([&](News& news) { news.device = scene_->device(); });
     if (!scene_->bring_up()) return;
     if (work.probe) {
-        answer(*work.probe, scene_->point_at(*work.probe));
+        answer(scene_->point_at(*work.probe));
         work.probe.reset();  // it is not answered again if what follows fails
     }
     if (work.full) {
@@ -393,7 +401,7 @@ void RenderThread::fail(Work& work) {
         news.failure = std::current_exception();
         if (work.extra) news.extras.push_back({work.extra->number, news.failure});
     });
-    if (work.probe) answer(*work.probe, std::nullopt);
+    if (work.probe) answer({.number = work.probe->number, .use = work.probe->use, .place = {}});
 }
 
 void RenderThread::work(const std::stop_token& stop) {

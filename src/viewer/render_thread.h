@@ -40,14 +40,16 @@ struct RenderRequest {
     std::filesystem::path file;  // written as by `ewa render` with this extension; empty: no file
 };
 
-/// The use of a point under a pixel. edit: by a tool of the editor.
-enum class PointUse { look_at, measure, edit };
+/// The use of a point under a pixel. edit: by a tool of the editor; color: also by one, which needs SurfacePoint::color.
+enum class PointUse { look_at, measure, edit, color };
 
 /// The point on the surface under a pixel.
 struct SurfacePoint {
     uint64_t number = 0;  // that ask_point() returned
     PointUse use = PointUse::look_at;
     std::optional<glm::dvec3> place;  // world; empty where no splat is half opaque, or a render failed
+    /// RGB of PointUse::color: that of the splats there as seen from all sides, without background and tints.
+    glm::dvec3 color{0};
 };
 
 struct RenderedFrame {
@@ -99,8 +101,7 @@ class RenderThread {
     /// Replaces a waiting request that has no file. The frame that is being rendered is finished first.
     void ask(const RenderRequest& request);
     /// Requests the surface point at a pixel, by its median depth. News::points has it with the returned number. Each request with
-    /// PointUse::measure or PointUse::edit renders at full resolution, and is answered. One with PointUse::look_at replaces a waiting
-    /// one.
+    /// another use than PointUse::look_at renders at full resolution, and is answered. One with PointUse::look_at replaces a waiting one.
     uint64_t ask_point(const Camera& camera, const glm::dvec2& pixel, PointUse use);
 
     /// Drops waiting requests for points. The one in progress is still answered.
@@ -152,7 +153,7 @@ class RenderThread {
     bool next(const std::stop_token& stop, Work& work);
     void carry_out(Work& work);
     void fail(Work& work);
-    void answer(const Probe& probe, const std::optional<glm::dvec3>& place);
+    void answer(const SurfacePoint& point);
     void report(const std::function<void(News&)>& change);
 
     std::function<void()> on_news_;

@@ -63,7 +63,7 @@ void Shown::set_measuring(bool on) {
 
 void Shown::take_point(const SurfacePoint& point) {
     state_.redraw(Loop::kRedraws);
-    if (point.use == PointUse::edit) {
+    if (point.use == PointUse::edit || point.use == PointUse::color) {
         if (take_edit_point) take_edit_point(point);
         return;
     }

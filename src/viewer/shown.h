@@ -63,7 +63,7 @@ class Shown {
     Renders renders;
     std::vector<ExtraDone> extras;  // that take_renders() has brought; who has asked for them takes them out
     Measurement measurement;
-    std::function<void(const SurfacePoint&)> take_edit_point;  // gets the answers to PointUse::edit
+    std::function<void(const SurfacePoint&)> take_edit_point;  // gets the answers to PointUse::edit and color
 
   private:
     void take_point(const SurfacePoint& point);

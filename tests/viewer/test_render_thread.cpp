@@ -201,6 +201,27 @@ TEST(Renders, ForgetPoints) {
     EXPECT_TRUE(renders.settled()) << "no answer is awaited";
 }
 
+/// The eyedropper reads the splats, not the picture: without tints of selections and locks.
+TEST(RenderThread, AnswersTheColourOfTheSplats) {
+    RenderThread thread([] { return open_device({}); }, [] {});
+    thread.set_scene(red_splat());
+    for (const uint8_t mark : {0, int(kMarkSelected), int(kMarkLocked), int(kMarkPreview)}) {
+        SCOPED_TRACE(int(mark));
+        thread.set_marks(std::make_shared<const std::vector<uint8_t>>(1, mark));
+        const uint64_t number = thread.ask_point(request(0).camera, {20.5, 15.5}, PointUse::color);
+        const std::vector<SurfacePoint> points = points_of(thread, number);
+        ASSERT_TRUE(points.size() == 1 && points[0].place);
+        EXPECT_EQ(points[0].use, PointUse::color);
+        const double expected[] = {1, 0, 0};
+        for (int c = 0; c < 3; ++c)
+            EXPECT_NEAR(points[0].color[c], expected[c], 1e-3) << "without the background";
+    }
+    const std::vector<SurfacePoint> points =
+        points_of(thread, thread.ask_point(request(0).camera, {1, 1}, PointUse::color));
+    ASSERT_EQ(points.size(), 1u);
+    EXPECT_FALSE(points[0].place) << "there is nothing in the corner";
+}
+
 TEST(RenderThread, FitsOpacitiesToTheKernel) {
     RenderThread thread([] { return open_device({}); }, [] {});
     Gaussians dense = *red_splat();

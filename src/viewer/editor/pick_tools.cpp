@@ -13,35 +13,21 @@
 namespace ewa::viewer {
 
 void PickTools::click(const ToolPicture& picture) {
-    const Tool tool = room_.settings().tool;
-    if (tool == Tool::eyedropper) return pick_color(picture);
-    asked_ = tool;
+    asked_ = room_.settings().tool;
     operation_ = room_.operation();
-    room_.shown.ask_point(picture.pointer, PointUse::edit);
-}
-
-/// The colour under the pointer, as the last frame shows it.
-void PickTools::pick_color(const ToolPicture& picture) const {
-    const auto& frame = room_.shown.renders.shown();
-    if (!frame || frame->request.look.mode != Mode::color) return room_.state.say(texts::kNeedsColours);
-    const Camera& camera = frame->request.camera;
-    const Rectangle at =
-        fitted({camera.width, camera.height}, {0, 0, picture.place.width, picture.place.height});
-    const ByteImage& image = frame->picture;
-    const int x = std::clamp(int((picture.pointer.x - at.x) * image.width / at.width), 0, image.width - 1);
-    const int y = std::clamp(int((picture.pointer.y - at.y) * image.height / at.height), 0, image.height - 1);
-    const uint8_t* rgba = &image.rgba[4 * (size_t(y) * size_t(image.width) + size_t(x))];
-    room_.select(fmt::format("color={:.4g},{:.4g},{:.4g},{:.4g}", rgba[0] / 255.0, rgba[1] / 255.0,
-                             rgba[2] / 255.0, room_.settings().tolerance),
-                 room_.operation());
+    room_.shown.ask_point(picture.pointer, asked_ == Tool::eyedropper ? PointUse::color : PointUse::edit);
 }
 
 bool PickTools::take_point(const SurfacePoint& point) {
-    if (point.use != PointUse::edit || asked_ == Tool::view || asked_ != room_.settings().tool) return false;
+    if (asked_ == Tool::view || asked_ != room_.settings().tool) return false;
     if (!point.place) {
         room_.state.say(texts::kNoSurface);
     } else if (asked_ == Tool::flood) {
         room_.select(fmt::format("flood={},{:.4g}", point_text(*point.place), room_.settings().tolerance),
+                     operation_);
+    } else if (asked_ == Tool::eyedropper) {
+        room_.select(fmt::format("color={:.4g},{:.4g},{:.4g},{:.4g}", point.color.r, point.color.g,
+                                 point.color.b, room_.settings().tolerance),
                      operation_);
     } else if (asked_ == Tool::sphere) {
         room_.settings().sphere_center = *point.place;

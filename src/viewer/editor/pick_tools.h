@@ -18,7 +18,6 @@ class PickTools {
     bool cancel();
 
   private:
-    void pick_color(const ToolPicture& picture) const;
     void add_level_point(const glm::dvec3& point);
     void set_unit(double factor) const;
     void length_field(const ToolPicture& picture);

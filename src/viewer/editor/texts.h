@@ -215,7 +215,6 @@ inline constexpr const char *kNeedsPinhole =
                                 "this tool needs a view without distortion; the view has changed to one",
                             *kPolygonViewChanged = "the view has moved; click the corners again",
                             *kNoSurface = "no splat is opaque enough here",
-                            *kNeedsColours = "the eyedropper needs a picture of colours",
                             *kNoLevel = "the three points are nearly on a line; click three others",
                             *kShapeSelect = "Select", *kShapeAdd = "Add", *kShapeRemove = "Remove",
                             *kTrueLength = "true length";

@@ -22,7 +22,7 @@ class Tools {
     bool handle_key(const KeyPress& press);
     /// Draws the handles, the lines of a selection in progress, and the brush under the pointer.
     void draw();
-    /// Takes a surface point that the tool has asked for (PointUse::edit). Returns whether it was the tool's.
+    /// Takes a surface point that the tool has asked for (PointUse::edit, color). Returns whether it was the tool's.
     bool take_point(const SurfacePoint& point);
 
   private:
