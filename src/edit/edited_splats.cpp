@@ -109,10 +109,10 @@ void EditedSplats::set_states(std::vector<uint8_t> states) {
     states_ = std::move(states);
 }
 
-std::vector<uint32_t> EditedSplats::affected_splats() const {
+std::vector<uint32_t> EditedSplats::affected_splats(bool all) const {
     std::vector<uint32_t> indices;
     for (size_t i = 0; i < size(); ++i)
-        if (affected(i)) indices.push_back(uint32_t(i));
+        if (all || affected(i)) indices.push_back(uint32_t(i));
     return indices;
 }
 
@@ -154,8 +154,8 @@ void EditedSplats::set_values(const std::vector<uint32_t>& indices, Gaussians va
     for (size_t k = 0; k < indices.size(); ++k) scene::copy_splats(values, k, 1, splats, indices[k]);
 }
 
-void EditedSplats::change(const ValueEdit& edit) {
-    const std::vector<uint32_t> indices = affected_splats();
+void EditedSplats::change(const ValueEdit& edit, bool all) {
+    const std::vector<uint32_t> indices = affected_splats(all);
     if (indices.empty()) return;
     glm::dvec3 origin = now_->origin;
     Gaussians values =

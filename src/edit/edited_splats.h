@@ -66,9 +66,9 @@ class EditedSplats {
 
     /// Sets the states of all splats. Requires size() of them.
     void set_states(std::vector<uint8_t> states);
-    /// Changes the values of the affected splats. Throws InputError, and changes nothing, for a transform that is no affine one, and
-    /// where values leave the range of float32.
-    void change(const ValueEdit& edit);
+    /// Changes the values of the affected splats, or of all. Throws InputError, and changes nothing, for a transform that is no affine
+    /// one, and where values leave the range of float32.
+    void change(const ValueEdit& edit, bool all = false);
     /// Appends a copy of each affected splat, and selects the copies in place of the originals.
     void duplicate();
 
@@ -88,7 +88,7 @@ class EditedSplats {
         ValueEdit edit;
         glm::dvec3 origin;  // of the splats after the edit
     };
-    std::vector<uint32_t> affected_splats() const;
+    std::vector<uint32_t> affected_splats(bool all = false) const;
     const glm::dvec3& origin_of(uint32_t group) const;
     Gaussians first_values(std::vector<uint32_t> indices) const;
     Gaussians values_of(uint32_t group, const std::vector<uint32_t>& indices) const;

@@ -63,10 +63,11 @@ Edit fixed(const char* text) {
 }
 
 Edit transform(const std::string& value) {
+    const bool all = value.starts_with(kAllSplats);
     return {.text = "--transform",
-            .place = [step = parse_transform({value})](const glm::dmat4& before, auto&) {
-                return step * before;
-            }};
+            .place = [step = parse_transform({all ? value.substr(kAllSplats.size()) : value})](
+                         const glm::dmat4& before, auto&) { return step * before; },
+            .all = all};
 }
 
 Edit scale_to(const std::string& value) {
@@ -184,8 +185,8 @@ Edit adjust(const std::string& value) {
 constexpr std::array kRows{
     Row{"transform", "STEP",
         "Of the joined scene: move=x,y,z, turn=x,y,z,degrees, scale=s, or a matrix of 12 or 16 numbers, row "
-        "by "
-        "row. Axes are those of a PLY: y down, z forward",
+        "by row. Axes are those of a PLY: y down, z forward. After --select, all: before it moves every "
+        "splat, also locked and hidden ones",
         transform, "move=x,y,z, turn=x,y,z,degrees or scale=s"},
     Row{"scale-to", "x,y,z,X,Y,Z,LENGTH",
         "Scale the joined scene until these two points are LENGTH apart; they are its points before the "
@@ -267,7 +268,7 @@ class Chain {
     }
 
     void perform(const Edit& edit) {
-        if (edit.act || (edit.place && selection_)) return act(edit);
+        if (edit.act || (edit.place && (selection_ || edit.all))) return act(edit);
         if (edit.place) return steps_.add(edit, applied_.remarks);
         end_selection();
         place();
@@ -301,8 +302,11 @@ class Chain {
         EditedSplats& splats = *selection_;
         const size_t before = splats.left();
         const bool selects = edit.text.starts_with("--select "), none = splats.count(kSelected) == 0;
-        perform_on(splats, edit);
-        if (none && !selects && !edit.text.starts_with("--un"))
+        acted_ = acted_ || edit.act;
+        Edit now = edit;
+        now.all = edit.all || !acted_;  // without --select, each place edit moves the scene
+        perform_on(splats, now);
+        if (none && !now.all && !selects && !edit.text.starts_with("--un"))
             applied_.warnings.push_back(edit.text + " changed nothing: no splat is selected");
         if (selects && splats.count(kSelected) == 0 && edit.text != "--select none")
             applied_.warnings.push_back(edit.text.substr(0, kShown) + " selects no splat");
@@ -320,6 +324,7 @@ class Chain {
         applied_.left = std::move(left);
         gaussians_ = selection_->result();
         selection_.reset();
+        acted_ = false;
     }
 
     void place() { applied_.moved = steps_.apply(gaussians_) || applied_.moved; }
@@ -340,6 +345,7 @@ class Chain {
     Applied applied_;
     Steps steps_;
     std::optional<EditedSplats> selection_;
+    bool acted_ = false;  // an edit has selected splats since selection_ began
 };
 
 }  // namespace
@@ -357,7 +363,7 @@ Edit parse(std::string_view name, const std::string& value) {
 void perform_on(EditedSplats& splats, const Edit& edit) {
     if (edit.act) return edit.act(splats);
     std::vector<std::string> remarks;
-    splats.change(edit.place(glm::dmat4(1.0), remarks));
+    splats.change(edit.place(glm::dmat4(1.0), remarks), edit.all);
 }
 
 Applied apply(Gaussians& gaussians, std::span<const Edit> edits, const Cameras& cameras) {

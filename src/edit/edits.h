@@ -21,6 +21,7 @@ struct Edit {
     /// Transforms the scene. before: the matrix of the place edits directly before this one, which is not applied yet. Returns the
     /// matrix of all of them, this one included. May add a line for the user to `remarks`.
     std::function<glm::dmat4(const glm::dmat4& before, std::vector<std::string>& remarks)> place = {};
+    bool all = false;  // `place` moves all splats, also those that are not selected, locked or hidden
     /// Merges, reduces or sorts splats.
     std::function<void(Gaussians&)> change = {};
     /// Selects splats, or changes the selected ones.
@@ -35,12 +36,15 @@ struct Row {
     const char* brief = "";  // text of the short help; empty: only the whole help has the edit
 };
 
+/// A value of --transform that begins with it moves all splats.
+inline constexpr std::string_view kAllSplats = "all:";
+
 std::span<const Row> rows();
 
 /// The edit of this name, without dashes. Throws InputError for a value that cannot be read.
 Edit parse(std::string_view name, const std::string& value = "");
 
-/// Performs an edit with `act` or `place`. A place edit moves the selected splats. Throws InputError, and has changed nothing then.
+/// Performs an edit with `act` or `place`. A place edit moves the selected splats, or all of them (Edit::all). Throws InputError, and has changed nothing then.
 void perform_on(EditedSplats& splats, const Edit& edit);
 
 struct Outcome {
@@ -59,7 +63,7 @@ struct Applied {
 };
 
 /// Applies the edits in order. Consecutive place edits transform the scene once. After --select, edits with `act` and place edits
-/// change the selected splats alone, each by itself, until a filter or a change ends the selection. cameras: those of the splats' run,
+/// change the selected splats alone (but for Edit::all), each by itself, until a filter or a change ends the selection. cameras: those of the splats' run,
 /// in the world before any edit. Throws InputError that names the edit.
 Applied apply(Gaussians& gaussians, std::span<const Edit> edits, const Cameras& cameras = {});
 

@@ -104,7 +104,7 @@ Step random_step(Random& random) {
     const auto point = [&] { return number(-4, 4) + "," + number(-4, 4) + "," + number(-4, 4); };
     const char* operations[] = {"", "add:", "remove:", "and:"};
     const std::string operation = operations[random.integer(0, 3)];
-    switch (random.integer(0, 12)) {
+    switch (random.integer(0, 13)) {
         case 0:
             return selection(operation + "sphere=" + point() + "," + number(1, 5));
         case 1:
@@ -129,6 +129,8 @@ Step random_step(Random& random) {
             return step({{random.integer(0, 1) != 0 ? "hide" : "unhide", ""}});
         case 11:
             return step({{"reset", ""}});
+        case 12:
+            return step({{"transform", "all:move=" + point()}});
         default:
             return selection(
                 polygon_shape(camera_at({0, 0, 8}), {{random.uniform(0, 200), 10}, {150, 20}, {90, 90}}));
@@ -272,6 +274,29 @@ TEST(Selection, IsWhatEditsChange) {
             EXPECT_EQ(history.splats().splats()->sh[splats->sh_stride() * i + k],
                       expected.sh[splats->sh_stride() * i + k]);
     }
+}
+
+/// The unit and the origin are of the whole scene.
+TEST(Selection, LeavesNothingBehindWhereAllIsMoved) {
+    const Gaussians g = balls({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}}, 0.1);
+    const std::vector<Words> edits{{"select", "x=0.5..1.5"}, {"lock", ""},
+                                   {"select", "x=1.5..2.5"}, {"hide", ""},
+                                   {"select", "x=2.5.."},    {"transform", "all:move=0,5,0"}};
+    History history(std::make_shared<const Gaussians>(g));
+    ASSERT_TRUE(history.perform(step(edits)));
+    for (size_t i = 0; i < 4; ++i) EXPECT_EQ(history.splats().splats()->means[3 * i + 1], 5.0f) << i;
+    EXPECT_EQ(history.splats().states(), (std::vector<uint8_t>{0, kLocked, kHidden, kSelected}));
+    expect_same_bytes(replayed(g, edits), history.splats().result());
+    ASSERT_TRUE(history.undo());
+    EXPECT_EQ(history.splats().splats()->means, g.means);
+    // Before any selection, the bytes are those of the window, and what follows moves the scene too.
+    const auto splats = some_splats(30);
+    History whole(splats);
+    for (const char* value : {"all:scale=3.1", "all:turn=1,2,3,40", "all:move=0.3,0,1"})
+        whole.perform(step({{"transform", value}}));
+    expect_same_bytes(replayed(*splats, whole.edits()), whole.splats().result());
+    const auto moved = replayed(g, {{"transform", "all:move=0,5,0"}, {"transform", "move=0,1,0"}});
+    for (size_t i = 0; i < 4; ++i) EXPECT_EQ(moved.means[3 * i + 1], 6.0f) << i;
 }
 
 TEST(Selection, AdjustsColoursByTheFormula) {
