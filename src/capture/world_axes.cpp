@@ -10,9 +10,8 @@
 #include <vector>
 
 #include "capture/gps_axes.h"
-#include "core/random.h"
 #include "ewa/error.h"
-#include "scene/splat_shape.h"
+#include "scene/planes.h"
 #include "scene/statistics.h"
 
 namespace ewa::capture {
@@ -41,48 +40,14 @@ std::vector<Shot> shots_of(const SparseModel& model, const std::map<std::string,
     return shots;
 }
 
-/// The axes of a symmetric matrix by its values, the smallest first.
-struct Axes {
-    std::array<double, 3> values{};
-    std::array<glm::dvec3, 3> directions{};
-};
-
-Axes axes_of(const glm::dmat3& symmetric) {
-    const scene::Decomposition d = scene::decompose(symmetric);
-    std::array<int, 3> order{0, 1, 2};
-    std::ranges::sort(order, {}, [&](int k) { return d.s[k]; });
-    Axes axes;
-    for (size_t i = 0; i < 3; ++i) {
-        axes.values[i] = d.s[order[i]];
-        axes.directions[i] = d.v[order[i]];
-    }
-    return axes;
-}
-
-/// The mean squares of points about their mean, along and across their axes.
-struct Spread {
-    glm::dvec3 mean{0};
-    Axes axes;
-};
-
-Spread spread_of(const std::vector<glm::dvec3>& points) {
-    Spread spread;
-    for (const glm::dvec3& point : points) spread.mean += point / double(points.size());
-    glm::dmat3 products(0);
-    for (const glm::dvec3& point : points)
-        products += glm::outerProduct(point - spread.mean, point - spread.mean) / double(points.size());
-    spread.axes = axes_of(products);
-    return spread;
-}
-
 /// Whether the photos look along one direction from places in a plane across it, as those of an aerial survey do.
 bool are_a_survey(const std::vector<Shot>& shots, const glm::dvec3& mean_forward) {
     constexpr double kAlike = 0.9, kFlat = 0.2, kWide = 0.2;
     if (glm::length(mean_forward) < kAlike) return false;
     std::vector<glm::dvec3> centers;
     for (const Shot& shot : shots) centers.push_back(shot.center);
-    const auto& [low, middle, high] = spread_of(centers).axes.values;
-    const glm::dvec3 normal = spread_of(centers).axes.directions[0];
+    const auto& [low, middle, high] = scene::spread_of(centers).axes.values;
+    const glm::dvec3 normal = scene::spread_of(centers).axes.directions[0];
     const double across = std::abs(glm::dot(normal, glm::normalize(mean_forward)));
     return low < kFlat * kFlat * middle && middle > kWide * kWide * high && across > kAlike;
 }
@@ -98,7 +63,7 @@ std::optional<Up> up_of(const std::vector<Shot>& shots) {
         up += shot.up / count;
         forward += shot.forward / count;
     }
-    Axes axes;
+    scene::Axes axes;
     glm::dvec3 level(0);  // square to the cameras' horizontal axes
     for (int round = 0; round < kRounds; ++round) {
         glm::dmat3 products(0);
@@ -108,7 +73,7 @@ std::optional<Up> up_of(const std::vector<Shot>& shots) {
             products += weight * glm::outerProduct(shot.right, shot.right);
             sum += weight;
         }
-        axes = axes_of(products / sum);
+        axes = scene::axes_of(products / sum);
         level = axes.directions[0];
     }
     std::vector<double> tilts;
@@ -162,44 +127,14 @@ class Ground {
     }
 
     std::optional<glm::dvec3> normal() const {
-        constexpr size_t kLeast = 50;
-        constexpr uint32_t kTries = 3000;
-        constexpr double kShare = 0.1;  // of the points
-        constexpr int kRounds = 5;
-        constexpr double kWide = 5;  // thicknesses that the ground is wide
-        if (points_.size() < kLeast || !(thickness_ > 0)) return {};
-        Plane best;
-        size_t most = 0;
-        for (uint32_t i = 0; i < kTries; ++i) {
-            const auto u = core::uniform4({i, 1, 0, 0});
-            std::array<glm::dvec3, 3> corners;
-            for (size_t k = 0; k < 3; ++k) corners[k] = points_[size_t(u[k] * double(points_.size()))];
-            const glm::dvec3 normal = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
-            if (!(glm::length(normal) > 0)) continue;
-            Plane plane{glm::normalize(normal), corners[0]};
-            if (!lies_below(plane)) continue;
-            if (const size_t count = on(plane).size(); count > most) {
-                most = count;
-                best = plane;
-            }
-        }
-        if (double(most) < std::max(kShare * double(points_.size()), double(kLeast))) return {};
-        for (int round = 0; round < kRounds; ++round) {
-            const Spread spread = spread_of(on(best));
-            if (std::sqrt(spread.axes.values[1]) < kWide * thickness_) return {};
-            best = {spread.axes.directions[0], spread.mean};
-            if (!lies_below(best) || on(best).size() < kLeast) return {};
-        }
-        return best.normal;
+        const auto plane = scene::largest_plane(points_, thickness_,
+                                                [this](scene::Plane& found) { return lies_below(found); });
+        return plane ? std::optional(plane->normal) : std::nullopt;
     }
 
   private:
-    struct Plane {
-        glm::dvec3 normal{0}, at{0};
-    };
-
     /// Whether most cameras are on one side, to which the normal then points, and up is near it.
-    bool lies_below(Plane& plane) const {
+    bool lies_below(scene::Plane& plane) const {
         constexpr double kMostCameras = 0.9;
         const double near = std::cos(glm::radians(up_ && up_->sure ? 8.0 : 20.0));
         size_t above = 0;
@@ -211,13 +146,6 @@ class Ground {
         }
         return double(above) >= kMostCameras * double(centers_.size()) &&
                (!up_ || glm::dot(plane.normal, up_->direction) > 0);
-    }
-
-    std::vector<glm::dvec3> on(const Plane& plane) const {
-        std::vector<glm::dvec3> found;
-        for (const glm::dvec3& point : points_)
-            if (std::abs(glm::dot(point - plane.at, plane.normal)) < thickness_) found.push_back(point);
-        return found;
     }
 
     std::optional<Up> up_;
