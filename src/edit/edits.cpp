@@ -14,10 +14,12 @@
 #include "core/text.h"
 #include "core/typing.h"
 #include "edit/edited_splats.h"
+#include "edit/ground.h"
 #include "edit/shapes.h"
 #include "edit/steps.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
+#include "scene/framing.h"
 
 namespace ewa::edit {
 namespace {
@@ -62,8 +64,18 @@ Edit fixed(const char* text) {
     return {.text = text, .filter = [](const Gaussians& g, const Cameras&) { return stay(g); }};
 }
 
+void level_by_ground(EditedSplats& splats) {
+    const glm::dvec3 up = scene::guessed_up(*splats.splats());
+    const auto matrix = level_ground(*splats.splats(), splats.states(), up);
+    if (!matrix)
+        throw InputError(
+            "--transform: level=ground finds no ground: no plane below the scene has a tenth of its splats");
+    splats.change(*matrix, true);
+}
+
 Edit transform(const std::string& value) {
     const bool all = value.starts_with(kAllSplats);
+    if (value == "level=ground") return {.text = "--transform", .act = level_by_ground, .all = true};
     return {.text = "--transform",
             .place = [step = parse_transform({all ? value.substr(kAllSplats.size()) : value})](
                          const glm::dmat4& before, auto&) { return step * before; },
@@ -184,7 +196,8 @@ Edit adjust(const std::string& value) {
 
 constexpr std::array kRows{
     Row{"transform", "STEP",
-        "Of the joined scene: move=x,y,z, turn=x,y,z,degrees, scale=s, or a matrix of 12 or 16 numbers, row "
+        "Of the joined scene: move=x,y,z, turn=x,y,z,degrees, scale=s, level=ground (the lowest plane), or a "
+        "matrix of 12 or 16 numbers, row "
         "by row. Axes are those of a PLY: y down, z forward. After --select, all: before it moves every "
         "splat, also locked and hidden ones",
         transform, "move=x,y,z, turn=x,y,z,degrees or scale=s"},
@@ -302,7 +315,7 @@ class Chain {
         EditedSplats& splats = *selection_;
         const size_t before = splats.left();
         const bool selects = edit.text.starts_with("--select "), none = splats.count(kSelected) == 0;
-        acted_ = acted_ || edit.act;
+        acted_ = acted_ || (edit.act && !edit.all);
         Edit now = edit;
         now.all = edit.all || !acted_;  // without --select, each place edit moves the scene
         perform_on(splats, now);
@@ -313,7 +326,7 @@ class Chain {
         if (splats.left() != before)
             applied_.outcomes.push_back({edit.text, splats.left() < before, before, splats.left()});
         applied_.left.resize(splats.size(), kNew);
-        applied_.moved = applied_.moved || edit.place;
+        applied_.moved = applied_.moved || edit.place || edit.all;
     }
 
     void end_selection() {

@@ -21,11 +21,11 @@ struct Edit {
     /// Transforms the scene. before: the matrix of the place edits directly before this one, which is not applied yet. Returns the
     /// matrix of all of them, this one included. May add a line for the user to `remarks`.
     std::function<glm::dmat4(const glm::dmat4& before, std::vector<std::string>& remarks)> place = {};
-    bool all = false;  // `place` moves all splats, also those that are not selected, locked or hidden
     /// Merges, reduces or sorts splats.
     std::function<void(Gaussians&)> change = {};
     /// Selects splats, or changes the selected ones.
     std::function<void(EditedSplats&)> act = {};
+    bool all = false;  // it moves all splats, also those that are not selected, locked or hidden
 };
 
 struct Row {

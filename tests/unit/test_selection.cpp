@@ -8,6 +8,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "edit/edits.h"
+#include "edit/ground.h"
 #include "edit/history.h"
 #include "edit/shapes.h"
 #include "ewa/error.h"
@@ -297,6 +298,37 @@ TEST(Selection, LeavesNothingBehindWhereAllIsMoved) {
     expect_same_bytes(replayed(*splats, whole.edits()), whole.splats().result());
     const auto moved = replayed(g, {{"transform", "all:move=0,5,0"}, {"transform", "move=0,1,0"}});
     for (size_t i = 0; i < 4; ++i) EXPECT_EQ(moved.means[3 * i + 1], 6.0f) << i;
+}
+
+/// A ground that slopes by 15 degrees, with things on it and a few splats below.
+TEST(Ground, BecomesLevel) {
+    Random random(40);
+    const glm::dvec3 normal = glm::normalize(glm::dvec3(0.2, -1, 0.15)), at(3, 2, -1);
+    const glm::dvec3 u = glm::normalize(glm::cross(normal, glm::dvec3(0, 0, 1))), v = glm::cross(normal, u);
+    std::vector<glm::dvec3> means;
+    for (int i = 0; i < 3000; ++i) {
+        const double height = i < 1500 ? random.uniform(-0.01, 0.01) : random.uniform(i < 1600 ? -3 : 0, 4);
+        const double wide = i < 1600 ? 10 : 3;
+        means.push_back(at + u * random.uniform(-wide, wide) + v * random.uniform(-wide, wide) +
+                        normal * height);
+    }
+    Gaussians g = balls(means, 0.05);
+    const std::vector<uint8_t> states(g.size());
+    const auto matrix = level_ground(g, states, {0, -1, 0});
+    ASSERT_TRUE(matrix);
+    const glm::dvec3 turned = glm::dmat3(*matrix) * normal;
+    EXPECT_NEAR(turned.y, -1, 1e-5);
+    EXPECT_NEAR((*matrix * glm::dvec4(at, 1)).y, 0, 0.02);
+    EXPECT_FALSE(level_ground(g, std::vector<uint8_t>(g.size(), kDeleted), {0, -1, 0}));
+    EXPECT_FALSE(level_ground(g, states, {1, 0, 0})) << "it is a wall then";
+    // ewa convert does the same, whatever is selected.
+    History history(std::make_shared<const Gaussians>(g));
+    history.perform(selection("x=0.."));
+    ASSERT_TRUE(history.perform(step({{"transform", "level=ground"}})));
+    expect_same_bytes(replayed(g, history.edits()), history.splats().result());
+    EXPECT_NEAR(history.splats().splats()->means[1], 0, 0.02);
+    for (float& mean : g.means) mean = float(random.uniform(-1, 1));
+    expect_error<InputError>([&] { replayed(g, {{"transform", "level=ground"}}); }, {"finds no ground"});
 }
 
 TEST(Selection, AdjustsColoursByTheFormula) {

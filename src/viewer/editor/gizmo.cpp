@@ -10,6 +10,7 @@
 #include <limits>
 #include <utility>
 
+#include "edit/ground.h"
 #include "scene/native_lens.h"
 
 namespace ewa::viewer {
@@ -128,14 +129,7 @@ std::optional<glm::dmat4> level_matrix(const std::array<glm::dvec3, 3>& points, 
     const double longest = std::max({glm::dot(a, a), glm::dot(b, b), glm::dot(c, c)});
     if (!(area > 1e-3 * longest)) return std::nullopt;
     normal *= (glm::dot(normal, viewer) < 0 ? -1 : 1) / area;
-    const glm::dvec3 up(0, -1, 0), axis = glm::cross(normal, up);
-    const double sine = glm::length(axis);
-    const glm::dmat3 turn =
-        turn_about(sine > 1e-12 ? axis / sine : glm::dvec3(1, 0, 0), std::atan2(sine, glm::dot(normal, up)));
-    const glm::dvec3 middle = (points[0] + points[1] + points[2]) / 3.0;
-    glm::dmat4 matrix = about(middle, turn);
-    matrix[3].y -= middle.y;
-    return matrix;
+    return edit::level_plane({normal, (points[0] + points[1] + points[2]) / 3.0});
 }
 
 Camera carried(const Camera& camera, const glm::dmat4& matrix) {
