@@ -9,12 +9,14 @@ namespace ewa::viewer {
 
 struct Message {
     using Clock = std::chrono::steady_clock;
-    std::string note;  // the last one; the panel shows it after the picture
+    std::string note;         // the last one; the panel shows it after the picture
+    bool until_edit = false;  // the next edit removes it
     Clock::time_point note_until{}, hint_until{};
     static constexpr std::chrono::seconds kFade{2};
 
-    void say(const std::string& text) {
+    void say(const std::string& text, bool until_next_edit = false) {
         note = text;
+        until_edit = until_next_edit;
         note_until = Clock::now() + std::chrono::seconds(10);
     }
     void hint() { hint_until = Clock::now() + std::chrono::seconds(15); }

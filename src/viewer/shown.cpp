@@ -69,12 +69,11 @@ void Shown::take_point(const SurfacePoint& point) {
     }
     const bool measured = point.use == PointUse::measure;
     if (!point.place) {
-        state_.say(measured ? "no splat is opaque enough here to measure"
-                            : "no splat is opaque enough here to look at");
+        state_.say("no splat is opaque enough here", true);
     } else if (measured) {
         measurement.add(*point.place);
         if (!measurement.complete()) return;
-        state_.say(measurement.text());
+        state_.say("Distance " + measurement.label(), true);
         std::puts(measurement.text().c_str());  // to be copied
         std::fflush(stdout);
     } else {

@@ -61,8 +61,8 @@ ViewState::ViewState(const Startup& asked)
       device_name(asked.device.name),
       loop{.capture = asked.picture.has_value(), .times = asked.times} {}
 
-void ViewState::say(const std::string& note) {
-    message.say(note);
+void ViewState::say(const std::string& note, bool until_edit) {
+    message.say(note, until_edit);
     redraw(Loop::kRedraws);
 }
 

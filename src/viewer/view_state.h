@@ -83,10 +83,10 @@ struct ViewState {
 
     bool scripted() const { return startup.picture.has_value(); }
     void redraw(int frames = 1) { loop.redraws = std::max(loop.redraws, frames); }
-    void say(const std::string& note);
-    double text_height() const;  // px of the framebuffer
-    int panel_width() const;     // px of the framebuffer, also while it is hidden
-    bool panel_fits() const;     // the window has room for the panel beside the picture
+    void say(const std::string& note, bool until_edit = false);  // as Message::say
+    double text_height() const;                                  // px of the framebuffer
+    int panel_width() const;  // px of the framebuffer, also while it is hidden
+    bool panel_fits() const;  // the window has room for the panel beside the picture
     bool empty() const { return scene.title.empty() && !scene.dataset && scene.gaussians->size() == 0; }
     bool panel_shown() const { return !scripted() && !empty() && (panel_fits() ? panel_beside : panel_over); }
     /// The place of the panel: beside the picture and the bars, or over the picture.

@@ -12,6 +12,7 @@ namespace ewa::viewer {
 
 /// What the window shows of a scene after the last finished edit. It never changes.
 struct EditSnapshot {
+    uint64_t scene = 0;  // EditedScene::id
     std::shared_ptr<const Gaussians> splats;
     std::shared_ptr<const std::vector<uint8_t>> states;
     edit::Cameras cameras;  // of the splats' run, while no splat has moved

@@ -176,6 +176,7 @@ std::shared_ptr<const EditSnapshot> EditWorker::snapshot() const {
     if (found == scenes_.end()) return result;
     const edit::History& history = *found->second.history;
     const edit::EditedSplats& splats = history.splats();
+    result->scene = active_;
     result->splats = splats.splats();
     result->states = std::make_shared<const std::vector<uint8_t>>(splats.states());
     result->cameras = splats.cameras();

@@ -11,6 +11,7 @@
 #include "viewer/editor/edit_words.h"
 #include "viewer/editor/edit_worker.h"
 #include "viewer/editor/publish.h"
+#include "viewer/editor/texts.h"
 
 namespace ewa::viewer {
 namespace {
@@ -189,6 +190,14 @@ void Editor::separate() {
 
 void Editor::perform(edit::Step step) {
     if (scenes_.empty()) return;
+    const auto states_alone = [](const edit::Words& words) {
+        return words.name == "select" || words.name == "delete" || words.name.ends_with("lock") ||
+               words.name.ends_with("hide");
+    };
+    if (settings.live && !std::ranges::all_of(step.edits, states_alone)) {
+        note_ = texts::kLiveRefuses;
+        return;
+    }
     if (step.title.empty()) step.title = selection_title(step.edits.front().value);
     worker_->perform(now().id, std::move(step));
 }
@@ -203,7 +212,10 @@ void Editor::select(const std::string& shape) {
 }
 
 void Editor::undo() {
-    if (!scenes_.empty()) worker_->undo(now().id);
+    if (settings.live && snapshot_->done <= settings.sent)
+        note_ = snapshot_->done > 0 ? texts::kLiveUndo : "";
+    else if (!scenes_.empty())
+        worker_->undo(now().id);
 }
 
 void Editor::redo() {

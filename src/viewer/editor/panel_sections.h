@@ -14,6 +14,7 @@
 #include "viewer/editor/editor.h"
 #include "viewer/editor/histogram.h"
 #include "viewer/editor/panel_controls.h"
+#include "viewer/editor/texts.h"
 #include "viewer/latest.h"
 
 namespace ewa::viewer {

@@ -5,8 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/trigonometric.hpp>
 #include <utility>
 
+#include "edit/edits.h"
+#include "edit/ground.h"
 #include "viewer/editor/texts.h"
 #include "viewer/editor/theme.h"
 
@@ -21,7 +24,7 @@ void PickTools::click(const ToolPicture& picture) {
 bool PickTools::take_point(const SurfacePoint& point) {
     if (asked_ == Tool::view || asked_ != room_.settings().tool) return false;
     if (!point.place) {
-        room_.state.say(texts::kNoSurface);
+        room_.say(texts::kNoSurface);
     } else if (asked_ == Tool::flood) {
         room_.select(fmt::format("flood={},{:.4g}", point_text(*point.place), room_.settings().tolerance),
                      operation_);
@@ -34,31 +37,48 @@ bool PickTools::take_point(const SurfacePoint& point) {
     } else if (asked_ == Tool::level) {
         add_level_point(*point.place);
     } else if (asked_ == Tool::origin) {
-        glm::dmat4 matrix(1.0);
-        matrix[3] = glm::dvec4(-*point.place, 1);
-        room_.transform("Set origin", "move=" + point_text(-*point.place), true);
-        room_.move_view(matrix);
+        move_all("Set origin", "move=" + point_text(-*point.place));
     }
     return true;
 }
 
+/// Moves every splat. The view follows with the edit.
+void PickTools::move_all(const char* title, const std::string& step) const {
+    room_.perform(title, "transform", std::string(edit::kAllSplats) + step);
+}
+
 void PickTools::add_level_point(const glm::dvec3& point) {
     points_.push_back(point);
-    if (points_.size() < 3) return;
+    if (points_.size() < 3) return say_points();
     const std::array<glm::dvec3, 3> three{points_[0], points_[1], points_[2]};
     points_.clear();
-    const auto matrix = level_matrix(three, towards_viewer(room_.shown.camera(), three[0]));
-    if (!matrix) return room_.state.say(texts::kNoLevel);
-    room_.transform("Level", matrix_text(*matrix), true);
-    room_.move_view(*matrix);
-    room_.navigation.view.set_up({0, -1, 0});
+    level(level_matrix(three, towards_viewer(room_.shown.camera(), three[0])), texts::kNoLevel);
+}
+
+void PickTools::find_ground() {
+    const EditSnapshot& now = room_.editor.snapshot();
+    points_.clear();
+    if (now.splats)
+        level(edit::level_ground(*now.splats, *now.states, room_.navigation.view.up()), texts::kNoGround);
+}
+
+void PickTools::level(const std::optional<glm::dmat4>& matrix, const char* problem) {
+    std::string& progress = room_.settings().progress;
+    progress.clear();
+    if (!matrix) return room_.say(problem);
+    const double cosine = ((*matrix)[0][0] + (*matrix)[1][1] + (*matrix)[2][2] - 1) / 2;
+    progress = fmt::format(texts::kTurnedBy, glm::degrees(std::acos(std::clamp(cosine, -1.0, 1.0))));
+    move_all("Level", matrix_text(*matrix));
+}
+
+void PickTools::say_points() const {
+    room_.settings().progress =
+        points_.empty() ? std::string() : fmt::format(texts::kPointOf, points_.size() + 1);
 }
 
 void PickTools::set_unit(double factor) const {
     if (!(factor > 0 && std::isfinite(factor)) || factor == 1) return;
-    room_.transform("Set unit", fmt::format("scale={:.9g}", factor), true);
-    room_.move_view(about(glm::dvec3(0), glm::dmat3(factor)));
-    for (glm::dvec3& point : room_.shown.measurement.points) point *= factor;
+    move_all("Set unit", fmt::format("scale={:.9g}", factor));
 }
 
 /// Beside the label of the measurement.
@@ -76,9 +96,11 @@ void PickTools::length_field(const ToolPicture& picture) {
                             ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                             ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav;
     if (ImGui::Begin("length", nullptr, kFlags)) {
+        ImGui::AlignTextToFramePadding();
+        ImGui::TextUnformatted(texts::kTrueLength);
+        ImGui::SameLine();
         ImGui::SetNextItemWidth(6 * line);
-        if (ImGui::InputDouble(texts::kTrueLength, &length_, 0, 0, "%.6g",
-                               ImGuiInputTextFlags_EnterReturnsTrue))
+        if (ImGui::InputDouble("##length", &length_, 0, 0, "%.4g", ImGuiInputTextFlags_EnterReturnsTrue))
             set_unit(length_ / distance);
     }
     ImGui::End();
@@ -87,12 +109,14 @@ void PickTools::length_field(const ToolPicture& picture) {
 bool PickTools::remove_last() {
     if (points_.empty()) return false;
     points_.pop_back();
+    say_points();
     return true;
 }
 
 bool PickTools::cancel() {
     const bool any = !points_.empty();
     points_.clear();
+    room_.settings().progress.clear();
     asked_ = Tool::view;
     return any;
 }

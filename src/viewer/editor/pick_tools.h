@@ -13,12 +13,17 @@ class PickTools {
     bool take_point(const SurfacePoint& point);
     /// Removes the last of the clicked points. Returns whether there was one.
     bool remove_last();
+    /// Levels the scene by the ground that is found.
+    void find_ground();
     /// Draws the clicked points, and the field for the true length of a measurement.
     void draw(const ToolPicture& picture);
     bool cancel();
 
   private:
     void add_level_point(const glm::dvec3& point);
+    void level(const std::optional<glm::dmat4>& matrix, const char* problem);
+    void say_points() const;
+    void move_all(const char* title, const std::string& step) const;
     void set_unit(double factor) const;
     void length_field(const ToolPicture& picture);
 

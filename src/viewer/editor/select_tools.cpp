@@ -36,7 +36,7 @@ void SelectTools::press(const ToolPicture& picture) {
     }
     if (!points_.empty() && !same_picture(camera_, picture.camera)) {
         points_.clear();
-        room_.state.say(texts::kPolygonViewChanged);
+        room_.say(texts::kPolygonViewChanged);
     }
     const bool closes =
         points_.size() >= 3 && glm::length(picture.pointer - points_[0]) < kHandleReach * picture.unit;
@@ -84,7 +84,7 @@ void SelectTools::end_polygon() {
     if (same_picture(camera_, room_.shown.camera()))
         room_.select(edit::polygon_shape(camera_, corners), room_.operation());
     else
-        room_.state.say(texts::kPolygonViewChanged);
+        room_.say(texts::kPolygonViewChanged);
 }
 
 bool SelectTools::key(const KeyPress& press) {
@@ -133,6 +133,7 @@ void SelectTools::draw(const ToolPicture& picture) const {
         std::vector<glm::dvec2> corners = points_;
         corners.push_back(picture.pointer);
         pen.line(corners);
+        if (points_.size() >= 2) pen.line({picture.pointer, points_.front()}, accent(0.6f), 1);
         for (size_t i = 0; i < points_.size(); ++i) pen.knob(points_[i], i == 0 ? accent() : ToolPen::kLight);
     }
 }

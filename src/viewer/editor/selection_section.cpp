@@ -35,7 +35,11 @@ void edit_line(Editor& editor, std::initializer_list<ui::Button> buttons) {
 void change_states(Editor& editor, bool live) {
     const EditSnapshot& now = editor.snapshot();
     const bool any = now.selected > 0;
-    if (live) return edit_line(editor, {{say::kDelete, any, ui::ButtonLook::danger}, {say::kFreeze, any}});
+    if (live) {
+        edit_line(editor, {{say::kDelete, any, ui::ButtonLook::danger}, {say::kFreeze, any}});
+        if (ui::button_line({{say::kUnfreeze}}) == 0) editor.settings.unfreeze = true;
+        return;
+    }
     edit_line(editor, {{say::kLock, any}, {say::kUnlock, now.locked > 0}});
     edit_line(editor, {{say::kHide, any}, {say::kShow, now.hidden > 0}});
     edit_line(editor, {{say::kDelete, any, ui::ButtonLook::danger}, {say::kDuplicate, any}});

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <iterator>
 #include <numbers>
 #include <utility>
 
@@ -82,6 +83,7 @@ bool ShapeHandles::mouse(const ToolPicture& picture) {
         const auto ray = picture.ray();
         if (!handle || !ray) return false;
         const EditSettings& s = room_.settings();
+        dragged_sphere_ = sphere();
         const glm::dvec3 at = handles(picture.camera)[*handle];
         drag_ = Drag{*handle,        on_plane(*ray, at, towards_viewer(picture.camera, at)).value_or(at),
                      s.box_low,      s.box_high,
@@ -138,6 +140,19 @@ bool ShapeHandles::release() {
     return dragged;
 }
 
+bool ShapeHandles::cancel() {
+    if (!drag_) return false;
+    EditSettings& settings = room_.settings();
+    if (dragged_sphere_) {
+        settings.sphere_center = drag_->center;
+        settings.sphere_radius = drag_->radius;
+    } else {
+        settings.box_low = drag_->low;
+        settings.box_high = drag_->high;
+    }
+    return release();
+}
+
 void ShapeHandles::select(edit::Operation operation) const {
     const EditSettings& settings = room_.settings();
     room_.select(sphere() ? edit::sphere_shape(settings.sphere_center, settings.sphere_radius)
@@ -181,18 +196,18 @@ void ShapeHandles::buttons(const ToolPicture& picture, const std::vector<Segment
         if (const auto pixel = picture.pixel(segment.from)) lowest = std::max(lowest, pixel->y);
     const double margin = 60 * picture.unit;
     const glm::dvec2 size(picture.place.width, picture.place.height);
-    const glm::dvec2 at = glm::max(glm::dvec2(0), glm::min(glm::dvec2(center->x, lowest + margin / 4),
-                                                           size - glm::dvec2(2 * margin, margin)));
-    ImGui::SetNextWindowPos(picture.gui(at));
+    const double half = 3 * margin;  // more than half of their width
+    const glm::dvec2 at = glm::max(glm::dvec2(half, 0), glm::min(glm::dvec2(center->x, lowest + margin / 4),
+                                                                 size - glm::dvec2(half, margin)));
+    ImGui::SetNextWindowPos(picture.gui(at), ImGuiCond_Always, {0.5f, 0});
     constexpr auto kFlags = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
                             ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                             ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav;
     if (ImGui::Begin("shape", nullptr, kFlags)) {
-        if (ImGui::Button(texts::kShapeSelect)) select(edit::Operation::set);
-        ImGui::SameLine();
-        if (ImGui::Button(texts::kShapeAdd)) select(edit::Operation::add);
-        ImGui::SameLine();
-        if (ImGui::Button(texts::kShapeRemove)) select(edit::Operation::remove);
+        for (size_t i = 0; i < std::size(texts::kShapeButtons); ++i) {
+            if (i > 0) ImGui::SameLine();
+            if (ImGui::Button(texts::kShapeButtons[i])) select(edit::Operation(i));
+        }
     }
     ImGui::End();
 }

@@ -18,7 +18,8 @@ class ShapeHandles {
     void select(edit::Operation operation) const;
     /// Draws the shape and its buttons.
     void draw(const ToolPicture& picture);
-    bool cancel() { return release(); }
+    /// Ends a drag, and gives the shape back its place before.
+    bool cancel();
 
   private:
     struct Drag {
@@ -37,6 +38,7 @@ class ShapeHandles {
 
     const ToolRoom& room_;
     std::optional<Drag> drag_;
+    bool dragged_sphere_ = false;                              // else the box; a key may change the tool
     std::optional<std::filesystem::path> sphere_of_, box_of_;  // the scenes in which they have places
 };
 

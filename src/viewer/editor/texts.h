@@ -90,19 +90,22 @@ struct ToolText {
 };
 inline constexpr ToolText kTools[] = {
     {Tool::view, "View", "Esc", "Drag orbits, right drag moves, wheel zooms"},
-    {Tool::rectangle, "Rectangle", "R", "Drag a rectangle; Shift adds, Ctrl removes"},
-    {Tool::lasso, "Lasso", "L", "Draw round splats; Shift adds, Ctrl removes"},
-    {Tool::polygon, "Polygon", "P", "Click the corners; Enter or a click on the first one ends"},
-    {Tool::brush, "Brush", "B", "Paint over splats; [ and ] change the brush"},
-    {Tool::sphere, "Sphere", "N", "Click a centre, drag the handles; Enter selects"},
-    {Tool::box, "Box", "X", "Drag the handles of the box; Enter selects"},
-    {Tool::flood, "Flood", "O", "Click a splat: it and those that touch it, of like colour"},
-    {Tool::eyedropper, "Eyedropper", "I", "Click a colour: all splats that have it"},
-    {Tool::move, "Move", "1", "Drag an arrow; the selection moves, or everything"},
-    {Tool::rotate, "Rotate", "2", "Drag a ring"},
-    {Tool::scale, "Scale", "3", "Drag the square"},
-    {Tool::measure, "Measure", "M", "Click two points; type their true distance to set the unit"},
-    {Tool::level, "Level", "G", "Click three points of the ground"},
+    {Tool::rectangle, "Rectangle", "R", "Drag a rectangle; Shift adds, Ctrl removes, both intersect"},
+    {Tool::lasso, "Lasso", "L", "Draw round splats; Shift adds, Ctrl removes, Esc cancels"},
+    {Tool::polygon, "Polygon", "P",
+     "Click the corners; Enter, a double click or the first corner ends, Backspace takes one back"},
+    {Tool::brush, "Brush", "B", "Paint over splats; Shift adds, Ctrl removes, [ and ] change the brush"},
+    {Tool::sphere, "Sphere", "N", "Click a centre, drag the handles; Enter selects, Esc takes a drag back"},
+    {Tool::box, "Box", "X", "Drag the handles of the box; Enter selects, Esc takes a drag back"},
+    {Tool::flood, "Flood", "O",
+     "Click a splat: it and those that touch it, of like colour; Shift adds, Ctrl removes"},
+    {Tool::eyedropper, "Eyedropper", "I", "Click a splat: all of its colour; Shift adds, Ctrl removes"},
+    {Tool::move, "Move", "1", "Drag an arrow: the selection moves, or everything; Shift snaps, Esc cancels"},
+    {Tool::rotate, "Rotate", "2", "Drag a ring; Shift snaps to 15 degrees, Esc cancels"},
+    {Tool::scale, "Scale", "3", "Drag the middle to scale, an end to stretch; Shift snaps, Esc cancels"},
+    {Tool::measure, "Measure", "M", "Click two points; type their true length, Enter sets the unit"},
+    {Tool::level, "Level", "G",
+     "Click three points of the ground, Backspace takes one back; Enter finds the ground"},
     {Tool::origin, "Origin", "", "Click the point that becomes 0, 0, 0"},
 };
 
@@ -147,7 +150,8 @@ inline constexpr Item kLock{"Lock", "The selection is drawn, and no edit changes
     kDuplicate{"Duplicate", "Copy the selection, and select the copy", "", "duplicate", "", true},
     kSeparate{"Separate", "Make the selection a scene of its own"},
     kReset{"Reset", "Give the selection the values of the file back", "", "reset", "", true},
-    kFreeze{"Freeze", "The training changes the selection no more", "", "lock", "", true};
+    kFreeze{"Freeze", "The training changes the selection no more", "", "lock", "", true},
+    kUnfreeze{"Unfreeze all", "The training changes all splats again"};
 /// The edits that a key does.
 inline constexpr Item kKeyedEdits[] = {kAll,  kNone,   kInvert, kGrow, kShrink,
                                        kLock, kUnlock, kHide,   kShow, kDelete};
@@ -216,8 +220,17 @@ inline constexpr const char *kNeedsPinhole =
                             *kPolygonViewChanged = "the view has moved; click the corners again",
                             *kNoSurface = "no splat is opaque enough here",
                             *kNoLevel = "the three points are nearly on a line; click three others",
-                            *kShapeSelect = "Select", *kShapeAdd = "Add", *kShapeRemove = "Remove",
-                            *kTrueLength = "true length";
+                            *kLiveRefuses = "a training that runs takes selections, deletes and locks alone",
+                            *kLiveUndo = "the training has this edit already and cannot take it back",
+                            *kNewerSplats =
+                                "newer splats of the run wait until your edits are saved or undone",
+                            *kNoGround = "no ground is found; click three points of it",
+                            *kTrueLength = "True length",
+                            *kPointsEdited = "points of a dataset cannot be edited; train first",
+                            *kShapeButtons[] = {"Select", "Add", "Remove",
+                                                "Intersect"};  // as edit::Operation
+inline constexpr const char *kPointOf = "Level: point {} of 3",
+                            *kTurnedBy = "Level: turned by {:.1f} degrees";
 
 // The dialogs of files.
 namespace files {

@@ -33,13 +33,6 @@ void ToolRoom::perform(const char* title, const char* name, const std::string& v
     editor.perform({title, {{name, value}}});
 }
 
-void ToolRoom::transform(const char* title, const std::string& value, bool all) const {
-    if (all || editor.snapshot().selected == 0)
-        editor.perform({title, {{"select", "all"}, {"transform", value}, {"select", "none"}}});
-    else
-        perform(title, "transform", value);
-}
-
 void ToolRoom::move_view(const glm::dmat4& matrix) const {
     ViewCamera& view = navigation.view;
     const Size size = state.picture_area().size();
@@ -54,7 +47,7 @@ void ToolRoom::move_view(const glm::dmat4& matrix) const {
 bool ToolRoom::image_shapes_work() const {
     const Camera camera = shown.camera();
     if (camera.distortion.none() || camera.distortion.lens == Lens::orthographic) return true;
-    state.say(texts::kNeedsPinhole);
+    say(texts::kNeedsPinhole);
     ViewCamera& view = navigation.view;
     view.stand({scene::pinhole_at(camera), view.pivot(), view.up(), view.radius()});
     navigation.leave_camera();

@@ -27,9 +27,8 @@ struct ToolRoom {
     void select(const std::string& shape, edit::Operation operation) const;
     /// Performs a step of one edit.
     void perform(const char* title, const char* name, const std::string& value = "") const;
-    /// Transforms the selection; without one, or with `all`, every splat.
-    void transform(const char* title, const std::string& value, bool all) const;
-    /// Whether a selection exists, or may exist after the edits that are being done.
+    /// A message that the next edit removes.
+    void say(const std::string& text) const { state.say(text, true); }
     /// Moves the view with the splats. matrix: rotation, translation and one scale.
     void move_view(const glm::dmat4& matrix) const;
     /// Whether shapes in the image can select in this view. If not, says so and changes to a pinhole.

@@ -191,7 +191,7 @@ void draw_top(Editor& editor, const BarFacts& facts, const BarArea& area, BarAct
     ImGui::End();
 }
 
-void draw_strip(Editor& editor, const BarArea& area) {
+void draw_strip(Editor& editor, const BarFacts& facts, const BarArea& area) {
     const ImVec2 low(area.low.x, area.low.y + area.top),
         high(area.low.x + area.left, area.high.y - area.bottom);
     if (high.y - low.y < area.left) return;
@@ -200,10 +200,13 @@ void draw_strip(Editor& editor, const BarArea& area) {
         for (const texts::ToolText& tool : texts::kTools) {
             const bool first =
                 tool.tool == Tool::rectangle || tool.tool == Tool::move || tool.tool == Tool::measure;
+            const char* problem = facts.points && tool.tool != Tool::view ? texts::kPointsEdited
+                                  : facts.live && moves_splats(tool.tool) ? texts::kLiveRefuses
+                                                                          : nullptr;
             tools.push_back({Icon(tool.tool),
-                             {tool.name, tool.key, tool.hint},
+                             {tool.name, tool.key, problem ? problem : tool.hint},
                              [&editor, chosen = tool.tool] { editor.settings.tool = chosen; },
-                             true,
+                             !problem,
                              editor.settings.tool == tool.tool,
                              first});
         }
@@ -230,6 +233,7 @@ std::string status_text(const Editor& editor) {
         last.scene = editor.active();
         last.until = ImGui::GetTime() + kEditShown;
     }
+    if (!editor.settings.progress.empty()) return editor.settings.progress;
     if (!last.text.empty() && ImGui::GetTime() < last.until) return last.text;
     for (const texts::ToolText& tool : texts::kTools)
         if (tool.tool == editor.settings.tool) return tool.hint;
@@ -293,7 +297,7 @@ BarActions draw_bars(Editor& editor, const BarFacts& facts, const Rectangle& rec
     BarActions actions;
     const BarArea area = bar_area(rectangle);
     draw_top(editor, facts, area, actions);
-    draw_strip(editor, area);
+    draw_strip(editor, facts, area);
     draw_status(editor, facts, area);
     return actions;
 }

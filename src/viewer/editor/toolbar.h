@@ -22,8 +22,9 @@ BarSizes bar_sizes(double text_height);
 
 struct BarFacts {
     bool film_shown = false, panel_shown = false, can_save = false;
-    bool live = false;   // a training is watched: edits go to it
-    std::string status;  // at the right of the status line: device, time of the frame
+    bool live = false;    // a training is watched: edits go to it
+    bool points = false;  // the scene is points of a dataset, which cannot be edited
+    std::string status;   // at the right of the status line: device, time of the frame
 };
 
 /// area: the part of the window beside the panel, with the bars, px of the framebuffer.

@@ -9,9 +9,18 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+<<<<<<< HEAD
 #include <iterator>
 
 #include "viewer/editor/edit_words.h"
+=======
+#include <glm/matrix.hpp>
+#include <string_view>
+#include <utility>
+
+#include "edit/edits.h"
+#include "edit/steps.h"
+>>>>>>> 293b389d (Carry the view back when an edit of the whole scene is undone)
 #include "viewer/editor/pick_tools.h"
 #include "viewer/editor/select_tools.h"
 #include "viewer/editor/shape_handles.h"
@@ -64,6 +73,8 @@ struct Tools::State {
         return any[0] || any[1] || any[2] || any[3];
     }
     void follow_tool();
+    void follow_history();
+    void carry(const edit::Step& step, bool back);
     bool use_mouse(const ToolPicture& picture);
     bool tool_key(const KeyPress& press);
     bool control_key(const KeyPress& press);
@@ -81,11 +92,56 @@ struct Tools::State {
     bool yields = false;       // the present drag moves the camera
     bool swallows = false;     // the present drag was cancelled, and does nothing
     int ended = -1;            // the frame of ImGui in which a drag has ended
+    // Of the snapshot that the view has followed.
+    uint64_t scene = 0, version = 0;
+    std::vector<edit::Step> steps;  // in effect
+    std::vector<glm::dvec3> ups;    // of the view before the steps that have turned the scene
 };
+
+/// Moves the view and the measurement with a step that moves the whole scene, or back.
+void Tools::State::carry(const edit::Step& step, bool back) {
+    for (const edit::Words& words : step.edits) {
+        if (words.name != "transform" || !words.value.starts_with(edit::kAllSplats)) continue;
+        const glm::dmat4 matrix = edit::parse_transform({words.value.substr(edit::kAllSplats.size())});
+        const glm::dmat4 way = back ? glm::inverse(matrix) : matrix;
+        room.move_view(way);
+        for (glm::dvec3& point : room.shown.measurement.points)
+            point = glm::dvec3(way * glm::dvec4(point, 1));
+        if (glm::dmat3(matrix) == glm::dmat3(matrix[0][0])) continue;
+        ViewCamera& view = room.navigation.view;
+        if (!back) {
+            ups.push_back(view.up());
+            view.set_up({0, -1, 0});
+        } else if (!ups.empty()) {
+            view.set_up(ups.back());
+            ups.pop_back();
+        }
+    }
+}
+
+/// The view follows a scene that is moved as a whole, also where an undo moves it back.
+void Tools::State::follow_history() {
+    const EditSnapshot& now = room.editor.snapshot();
+    if (now.scene == scene && now.version == version) return;
+    std::vector<edit::Step> done(now.steps.begin(), now.steps.begin() + std::ptrdiff_t(now.done));
+    if (now.scene == scene) {
+        const auto [undone, fresh] = std::ranges::mismatch(steps, done);
+        for (auto step = steps.end(); step != undone;) carry(*--step, true);
+        for (auto step = fresh; step != done.end(); ++step) carry(*step, false);
+        Message& message = room.state.message;
+        if (message.until_edit && fresh != done.end()) message.note.clear();
+    } else {
+        ups.clear();
+    }
+    scene = now.scene;
+    version = now.version;
+    steps = std::move(done);
+}
 
 /// Begins and ends what belongs to a tool. The bar and the panel change the tool, too.
 void Tools::State::follow_tool() {
     bool& measure = room.state.settings.measure;
+    if (room.settings().live && moves_splats(tool())) room.settings().tool = Tool::view;
     if (tool() != before) {
         cancel();
         if (before == Tool::measure) measure = false;
@@ -117,7 +173,16 @@ bool Tools::State::use_mouse(const ToolPicture& picture) {
 bool Tools::State::tool_key(const KeyPress& press) {
     EditSettings& settings = room.settings();
     for (const texts::ToolText& row : texts::kTools) {
+<<<<<<< HEAD
         if (!is_key(press, row.key)) continue;
+=======
+        // GLFW's numbers of letters and digits are those of ASCII.
+        if (press.shift || std::string_view(row.key).size() != 1 || row.key[0] != press.key) continue;
+        if (settings.live && moves_splats(row.tool)) {
+            room.say(texts::kLiveRefuses);
+            return true;
+        }
+>>>>>>> 293b389d (Carry the view back when an edit of the whole scene is undone)
         const bool off = row.tool == Tool::measure && settings.tool == Tool::measure;
         settings.tool = off ? Tool::view : row.tool;
         return true;
@@ -185,8 +250,21 @@ bool Tools::State::edit_key(const KeyPress& press) {
         if (tool() == Tool::view) return false;
         room.settings().tool = Tool::view;
     } else if (is_key(press, GLFW_KEY_ENTER, GLFW_KEY_KP_ENTER)) {
+<<<<<<< HEAD
         if (!is_shape(tool())) return false;
         shapes.select(room.operation());
+=======
+        if (tool() == Tool::level)
+            picks.find_ground();
+        else if (is_shape(tool()))
+            shapes.select(room.operation());
+        else
+            return false;
+    } else if (key == GLFW_KEY_DELETE || key == GLFW_KEY_BACKSPACE) {
+        room.perform("Delete", "delete");
+    } else if (key == GLFW_KEY_H) {
+        room.perform(press.shift ? "Unlock" : "Lock", press.shift ? "unlock" : "lock");
+>>>>>>> 293b389d (Carry the view back when an edit of the whole scene is undone)
     } else if (key == GLFW_KEY_F && !press.shift) {
         return focus();
     } else if (key == GLFW_KEY_LEFT_BRACKET || key == GLFW_KEY_RIGHT_BRACKET) {
@@ -228,12 +306,14 @@ bool Tools::handle_key(const KeyPress& press) {
     const bool used = press.control ? s.control_key(press) : s.edit_key(press);
     s.follow_tool();
     if (used) s.room.state.redraw(Loop::kRedraws);
+    if (used && s.room.state.scene.points) s.room.say(texts::kPointsEdited);
     return used;
 }
 
 void Tools::draw() {
     State& s = *state_;
     s.follow_tool();
+    s.follow_history();
     if (s.idle()) return;
     const ToolPicture picture(s.room.shown);
     if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) {

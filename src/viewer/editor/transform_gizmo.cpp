@@ -9,6 +9,8 @@
 #include <numbers>
 #include <utility>
 
+#include "viewer/editor/panel_sections.h"
+
 namespace ewa::viewer {
 namespace {
 
@@ -134,14 +136,14 @@ void TransformGizmo::move(const ToolRay& ray) {
         if (!along) return;
         const double way = snapped(*along - drag.along, step);
         moved = drag.direction * way;
-        drag.label = fmt::format("{} {:.4g}", "xyz"[drag.handle], way);
+        drag.label = fmt::format("{} {:+.4g}", "xyz"[drag.handle], way);
     } else {
         const auto point = on_plane(ray, drag.center, drag.direction);
         if (!point) return;
         glm::dvec3 parts = glm::transpose(drag.axes) * (*point - drag.grabbed);
         for (int axis = 0; axis < 3; ++axis) parts[axis] = snapped(parts[axis], step);
         moved = drag.axes * parts;
-        drag.label = fmt::format("{:.4g}, {:.4g}, {:.4g}", parts.x, parts.y, parts.z);
+        drag.label = fmt::format("{:+.4g}, {:+.4g}, {:+.4g}", parts.x, parts.y, parts.z);
     }
     drag.matrix = glm::dmat4(1.0);
     drag.matrix[3] = glm::dvec4(moved, 1);
@@ -219,10 +221,11 @@ bool TransformGizmo::release() {
     const Tool tool = room_.settings().tool;
     if (tool == Tool::rotate) axes_ = glm::dmat3(drag.matrix) * axes();
     awaited_ = Awaited{room_.editor.snapshot().version, glm::dvec3(drag.matrix * glm::dvec4(drag.center, 1))};
-    room_.transform(tool == Tool::move     ? "Move"
-                    : tool == Tool::rotate ? "Rotate"
-                                           : "Scale",
-                    drag.edit, false);
+    perform_on_selection(room_.editor,
+                         tool == Tool::move     ? "Move"
+                         : tool == Tool::rotate ? "Rotate"
+                                                : "Scale",
+                         {{"transform", drag.edit}});
     return true;
 }
 
