@@ -108,7 +108,7 @@ void App::run() {
         shown_.take_renders();
         shown_.take_comparison(screen_->presenter);
         session_.take_saved();
-        session_.take_live();
+        session_.take_live(keeps_edits());
         if (!state_.scripted()) sync_editor();
         film_.edits = editor_.snapshot().done;
         film_.take();
@@ -170,9 +170,11 @@ void App::handle_key(const KeyPress& press) {
         if (settings.tab == PanelTab::view) editor_.settings.tool = Tool::view;
         return;
     }
-    const bool undoes = press.control && (key == GLFW_KEY_Z || key == GLFW_KEY_Y);
+    const bool undoes = press.control && (key == GLFW_KEY_Z || key == GLFW_KEY_Y),
+               edits_points = state_.scene.points && (press.control || key == GLFW_KEY_DELETE);
     if (undoes && film_.undo(key == GLFW_KEY_Z && !press.shift)) return state_.redraw(Loop::kRedraws);
-    if ((editing() || undoes) && tools_.handle_key(press)) return state_.redraw(Loop::kRedraws);
+    if ((editing() || undoes || edits_points) && tools_.handle_key(press))
+        return state_.redraw(Loop::kRedraws);
     float& scale = settings.look.splat_scale;
     if (key == GLFW_KEY_MINUS || key == GLFW_KEY_KP_SUBTRACT)
         scale = std::max(kLeastScale, scale / kScaleStep);
@@ -375,7 +377,10 @@ void App::enter_scene() {
             for (const Frame& frame : dataset->frames) all.push_back(frame.camera);
             return all;
         };
+    const Tool tool = live() ? editor_.settings.tool : Tool::view;
     editor_.enter(scene.title, file, entered_, cameras, journaled);
+    editor_.settings.tool = tool;
+    editor_.settings.sent = sent_before_ = 0;
     if (journaled) dialogs_.offer_journals();
 }
 
@@ -402,7 +407,8 @@ void App::sync_editor() {
     const Editor::News news = editor_.take();
     if (news.any) state_.redraw(Loop::kRedraws);
     if (!news.note.empty()) state_.say(news.note);
-    if (live()) send_edits(news.done);
+    editor_.settings.live = live();
+    if (live()) send_edits();
     if (editor_.scenes() == 0 || !news.marks) return;
     if (editor_.splats() != drawn_) {
         drawn_ = editor_.splats();
@@ -420,18 +426,36 @@ void App::sync_editor() {
     marked_ = any;
 }
 
-/// A training gets all edits since its splats were shown, once one of them removes or freezes splats.
-void App::send_edits(const std::vector<edit::Step>& done) {
-    const auto changes = [](const edit::Words& words) {
-        return words.name == "delete" || words.name.ends_with("lock");
-    };
-    if (std::ranges::none_of(
-            done, [&](const edit::Step& step) { return std::ranges::any_of(step.edits, changes); }))
-        return;
-    nlohmann::json edits = nlohmann::json::array();
+/// Whether newer splats of a run that is followed by its files would take unsaved edits away.
+bool App::keeps_edits() const {
+    return editor_.scenes() > 0 && editor_.scene(0).journaled && editor_.unsaved() &&
+           (editor_.scenes() > 1 || editor_.snapshot().done > 0);
+}
+
+/// A training gets the steps that it does not have yet, once one of them removes or freezes splats.
+void App::send_edits() {
+    const live::Update& run = *session_.live_run.update();
     const EditSnapshot& snapshot = editor_.snapshot();
-    for (size_t i = 0; i < snapshot.done; ++i)
-        for (const edit::Words& words : snapshot.steps[i].edits) edits.push_back({words.name, words.value});
+    size_t& sent = editor_.settings.sent;
+    if (editor_.busy() || editor_.scenes() == 0 || snapshot.scene != editor_.scene(editor_.active()).id)
+        return;
+    if (run.edits != std::exchange(answered_, run.edits) && !run.edit_refusal.empty()) {
+        state_.say(run.edit_refusal);
+        sent = std::min(sent_before_, snapshot.done);
+        for (size_t i = sent; i < snapshot.done; ++i) editor_.undo();
+        return;
+    }
+    nlohmann::json edits = nlohmann::json::array();
+    bool changes = std::exchange(editor_.settings.unfreeze, false);
+    if (changes && snapshot.locked > 0) return editor_.perform({"Unfreeze all", {{"unlock", ""}}});
+    if (changes) edits.push_back({"unlock", ""});
+    for (size_t i = sent; i < snapshot.done; ++i)
+        for (const edit::Words& words : snapshot.steps[i].edits) {
+            edits.push_back({words.name, words.value});
+            changes = changes || words.name == "delete" || words.name.ends_with("lock");
+        }
+    if (!changes) return;
+    sent_before_ = std::exchange(sent, snapshot.done);
     session_.live_run.edit(nlohmann::json{{"edits", std::move(edits)}}.dump());
 }
 
@@ -445,6 +469,7 @@ void App::draw_editor() {
                          .panel_shown = state_.panel_shown(),
                          .can_save = editor_.scenes() > 0,
                          .live = live(),
+                         .points = state_.scene.points,
                          .status = state_.device_name};
     const BarActions actions = draw_bars(editor_, facts, state_.frame_area());
     if (actions.open) session_.dialog.ask(Wanted::file);

@@ -50,7 +50,8 @@ class App {
     void take_chosen();
     void enter_scene();
     void add_scene();
-    void send_edits(const std::vector<edit::Step>& done);
+    void send_edits();
+    bool keeps_edits() const;
     void open(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown);
 
     ViewState state_;
@@ -73,6 +74,8 @@ class App {
     bool marked_ = false;                       // the render thread has marks
     Tool last_tool_ = Tool::view;
     Task<OpenedScene> added_;  // that is being opened beside the others
+    size_t sent_before_ = 0;   // EditSettings::sent before the last edit that was sent
+    uint64_t answered_ = 0;    // edits that the training has answered
 };
 
 }  // namespace ewa::viewer

@@ -10,6 +10,7 @@
 #include "folders/run.h"
 #include "run/earlier_run.h"
 #include "scene/names.h"
+#include "viewer/editor/texts.h"
 
 namespace ewa::viewer {
 
@@ -39,6 +40,7 @@ void ViewSession::adopt(OpenedScene opened, std::optional<int> frame) {
     look.sh_degree = scene.sh_degree;
     state_.message.note.clear();
     offer_answered_ = false;
+    newer_ = nullptr;
     if (!scene.remark.empty()) state_.say(scene.remark);
     shown_.enter_scene();
     navigation_.enter_scene(frame);
@@ -119,7 +121,7 @@ void ViewSession::watch(const live::WhatToWatch& what, TrainProcess* trainer) {
     state_.redraw();
 }
 
-void ViewSession::take_live() {
+void ViewSession::take_live(bool keep) {
     if (const auto status = live_run.failure(); status && state_.message.note.empty())
         state_.say("the training ended with status " + std::to_string(*status) +
                    "; see the terminal for the reason");
@@ -139,14 +141,17 @@ void ViewSession::take_live() {
         live_failed_ = true;
         std::fprintf(stderr, "ewa-view: %s\n", core::one_line(run->problem).c_str());
     }
-    if (!news.splats) return;
+    if (news.splats) newer_ = news.splats;
+    if (news.splats && keep) state_.say(texts::kNewerSplats);
+    if (!newer_ || keep) return;
+    const auto splats = std::exchange(newer_, nullptr);
     OpenedScene& scene = state_.scene;
     int& degree = state_.settings.look.sh_degree;
     const bool highest = degree == scene.sh_degree;
-    scene.set_gaussians(news.splats);
+    scene.set_gaussians(splats);
     scene.points = false;
     scene.coarse = nullptr;  // of the scene before
-    shown_.renders.set_scene(news.splats);
+    shown_.renders.set_scene(splats);
     if (highest) degree = scene.sh_degree;
     navigation_.take_splats();
 }

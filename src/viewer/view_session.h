@@ -35,7 +35,8 @@ class ViewSession {
     void take_opened();
     void take_found();
     void take_saved();
-    void take_live();  // new splats of the run replace those that are shown
+    /// New splats of the run replace those that are shown. keep: they wait, because edits would be lost.
+    void take_live(bool keep);
 
     bool saving() const { return saving_.running(); }
     bool waiting() const { return opening_.running() || saving() || dialog.open(); }
@@ -60,8 +61,9 @@ class ViewSession {
     Navigation& navigation_;
     Shown& shown_;
     bool offer_answered_ = false;
-    bool live_failed_ = false;    // a training that cannot be reached was reported
-    std::string search_failure_;  // why photos have no cameras; one line
+    std::shared_ptr<const Gaussians> newer_;  // splats of the run that wait; null: none
+    bool live_failed_ = false;                // a training that cannot be reached was reported
+    std::string search_failure_;              // why photos have no cameras; one line
     Task<OpenedScene> opening_;
     Task<std::string> saving_;  // a screenshot; the message about it
 };

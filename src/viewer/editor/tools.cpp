@@ -9,18 +9,13 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
-<<<<<<< HEAD
-#include <iterator>
-
-#include "viewer/editor/edit_words.h"
-=======
 #include <glm/matrix.hpp>
-#include <string_view>
+#include <iterator>
 #include <utility>
 
 #include "edit/edits.h"
 #include "edit/steps.h"
->>>>>>> 293b389d (Carry the view back when an edit of the whole scene is undone)
+#include "viewer/editor/edit_words.h"
 #include "viewer/editor/pick_tools.h"
 #include "viewer/editor/select_tools.h"
 #include "viewer/editor/shape_handles.h"
@@ -173,16 +168,11 @@ bool Tools::State::use_mouse(const ToolPicture& picture) {
 bool Tools::State::tool_key(const KeyPress& press) {
     EditSettings& settings = room.settings();
     for (const texts::ToolText& row : texts::kTools) {
-<<<<<<< HEAD
         if (!is_key(press, row.key)) continue;
-=======
-        // GLFW's numbers of letters and digits are those of ASCII.
-        if (press.shift || std::string_view(row.key).size() != 1 || row.key[0] != press.key) continue;
         if (settings.live && moves_splats(row.tool)) {
             room.say(texts::kLiveRefuses);
             return true;
         }
->>>>>>> 293b389d (Carry the view back when an edit of the whole scene is undone)
         const bool off = row.tool == Tool::measure && settings.tool == Tool::measure;
         settings.tool = off ? Tool::view : row.tool;
         return true;
@@ -250,21 +240,12 @@ bool Tools::State::edit_key(const KeyPress& press) {
         if (tool() == Tool::view) return false;
         room.settings().tool = Tool::view;
     } else if (is_key(press, GLFW_KEY_ENTER, GLFW_KEY_KP_ENTER)) {
-<<<<<<< HEAD
-        if (!is_shape(tool())) return false;
-        shapes.select(room.operation());
-=======
         if (tool() == Tool::level)
             picks.find_ground();
         else if (is_shape(tool()))
             shapes.select(room.operation());
         else
             return false;
-    } else if (key == GLFW_KEY_DELETE || key == GLFW_KEY_BACKSPACE) {
-        room.perform("Delete", "delete");
-    } else if (key == GLFW_KEY_H) {
-        room.perform(press.shift ? "Unlock" : "Lock", press.shift ? "unlock" : "lock");
->>>>>>> 293b389d (Carry the view back when an edit of the whole scene is undone)
     } else if (key == GLFW_KEY_F && !press.shift) {
         return focus();
     } else if (key == GLFW_KEY_LEFT_BRACKET || key == GLFW_KEY_RIGHT_BRACKET) {
