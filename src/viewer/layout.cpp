@@ -21,6 +21,13 @@ Rectangle fitted(Size shape, const Rectangle& space) {
     return {space.x + (space.width - width) / 2, space.y + (space.height - height) / 2, width, height};
 }
 
+double monitor_scale(Size pixels, Size millimetres) {
+    constexpr double kDense = 140, kUsualHeight = 1080, kSteps = 4;
+    const double inches = millimetres.width / 25.4;
+    if (inches > 0 && pixels.width / inches <= kDense) return 1;
+    return std::max(1.0, std::round(kSteps * pixels.height / kUsualHeight) / kSteps);
+}
+
 int panel_width(int window, double text_height) {
     const double usual = kPanelWidth * text_height, most = kMostPanel * window;
     return int(most >= kLeastPanel * text_height ? std::min(usual, most) : usual);

@@ -24,6 +24,10 @@ inline constexpr double kMostPanel = 0.45;    // share of the window's width
 inline constexpr double kBarsNeed = 22;       // in heights of the text: the least side of a picture with bars
 inline constexpr Size kUsualSize{1280, 800};  // of a picture that no camera sets
 
+/// The scale of text for a monitor whose desktop sets none: 1 for usual monitors, and by the height on dense ones. millimetres: its
+/// size; zero if unknown.
+double monitor_scale(Size pixels, Size millimetres);
+
 /// The width of the panel in a window of this width. It is less than usual where that leaves the bars of the editor room.
 int panel_width(int window, double text_height);
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "ewa/error.h"
+#include "viewer/layout.h"
 
 namespace ewa::viewer {
 namespace {
@@ -37,6 +38,11 @@ WindowSystem::WindowSystem() {
         throw RunError("no window can be opened: " + reason +
                        "; no Vulkan driver can show images on this display");
     }
+    if (GLFWmonitor* monitor = glfwGetPrimaryMonitor()) {
+        Size millimetres;
+        glfwGetMonitorPhysicalSize(monitor, &millimetres.width, &millimetres.height);
+        density_scale_ = float(monitor_scale(work_area(), millimetres));
+    }
 }
 
 WindowSystem::~WindowSystem() {
@@ -54,7 +60,7 @@ Size WindowSystem::work_area() const {
 float WindowSystem::scale() const {
     float x = 1, y = 1;
     if (GLFWmonitor* monitor = glfwGetPrimaryMonitor()) glfwGetMonitorContentScale(monitor, &x, &y);
-    return std::max(1.0f, std::max(x, y));
+    return std::max({density_scale_, x, y});
 }
 
 std::vector<const char*> WindowSystem::vulkan_extensions() const {
@@ -67,7 +73,8 @@ void WindowSystem::wake() const {
     glfwPostEmptyEvent();
 }
 
-Window::Window(const WindowSystem&, const std::string& title, Size size, bool resizable) {
+Window::Window(const WindowSystem& system, const std::string& title, Size size, bool resizable)
+    : least_scale_(system.density_scale()) {
     glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
     // The name by which a desktop finds ewa-view.desktop, and its icon.
     glfwWindowHintString(GLFW_X11_CLASS_NAME, "ewa-view");
@@ -128,7 +135,7 @@ void Window::set_title(const std::string& title) {
 float Window::scale() const {
     float x = 1, y = 1;
     glfwGetWindowContentScale(window_, &x, &y);
-    return std::max(1.0f, std::max(x, y));
+    return std::max({least_scale_, x, y});
 }
 
 float Window::density() const {

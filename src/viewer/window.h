@@ -24,11 +24,16 @@ class WindowSystem {
 
     /// The size that a window on the main monitor can have without covering the desktop's bars, in window units; zero if unknown.
     Size work_area() const;
-    /// The scale of text on the main monitor: larger than 1 on high-density displays.
+    /// The scale of text on the main monitor: the desktop's, or the larger one that its density asks for.
     float scale() const;
+    /// The scale that the density of the main monitor asks for, as of the start.
+    float density_scale() const { return density_scale_; }
     std::vector<const char*> vulkan_extensions() const;
     /// Makes Window::wait() return. Any thread may call it.
     void wake() const;
+
+  private:
+    float density_scale_ = 1;
 };
 
 /// A key press with the modifiers at that time.
@@ -69,6 +74,7 @@ class Window {
     void watch();
 
     GLFWwindow* window_ = nullptr;
+    float least_scale_ = 1;
     std::vector<KeyPress> pressed_;
     std::vector<std::filesystem::path> dropped_;
     bool stirred_ = false;

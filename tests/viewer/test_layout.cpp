@@ -36,6 +36,17 @@ TEST(Layout, ThePanelLeavesTheBarsRoom) {
     }
 }
 
+TEST(Layout, ADenseMonitorHasLargerText) {
+    EXPECT_EQ(monitor_scale({1920, 1040}, {344, 194}), 1) << "small, with few px";
+    EXPECT_EQ(monitor_scale({3840, 2120}, {597, 336}), 2);
+    EXPECT_EQ(monitor_scale({3840, 2120}, {1210, 680}), 1) << "a television";
+    EXPECT_EQ(monitor_scale({3840, 2160}, {1016, 571}), 1) << "96 px an inch, as virtual displays have";
+    EXPECT_EQ(monitor_scale({3840, 2160}, {0, 0}), 2);
+    EXPECT_EQ(monitor_scale({2880, 1760}, {302, 189}), 1.75);
+    EXPECT_EQ(monitor_scale({1280, 720}, {0, 0}), 1);
+    EXPECT_EQ(monitor_scale({0, 0}, {0, 0}), 1);
+}
+
 TEST(Layout, PlacesKeepTheImagesAspectRatio) {
     const Rectangle area{101, 0, 701, 300};
     const Arrangement beside = arrange(Comparison::beside, area, {200, 100});
