@@ -82,25 +82,45 @@ void draw_help_group(const char* name, std::span<const texts::HelpRow> rows, flo
     ImGui::Spacing();
 }
 
-void draw_help_groups(int columns) {
-    std::vector<texts::HelpRow> tools, edits;
+struct HelpGroup {
+    const char* name;
+    std::vector<texts::HelpRow> rows;
+    bool second;  // in the second column, where there are two
+};
+
+/// The tools from `first` to the one before `end` that have keys, and then these rows.
+std::vector<texts::HelpRow> with_tools(Tool first, Tool end, std::span<const texts::HelpRow> rows) {
+    std::vector<texts::HelpRow> all;
     for (const texts::ToolText& tool : texts::kTools)
-        if (*tool.key) tools.push_back({tool.key, tool.name});
-    for (const auto& edit : texts::edit_panel::kKeyedEdits) edits.push_back({edit.keys, edit.name});
+        if (tool.tool >= first && tool.tool < end && *tool.key) all.push_back({tool.key, tool.name});
+    all.insert(all.end(), rows.begin(), rows.end());
+    return all;
+}
+
+std::vector<HelpGroup> help_groups() {
+    const auto plain = [](std::span<const texts::HelpRow> rows) {
+        return std::vector<texts::HelpRow>(rows.begin(), rows.end());
+    };
+    return {{texts::kLookGroup, plain(texts::kLookHelp), false},
+            {texts::kViewGroup, plain(texts::kViewHelp), false},
+            {texts::kFilmGroup, plain(texts::kFilmHelp), false},
+            {texts::kSelectGroup, with_tools(Tool::rectangle, Tool::move, texts::kSelectHelp), true},
+            {texts::kChangeGroup, with_tools(Tool::move, Tool::origin, texts::kChangeHelp), true},
+            {texts::kFilesGroup, plain(texts::kFilesHelp), true}};
+}
+
+void draw_help_groups(int columns) {
+    const std::vector<HelpGroup> groups = help_groups();
     float keys = 0;
-    for (const auto& rows : {std::span<const texts::HelpRow>(texts::kMoveHelp),
-                             std::span<const texts::HelpRow>(texts::kLookHelp),
-                             std::span<const texts::HelpRow>(texts::kFilesHelp)})
-        for (const texts::HelpRow& row : rows) keys = std::max(keys, ImGui::CalcTextSize(row.keys).x);
+    for (const HelpGroup& group : groups)
+        for (const texts::HelpRow& row : group.rows) keys = std::max(keys, ImGui::CalcTextSize(row.keys).x);
     keys = std::min(keys + 1, 0.4f * ImGui::GetContentRegionAvail().x / float(columns));  // longer ones wrap
     if (!ImGui::BeginTable("columns", columns, ImGuiTableFlags_SizingStretchSame)) return;
-    ImGui::TableNextColumn();
-    draw_help_group(texts::kMoveGroup, texts::kMoveHelp, keys);
-    draw_help_group(texts::kLookGroup, texts::kLookHelp, keys);
-    draw_help_group(texts::kFilesGroup, texts::kFilesHelp, keys);
-    ImGui::TableNextColumn();
-    draw_help_group(texts::kToolsGroup, tools, keys);
-    draw_help_group(texts::kEditsGroup, edits, keys);
+    for (const bool second : {false, true}) {
+        ImGui::TableNextColumn();
+        for (const HelpGroup& group : groups)
+            if (group.second == second) draw_help_group(group.name, group.rows, keys);
+    }
     ImGui::EndTable();
 }
 

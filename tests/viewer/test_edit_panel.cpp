@@ -2,10 +2,13 @@
 // What the panel of edits computes: bins of histograms, and the words of edits.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numeric>
+#include <set>
+#include <span>
 #include <sstream>
 
 #include "edit/edits.h"
@@ -31,6 +34,26 @@ std::vector<double> counting(size_t n) {
 
 uint32_t total(const std::vector<uint32_t>& counts) {
     return std::accumulate(counts.begin(), counts.end(), 0u);
+}
+
+TEST(HelpTexts, NameEachKeyOnce) {
+    std::set<std::string> keys;
+    const auto add = [&](std::span<const texts::HelpRow> rows) {
+        for (const texts::HelpRow& row : rows) EXPECT_TRUE(keys.insert(row.keys).second) << row.keys;
+    };
+    add(texts::kViewHelp);
+    keys.clear();  // the tools take some of them in the other tab
+    for (const std::span<const texts::HelpRow> rows : {std::span<const texts::HelpRow>(texts::kLookHelp),
+                                                       std::span<const texts::HelpRow>(texts::kSelectHelp),
+                                                       std::span<const texts::HelpRow>(texts::kChangeHelp),
+                                                       std::span<const texts::HelpRow>(texts::kFilmHelp),
+                                                       std::span<const texts::HelpRow>(texts::kFilesHelp)})
+        add(rows);
+    for (const texts::ToolText& tool : texts::kTools)
+        if (tool.tool != Tool::view && *tool.key) add(std::array{texts::HelpRow{tool.key, tool.name}});
+    for (const char* key :
+         {"Del", "Ctrl + Z", "Ctrl + A", "Ctrl + D", "Ctrl + I", "H", "[ ]", "K", "Space", "Tab"})
+        EXPECT_TRUE(keys.contains(key)) << key;
 }
 
 TEST(Histogram, CountsWhatIsLeftAndWhatIsSelected) {

@@ -42,11 +42,11 @@ inline constexpr const char* kDropExplanation = "or a dataset, or a training run
 inline constexpr const char *kOpenAFile = "Open a file", *kOpenAFolder = "Open a folder", *kRecent = "Recent",
                             *kKeysLine = "F1: keys";
 
-// Help (F1). The keys of the editor are those of kTools and kKeyedEdits.
+// Help (F1). The tools of kTools come first in their groups.
 struct HelpRow {
     const char *keys, *text;
 };
-inline constexpr HelpRow kMoveHelp[] = {
+inline constexpr HelpRow kLookHelp[] = {
     {"left drag", "orbit the scene"},
     {"Ctrl + left drag", "look around"},
     {"right or middle drag", "move sideways"},
@@ -54,34 +54,57 @@ inline constexpr HelpRow kMoveHelp[] = {
     {"double click", "look at this point and orbit it"},
     {"W S  A D  Q E", "fly: forward, back; left, right; down, up"},
     {"Shift", "fly four times as fast"},
-    {"F", "show the whole scene from the front"},
-    {"R", "return to the first view"},
+    {"F", "show the whole scene; in the tab Edit the selection"},
     {"T", "turntable"},
-    {"P", "parallel rays"},
     {"U", "change the up axis"},
-};
-inline constexpr HelpRow kLookHelp[] = {
-    {"1 to 7", "colour, depth, opacity, splats per pixel, ellipsoids, median depth, normals"},
     {"- +", "make splats smaller, larger"},
     {"C", "show cameras; a click goes to one"},
     {"left right", "go to the previous, next camera"},
-    {"G", "go to the nearest camera"},
     {"V", "compare with the image: side by side, wipe, difference"},
+    {"Ctrl + 1 to 9", "save this view under a number"},
+    {"Shift + 1 to 9", "go to the saved view"},
+};
+inline constexpr HelpRow kViewHelp[] = {
+    {"R", "return to the first view"},
+    {"P", "parallel rays"},
+    {"G", "go to the nearest camera"},
     {"M", "measure: click two points"},
+    {"1 to 7", "colour, depth, opacity, splats per pixel, ellipsoids, median depth, normals"},
+};
+inline constexpr HelpRow kSelectHelp[] = {
+    {"[ ]", "make the brush smaller, larger"},
+    {"Enter", "select with the sphere or box; end the polygon"},
+    {"Ctrl + A", "select all"},
+    {"Ctrl + D", "select none"},
+    {"Ctrl + I", "invert the selection"},
+    {"Ctrl + +, Ctrl + -", "grow, shrink the selection"},
+    {"H", "lock the selection; with Shift: unlock all"},
+    {"Ctrl + H", "hide the selection; with Shift: show all"},
+    {"Esc", "end what is being drawn, then the tool"},
+};
+inline constexpr HelpRow kChangeHelp[] = {
+    {"Del", "delete the selection"},
+    {"Ctrl + Z", "undo; Ctrl + Shift + Z: redo"},
+};
+inline constexpr HelpRow kFilmHelp[] = {
+    {"K", "make this view a key of the film"},
+    {"Space", "play or stop the film"},
+    {"Ctrl + K", "save the film"},
 };
 inline constexpr HelpRow kFilesHelp[] = {
     {"drop a file", "open it; a dataset gives its cameras to splats"},
     {"Ctrl + O", "open a file; with Shift: a folder"},
-    {"Ctrl + 1 to 9", "save this view under a number"},
-    {"Shift + 1 to 9", "go to the saved view"},
+    {"Ctrl + S", "save; with Shift: to another file"},
     {"F12", "screenshot (PNG); with Shift: EXR"},
+    {"Tab", "go to the other tab of the panel"},
     {"F1", "show or hide these keys"},
     {"F2", "show or hide the panel"},
     {"Ctrl + Q", "quit"},
 };
-inline constexpr const char *kMoveGroup = "Move around", *kLookGroup = "Look",
-                            *kFilesGroup = "Views and files", *kToolsGroup = "Tools, in the tab Edit",
-                            *kEditsGroup = "Edits, in the tab Edit";
+inline constexpr const char *kLookGroup = "Look", *kViewGroup = "Look, in the tab View",
+                            *kSelectGroup = "Select, in the tab Edit",
+                            *kChangeGroup = "Change, in the tab Edit", *kFilmGroup = "Film",
+                            *kFilesGroup = "File";
 
 // The tools.
 struct ToolText {
