@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <memory>
 #include <numeric>
 #include <set>
 #include <span>
@@ -17,6 +18,7 @@
 #include "ewa/error.h"
 #include "support/soon.h"
 #include "viewer/editor/edit_words.h"
+#include "viewer/editor/editor.h"
 #include "viewer/editor/histogram.h"
 #include "viewer/editor/texts.h"
 
@@ -342,6 +344,36 @@ TEST(PlacementText, MovesTurnsAndScalesAboutThePoint) {
     // About x, y becomes z, which the turn about z leaves; about z, x becomes y.
     EXPECT_NEAR(glm::length(glm::dvec3(matrix[1]) - glm::dvec3(0, 0, 2)), 0, 1e-9);
     EXPECT_NEAR(glm::length(glm::dvec3(matrix[0]) - glm::dvec3(0, 2, 0)), 0, 1e-9);
+}
+
+/// A training takes selections, deletes and locks alone, and no undo of what it has.
+TEST(LiveEdits, AreRefusedAtOnce) {
+    Gaussians two;
+    two.resize(2);
+    two.quaternions[0] = two.quaternions[4] = 1;
+    Editor editor(
+        "ewa", [] {}, 1000);
+    editor.enter("two", {}, std::make_shared<const Gaussians>(two), {}, false);
+    editor.settings.live = true;
+    const auto settled = [&] {
+        EXPECT_TRUE(test::soon([&] { return !editor.busy(); }));
+        return editor.take().note;
+    };
+    editor.perform({"Select all", {{"select", "all"}}});
+    EXPECT_EQ(settled(), "");
+    EXPECT_EQ(editor.snapshot().selected, 2u);
+    EXPECT_EQ(editor.snapshot().scene, editor.scene(0).id);
+    editor.perform({"Move", {{"transform", "move=1,0,0"}}});
+    EXPECT_EQ(settled(), texts::kLiveRefuses);
+    EXPECT_EQ(editor.snapshot().done, 1u);
+    editor.settings.sent = 1;
+    editor.undo();
+    EXPECT_EQ(settled(), texts::kLiveUndo);
+    EXPECT_EQ(editor.snapshot().done, 1u);
+    editor.settings.sent = 0;
+    editor.undo();
+    EXPECT_EQ(settled(), "");
+    EXPECT_EQ(editor.snapshot().done, 0u);
 }
 
 TEST(PasteShape, TakesABoxOrASphere) {
