@@ -123,6 +123,7 @@ void Tools::State::follow_history() {
         const auto [undone, fresh] = std::ranges::mismatch(steps, done);
         for (auto step = steps.end(); step != undone;) carry(*--step, true);
         for (auto step = fresh; step != done.end(); ++step) carry(*step, false);
+        if (undone != steps.end()) room.settings().progress.clear();
         Message& message = room.state.message;
         if (message.until_edit && fresh != done.end()) message.note.clear();
     } else {
