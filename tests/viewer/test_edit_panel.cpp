@@ -301,7 +301,21 @@ TEST(EditNews, SaysWhatWasDoneAndWithHowManySplats) {
     hidden.selected = 0;
     hidden.hidden = 7163;
     EXPECT_EQ(edit_news(undone, hidden), "Hide, 7,163 splats, 2 ms");
+    // A rule that removes nothing takes the selection away alone.
+    EditSnapshot nothing = selected;
+    nothing.steps.push_back({"Remove large splats", {{"select", "scale=9.."}, {"delete", ""}}});
+    nothing.done = 2;
+    nothing.selected = 0;
+    EXPECT_EQ(edit_news(selected, nothing), "Remove large splats, 0 splats, 2 ms");
     EXPECT_EQ(edit_news(deleted, first), "") << "another scene";
+}
+
+TEST(PartText, SaysTheShareWithoutExponents) {
+    EXPECT_EQ(part_text(0, 73'284), "0 splats (0 %)");
+    EXPECT_EQ(part_text(0, 0), "0 splats (0 %)");
+    EXPECT_EQ(part_text(3406, 90'854), "3,406 splats (3.75 %)");
+    EXPECT_EQ(part_text(73'284, 73'284), "73,284 splats (100 %)");
+    EXPECT_EQ(part_text(1, 10'000'000), "1 splat (< 0.001 %)");
 }
 
 TEST(EditSnapshot, TheMiddleIsThatOfWhatAMoveChanges) {

@@ -3,11 +3,9 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <cfloat>
 #include <cmath>
 #include <utility>
 
-#include "core/text.h"
 #include "viewer/editor/panel_controls.h"
 #include "viewer/editor/panel_sections.h"
 
@@ -29,12 +27,6 @@ float large_scale(const Gaussians& splats) {
     const auto middle = scales.begin() + std::ptrdiff_t(scales.size() / 2);
     std::nth_element(scales.begin(), middle, scales.end());
     return float(kLargeFactor * std::exp(double(*middle)));
-}
-
-/// "1,234 splats (0.12 %)".
-std::string part_text(size_t count, size_t of) {
-    return fmt::format(say::kPart, core::grouped(count, "splat"),
-                       of > 0 ? 100.0 * double(count) / double(of) : 0.0);
 }
 
 }  // namespace
@@ -113,8 +105,9 @@ void CleanSection::draw(Editor& editor) {
     ui::slider(say::kFaint, opacity_, 0.001f, 1, "%.3f", true);
     draw_rule(editor, say::kFaint, first, say::kRemoveFaint, fmt::format("opacity=..{}", opacity_));
     ui::label_left(say::kLarge);
-    ImGui::InputFloat("##scale", &scale_, 0, 0, "%.4g");
-    if (!(scale_ > 0)) scale_ = FLT_MIN;
+    float scale = scale_;
+    if (ImGui::InputFloat("##scale", &scale, 0, 0, "%.4g") && scale > 0 && std::isfinite(scale))
+        scale_ = scale;
     draw_rule(editor, say::kLarge, first, say::kRemoveLarge, fmt::format("scale={}..", scale_));
     ImGui::PopID();
 }

@@ -98,6 +98,14 @@ std::string edit_news(const EditSnapshot& before, const EditSnapshot& now) {
     return fmt::format("{}, {}, {:.0f} ms", text, core::grouped(splats, "splat"), now.milliseconds);
 }
 
+std::string part_text(size_t count, size_t of) {
+    constexpr double kLeastPercent = 0.001;
+    const double percent = of > 0 ? 100.0 * double(count) / double(of) : 0;
+    const bool less = percent > 0 && percent < kLeastPercent;
+    return fmt::format(texts::edit_panel::kPart, core::grouped(count, "splat"), less ? "< " : "",
+                       less ? kLeastPercent : percent);
+}
+
 bool has_key(std::string_view keys, int key, bool shift, bool control) {
     constexpr std::pair<std::string_view, int> kNames[] = {{"Esc", 256}, {"Backspace", 259}, {"Del", 261}};
     constexpr std::string_view kOr = " or ";

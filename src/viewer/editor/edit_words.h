@@ -17,6 +17,9 @@ std::string selection_title(std::string_view shape);
 /// nothing that is known.
 std::string edit_news(const EditSnapshot& before, const EditSnapshot& now);
 
+/// "1,234 splats (0.12 %)": so many of all.
+std::string part_text(size_t count, size_t of);
+
 /// Whether `keys`, as in "Ctrl+D or Ctrl+Shift+A", has this key, a number of GLFW, with these modifiers. Shift is free with = and -.
 bool has_key(std::string_view keys, int key, bool shift, bool control);
 

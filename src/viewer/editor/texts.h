@@ -23,7 +23,7 @@ inline constexpr ButtonText kHelp{"Help", "F1", "All keys"};
 inline constexpr const char *kSaveAs = "Save as ...", *kMore = "More", *kSaving = "saving ...";
 inline constexpr const char *kUndone = "Undone: ", *kRedone = "Redone: ",
                             *kNothingSelected = "nothing is selected";
-inline constexpr const char *kSelected = "selected", *kWouldBeSelected = "would be selected";
+inline constexpr const char *kSelected = "selected", *kWouldBeRemoved = "would be removed";
 inline constexpr const char* kEditsTraining = "edits go to the training";
 
 // The panel.
@@ -212,7 +212,7 @@ inline constexpr Item kFloaters{"Floaters", "Groups of fewer than 10 splats that
     kFewViews{"Seen by fewer than", "Splats that fewer photos than this see"},
     kFaint{"Almost transparent", "Splats with an opacity below this"},
     kLarge{"Too large", "Splats with a larger standard deviation than this, world units"};
-inline constexpr const char *kPart = "{} ({:.2g} %)", *kFinding = "looking ...",
+inline constexpr const char *kPart = "{} ({}{:.3g} %)", *kFinding = "looking ...",
                             *kNothingFound = "nothing to remove";
 
 inline constexpr const char *kRemoveFloaters = "Remove floaters", *kRemoveFar = "Remove far clusters",

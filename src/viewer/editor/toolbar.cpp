@@ -256,7 +256,7 @@ std::string shortened(std::string text, float width) {
 std::string selection_text(const Editor& editor, const BarFacts& facts) {
     if (editor.saving()) return texts::kSaving;
     if (const auto count = editor.preview_count())
-        return core::grouped(*count, "splat") + " " + texts::kWouldBeSelected;
+        return core::grouped(*count, "splat") + " " + texts::kWouldBeRemoved;
     if (const size_t selected = editor.snapshot().selected; selected > 0)
         return core::grouped(selected) + " " + texts::kSelected;
     return facts.live ? texts::kEditsTraining : "";
