@@ -19,4 +19,10 @@ vec3 tinted(vec3 color, uint mark) {
     if ((mark & MARK_PREVIEW) != 0u) color = mix(color, vec3(1.0, 0.0, 0.0), float(MARK_SHARE));
     return color;
 }
+
+// Splats of a preview are seen even if they are almost transparent. A NaN stays one.
+float shown_opacity(float opacity, uint mark) {
+    const float least = 0.3;
+    return (mark & MARK_PREVIEW) == 0u || !(opacity < least) ? opacity : least;
+}
 #endif

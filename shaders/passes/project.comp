@@ -47,7 +47,7 @@ bool project(uint i) {
     if ((MODE & PROJECT_NORMALS) != 0u) color = normal_of(p);
     if ((MODE & PROJECT_SLOPES) != 0u) color = vec3(depth_slopes(p), 0.0);
 
-    float opacity = stored.peak * p.factor;
+    float opacity = shown_opacity(stored.peak * p.factor, mark & push.tinted_marks);
     // A NaN stays one.
     if (KERNEL == KERNEL_DENSITY) opacity = opacity > float(DEPTH_MAX) ? float(DEPTH_MAX) : opacity;
     const bool lens = LENSES != 0u;

@@ -166,6 +166,28 @@ TEST(Marks, TintAnIsolatedSplat) {
     }
 }
 
+/// An opacity of 0.005, and one of 0.001, of which a plain image shows nothing.
+TEST(Marks, OfAPreviewShowFaintSplats) {
+    for (const float faint : {-5.3f, -6.9f}) {
+        Scene scene = isolated_splat();
+        scene.gaussians.opacity_logits = {faint};
+        Renderer renderer(device(), scene.gaussians, scene.options);
+        const Image plain = renderer.render(scene.camera).alpha;
+        renderer.mark(std::vector<uint8_t>{kMarkSelected});
+        expect_same_values(renderer.render(scene.camera).alpha, plain);
+        renderer.mark(std::vector<uint8_t>{kMarkPreview});
+        const DrawOptions no_tints{.render = scene.options, .plain_colors = true};
+        expect_same_values(renderer.render(scene.camera, no_tints).alpha, plain);
+        const Image shown = renderer.render(scene.camera).alpha;
+        scene.gaussians.opacity_logits = {float(std::log(0.3 / 0.7))};
+        const Image expected = Renderer(device(), scene.gaussians, scene.options).render(scene.camera).alpha;
+        ASSERT_EQ(shown.pixels.size(), expected.pixels.size());
+        for (size_t i = 0; i < shown.pixels.size(); ++i)
+            ASSERT_NEAR(double(shown.pixels[i]), double(expected.pixels[i]), 1e-5);
+        EXPECT_GT(*std::ranges::max_element(shown.pixels), 0.25f);
+    }
+}
+
 TEST(Marks, WithPlainColoursHideAlone) {
     const MarkedScene marked = marked_scene(8500, kMarkHidden, kMarkDeleted);
     const Scene& scene = marked.scene;
