@@ -43,8 +43,8 @@ void CleanSection::preview(Editor& editor, const std::string& shape) {
     editor.preview(shape);
 }
 
+/// A preview stays until the splats are gone.
 void CleanSection::remove(Editor& editor, const char* title, const std::string& shape) {
-    end(editor);
     editor.perform({title, {{"select", shape}, {"delete", ""}}});
 }
 
@@ -68,7 +68,7 @@ void CleanSection::draw_rule(Editor& editor, const ui::Text& text, std::initiali
         !count        ? say::kFinding
         : *count == 0 ? say::kNothingFound
                       : fmt::format("{} {}", say::kRemove.name, part_text(*count, editor.snapshot().left));
-    const bool found = count.value_or(0) > 0;
+    const bool found = count.value_or(0) > 0 && !editor.busy();
     const auto look = found ? ui::ButtonLook::danger : ui::ButtonLook::plain;
     switch (ui::button_line({{{remove_text.c_str()}, found, look}, {say::kCancel}})) {
         case 0:

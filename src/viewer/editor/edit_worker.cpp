@@ -358,7 +358,9 @@ void EditWorker::change(uint64_t id, const std::function<void(Scene&)>& edit) {
         if (found == scenes_.end() || found->second.closed) return;
         const uint64_t before = found->second.history->version();
         edit(found->second);
-        if (found->second.history->version() != before && !previewed_.empty()) find_preview();
+        if (found->second.history->version() == before) return;
+        preview_.clear();  // it was of the splats before
+        previewed_.clear();
     });
 }
 
