@@ -338,7 +338,7 @@ TEST(EditSnapshot, TheMiddleIsThatOfWhatAMoveChanges) {
         return editor.snapshot().middle.x;
     };
     EXPECT_EQ(middle(), 4);
-    editor.select("x=9..");
+    editor.select("x=9..", edit::Operation::set);
     EXPECT_EQ(middle(), 10);
     EXPECT_EQ(editor.snapshot().steps.front().title, "Select by x");
     editor.perform({"Lock", {{"lock", ""}}});

@@ -202,9 +202,9 @@ void Editor::perform(edit::Step step) {
     worker_->perform(now().id, std::move(step));
 }
 
-void Editor::select(const std::string& shape) {
+void Editor::select(const std::string& shape, edit::Operation operation) {
     constexpr const char* kPrefixes[] = {"", "add:", "remove:", "and:"};
-    std::string text = kPrefixes[size_t(settings.operation)] + shape;
+    std::string text = kPrefixes[size_t(operation)] + shape;
     const bool in_view = shape.starts_with("polygon=") || shape.starts_with("brush=");
     if (in_view && settings.front) text += ";front";
     if (in_view && settings.extent) text += ";extent";

@@ -107,8 +107,8 @@ class Editor {
     // Edits of the active scene, in the background and in order. An error is News::note.
     /// A selection without a title gets that of selection_title().
     void perform(edit::Step step);
-    /// --select with the operation and the modifiers of the settings. shape: as the functions of edit/shapes.h write it.
-    void select(const std::string& shape);
+    /// --select with the modifiers of the settings. shape: as the functions of edit/shapes.h write it.
+    void select(const std::string& shape, edit::Operation operation);
     void undo();
     void redo();
     /// Shows what a selection would take, in red, without changing anything; empty: ends that.

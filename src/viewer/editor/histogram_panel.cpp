@@ -11,6 +11,7 @@
 #include "viewer/editor/panel_controls.h"
 #include "viewer/editor/panel_sections.h"
 #include "viewer/editor/theme.h"
+#include "viewer/editor/tool_parts.h"
 
 namespace ewa::viewer {
 namespace {
@@ -82,7 +83,7 @@ void HistogramSection::draw_bins(Editor& editor, const Histogram& histogram) {
                            ImU32(accent(kRangeOpacity)));
         if (ImGui::IsItemDeactivated()) {
             first_.reset();
-            editor.select(range_of_bins(histogram, from, to));
+            editor.select(range_of_bins(histogram, from, to), held_operation(editor.settings));
         }
     }
     const uint32_t most = std::ranges::max(histogram.left);

@@ -10,6 +10,7 @@
 #include "core/text.h"
 #include "viewer/editor/panel_controls.h"
 #include "viewer/editor/panel_sections.h"
+#include "viewer/editor/tool_parts.h"
 
 namespace ewa::viewer {
 namespace {
@@ -113,7 +114,7 @@ void SelectionSection::draw_shape(Editor& editor) {
             if (const char* text = ImGui::GetClipboardText()) paste_shape(text, settings);
             break;
         case 2:
-            editor.select(shape());
+            editor.select(shape(), held_operation(settings));
             break;
         case 3:
             editor.perform({say::kCrop.name, {{"select", shape()}, {"select", "invert"}, {"delete", ""}}});

@@ -16,17 +16,15 @@ constexpr double kOutside = 100000;  // px; positions are clamped to this
 
 }  // namespace
 
-edit::Operation ToolRoom::operation() const {
+edit::Operation held_operation(const EditSettings& settings) {
     const ImGuiIO& io = ImGui::GetIO();
     if (io.KeyShift && io.KeyCtrl) return edit::Operation::intersect;
     if (io.KeyShift) return edit::Operation::add;
-    return io.KeyCtrl ? edit::Operation::remove : editor.settings.operation;
+    return io.KeyCtrl ? edit::Operation::remove : settings.operation;
 }
 
 void ToolRoom::select(const std::string& shape, edit::Operation operation) const {
-    const edit::Operation before = std::exchange(editor.settings.operation, operation);
-    editor.select(shape);
-    editor.settings.operation = before;
+    editor.select(shape, operation);
 }
 
 void ToolRoom::perform(const char* title, const char* name, const std::string& value) const {

@@ -15,6 +15,9 @@
 
 namespace ewa::viewer {
 
+/// The operation of the held keys; without them, that of the settings.
+edit::Operation held_operation(const EditSettings& settings);
+
 struct ToolRoom {
     ViewState& state;
     Navigation& navigation;
@@ -22,8 +25,7 @@ struct ToolRoom {
     Editor& editor;
 
     EditSettings& settings() const { return editor.settings; }
-    /// The operation of the held keys; without them, that of the panel.
-    edit::Operation operation() const;
+    edit::Operation operation() const { return held_operation(editor.settings); }
     void select(const std::string& shape, edit::Operation operation) const;
     /// Performs a step of one edit.
     void perform(const char* title, const char* name, const std::string& value = "") const;
