@@ -49,6 +49,13 @@ std::string quoted(const std::string& word) {
     return text;
 }
 
+/// Whether the edit selects without regard to the selection before.
+bool replaces_selection(const Words& words) {
+    constexpr const char* kFromBefore[] = {"add:", "remove:", "and:", "invert", "grow=", "shrink="};
+    return words.name == "select" &&
+           std::ranges::none_of(kFromBefore, [&](auto* begin) { return words.value.starts_with(begin); });
+}
+
 }  // namespace
 
 std::vector<Words> edits_of(std::span<const Step> steps) {
@@ -134,6 +141,16 @@ uint64_t History::bytes() const {
     for (const Step& step : steps_)
         for (const Words& words : step.edits) bytes += sizeof(Words) + words.value.capacity();
     return bytes;
+}
+
+std::vector<Words> needed_edits(const std::vector<Words>& edits) {
+    std::vector<Words> needed;
+    for (const Words& words : edits) {
+        if (replaces_selection(words))
+            while (!needed.empty() && needed.back().name == "select") needed.pop_back();
+        needed.push_back(words);
+    }
+    return needed;
 }
 
 std::string command_line(const std::vector<Words>& edits, const std::string& input,

@@ -67,6 +67,9 @@ class History {
     uint64_t version_ = 1, values_version_ = 1;
 };
 
+/// The edits without the selections that a later one replaces before anything else is done. The result is the same.
+std::vector<Words> needed_edits(const std::vector<Words>& edits);
+
 /// The line that does the same to other files: "ewa convert IN OUT --select ... --delete". Words are quoted for a POSIX shell.
 std::string command_line(const std::vector<Words>& edits, const std::string& input,
                          const std::string& output);

@@ -484,4 +484,22 @@ TEST(History, GivesTheCommandThatDoesTheSame) {
               "ewa convert 'it'\\''s.ply' b.ply --select x=0.. --delete --select 'polygon=0,0;view=1'");
 }
 
+TEST(History, NeedsNoSelectionThatALaterOneReplaces) {
+    const std::vector<Words> edits{
+        {"select", "x=0.."},  {"select", "add:y=0.."},      {"select", "z=..0"}, {"select", "remove:x=1.."},
+        {"lock", ""},         {"select", "y=..0"},          {"select", "all"},   {"select", "invert"},
+        {"select", "x=..0"},  {"select", "and:z=0.5.."},    {"hide", ""},        {"unlock", ""},
+        {"select", "z=..-1"}, {"select", "sphere=0,0,0,1"}, {"delete", ""},      {"select", "grow=0.1"}};
+    const std::vector<Words> needed{{"select", "z=..0"},   {"select", "remove:x=1.."},   {"lock", ""},
+                                    {"select", "x=..0"},   {"select", "and:z=0.5.."},    {"hide", ""},
+                                    {"unlock", ""},        {"select", "sphere=0,0,0,1"}, {"delete", ""},
+                                    {"select", "grow=0.1"}};
+    EXPECT_EQ(needed_edits(edits), needed);
+    const auto splats = some_splats(24);
+    History all(splats), some(splats);
+    all.perform(step(edits));
+    some.perform(step(needed));
+    EXPECT_EQ(some.splats().states(), all.splats().states());
+}
+
 }  // namespace

@@ -330,7 +330,8 @@ std::string Editor::command() const {
     if (scenes_.empty()) return "";
     const auto words = edit::edits_of({snapshot_->steps.data(), snapshot_->done});
     const fs::path& file = scenes_[active_]->file;
-    return edit::command_line(words, file.empty() ? "splats.ply" : file.string(), "edited.ply");
+    return edit::command_line(edit::needed_edits(words), file.empty() ? "splats.ply" : file.string(),
+                              "edited.ply");
 }
 
 }  // namespace ewa::viewer
