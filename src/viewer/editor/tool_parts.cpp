@@ -11,7 +11,7 @@
 namespace ewa::viewer {
 namespace {
 
-constexpr ImU32 kRim = IM_COL32(0, 0, 0, 150), kLabelBack = IM_COL32(0, 0, 0, 190);
+constexpr ImU32 kRim = IM_COL32(0, 0, 0, 220), kLabelBack = IM_COL32(0, 0, 0, 190);
 constexpr double kOutside = 100000;  // px; positions are clamped to this
 
 }  // namespace
@@ -86,7 +86,7 @@ void ToolPen::line(const std::vector<glm::dvec2>& points, ImU32 color, double wi
     path.reserve(points.size());
     for (const glm::dvec2& point : points) path.push_back(picture_.gui(point));
     const int count = int(path.size());
-    list_.AddPolyline(path.data(), count, kRim, ImDrawFlags_None, float(width + 2) * unit_);
+    list_.AddPolyline(path.data(), count, kRim, ImDrawFlags_None, float(width + 3) * unit_);
     list_.AddPolyline(path.data(), count, color, ImDrawFlags_None, float(width) * unit_);
 }
 
@@ -96,7 +96,7 @@ void ToolPen::segment(const Segment& segment, ImU32 color, double width) const {
 
 void ToolPen::circle(const glm::dvec2& center, double radius_px, ImU32 color) const {
     const float radius = float(radius_px / picture_.scale.x);
-    list_.AddCircle(picture_.gui(center), radius, kRim, 0, 3.5f * unit_);
+    list_.AddCircle(picture_.gui(center), radius, kRim, 0, 4.5f * unit_);
     list_.AddCircle(picture_.gui(center), radius, color, 0, 1.5f * unit_);
 }
 
