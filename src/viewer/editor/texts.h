@@ -22,7 +22,7 @@ inline constexpr ButtonText kPanel{"Panel", "F2", "Shows or hides the panel"};
 inline constexpr ButtonText kHelp{"Help", "F1", "All keys"};
 inline constexpr const char *kSaveAs = "Save as ...", *kMore = "More", *kSaving = "saving ...";
 inline constexpr const char *kUndone = "Undone: ", *kRedone = "Redone: ",
-                            *kNothingSelected = "nothing is selected";
+                            *kNothingSelected = "Nothing is selected.";
 inline constexpr const char *kSelected = "selected", *kWouldBeRemoved = "would be removed";
 inline constexpr const char* kEditsTraining = "edits go to the training";
 
@@ -239,17 +239,17 @@ inline constexpr Item kCopyCommand{"Copy as command",
 }  // namespace edit_panel
 // What the tools say over the picture.
 inline constexpr const char *kNeedsPinhole =
-                                "this tool needs a view without distortion; the view has changed to one",
-                            *kPolygonViewChanged = "the view has moved; click the corners again",
-                            *kNoSurface = "no splat is opaque enough here",
-                            *kNoLevel = "the three points are nearly on a line; click three others",
-                            *kLiveRefuses = "a training that runs takes selections, deletes and locks alone",
-                            *kLiveUndo = "the training has this edit already and cannot take it back",
+                                "This tool needs a view without distortion. The view has changed to one.",
+                            *kPolygonViewChanged = "The view has moved. Click the corners again.",
+                            *kNoSurface = "No splat is opaque enough here.",
+                            *kNoLevel = "The three points are nearly on a line. Click three others.",
+                            *kLiveRefuses = "A training that runs takes selections, deletes and locks alone.",
+                            *kLiveUndo = "The training has this edit already, and cannot take it back.",
                             *kNewerSplats =
-                                "newer splats of the run wait until your edits are saved or undone",
-                            *kNoGround = "no ground is found; click three points of it",
+                                "Newer splats of the run wait until your edits are saved or undone.",
+                            *kNoGround = "No ground is found. Click three points of it.",
                             *kTrueLength = "True length",
-                            *kPointsEdited = "points of a dataset cannot be edited; train first",
+                            *kPointsEdited = "Points of a dataset cannot be edited. Train first.",
                             *kShapeButtons[] = {"Select", "Add", "Remove",
                                                 "Intersect"};  // as edit::Operation
 inline constexpr const char *kPointOf = "Level: point {} of 3",
