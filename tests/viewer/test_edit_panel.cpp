@@ -348,6 +348,28 @@ TEST(EditSnapshot, TheMiddleIsThatOfWhatAMoveChanges) {
     EXPECT_EQ((*editor.snapshot().bounds_of_all)[1].x, 3);
 }
 
+TEST(Editor, ShowsTheSceneThatIsEdited) {
+    auto splats = std::make_shared<Gaussians>();
+    splats->resize(1);
+    constexpr size_t kBudget = 1000;
+    Editor editor(
+        {}, [] {}, kBudget);
+    editor.enter("first", {}, splats, {}, false);
+    editor.show(0, false);
+    EXPECT_TRUE(editor.scene(0).shown) << "the only one";
+    editor.add("second", {}, splats);
+    EXPECT_EQ(editor.active(), 1u);
+    editor.show(1, false);
+    EXPECT_EQ(editor.active(), 0u);
+    EXPECT_FALSE(editor.scene(1).shown);
+    editor.show(0, false);
+    EXPECT_TRUE(editor.scene(0).shown) << "the only one that is shown";
+    editor.activate(1);
+    EXPECT_TRUE(editor.scene(1).shown);
+    editor.show(0, false);
+    EXPECT_EQ(editor.active(), 1u);
+}
+
 TEST(PlacementText, MovesTurnsAndScalesAboutThePoint) {
     const glm::dvec3 about(3, -2, 7);
     EXPECT_EQ(placement_text(about, {.position = about}), "");

@@ -139,10 +139,17 @@ void Editor::activate(size_t scene) {
     if (scene >= scenes_.size()) return;
     active_ = scene;
     worker_->activate(scenes_[scene]->id);
+    if (!scenes_[scene]->shown) show(scene, true);
 }
 
 void Editor::show(size_t scene, bool shown) {
     if (scene >= scenes_.size()) return;
+    if (!shown && scene == active_) {
+        const auto other = std::ranges::find_if(
+            scenes_, [&](const auto& each) { return each->shown && each != scenes_[scene]; });
+        if (other == scenes_.end()) return;
+        activate(size_t(other - scenes_.begin()));
+    }
     scenes_[scene]->shown = shown;
     worker_->show(scenes_[scene]->id, shown);
 }

@@ -99,6 +99,7 @@ class Editor {
     const EditedScene& scene(size_t i) const { return *scenes_[i]; }
     size_t active() const { return active_; }
     void activate(size_t scene);
+    /// The active scene is always shown: if it is hidden, another one becomes active. The only one that is shown stays.
     void show(size_t scene, bool shown);
     void close(size_t scene);
     /// The selection becomes a scene of its own: this history and --select invert --delete. Undo takes it back.
