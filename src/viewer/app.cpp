@@ -149,9 +149,10 @@ void App::handle_key(const KeyPress& press) {
     // A text field does not use these keys, so they act while one is edited. The other keys belong to the field.
     // Asked again while the dialog of unsaved edits is open, the window closes. The journal has the edits.
     if (key == GLFW_KEY_Q && press.control) return state_.window.close();
-    if (dialogs_.open()) {
-        if (key == GLFW_KEY_ENTER || key == GLFW_KEY_KP_ENTER) press_modal(Choice::confirm);
-        if (key == GLFW_KEY_ESCAPE) press_modal(Choice::cancel);
+    const bool confirms = key == GLFW_KEY_ENTER || key == GLFW_KEY_KP_ENTER,
+               answers = confirms || key == GLFW_KEY_ESCAPE;
+    if (dialogs_.open() || (answers && ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopup))) {
+        if (answers) press_modal(confirms ? Choice::confirm : Choice::cancel);
         return;
     }
     if (key == GLFW_KEY_S && press.control) return press.shift ? dialogs_.save_as() : dialogs_.save();

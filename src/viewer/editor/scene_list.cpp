@@ -7,6 +7,7 @@
 
 #include "core/text.h"
 #include "viewer/editor/icons.h"
+#include "viewer/editor/modal.h"
 #include "viewer/editor/panel_controls.h"
 #include "viewer/editor/panel_sections.h"
 #include "viewer/editor/theme.h"
@@ -18,19 +19,20 @@ constexpr size_t kMostRows = 10;          // of the history, without scrolling
 constexpr size_t kMostHintLetters = 300;  // of a step's words
 
 /// Returns whether the scene is to be closed.
-bool close_button(bool unsaved) {
+bool close_button(bool unsaved, bool enabled) {
     bool close = false;
+    ImGui::BeginDisabled(!enabled);
     if (ImGui::Button("x", ImVec2(ImGui::GetFrameHeight(), 0))) {
         close = !unsaved;
         if (unsaved) ImGui::OpenPopup("question");
     }
+    ImGui::EndDisabled();
     ui::show_hint(say::kCloseScene);
     if (ImGui::BeginPopup("question")) {
         ImGui::TextUnformatted(say::kCloseQuestion);
-        const int clicked =
-            ui::button_line({{say::kDiscard, true, ui::ButtonLook::danger}, {{say::kCancel.name}}});
-        close = clicked == 0;
-        if (clicked >= 0) ImGui::CloseCurrentPopup();
+        const Choice choice = draw_choices(say::kDiscard, nullptr, say::kCancel.name);
+        close = choice == Choice::confirm;
+        if (choice != Choice::none) ImGui::CloseCurrentPopup();
         ImGui::EndPopup();
     }
     return close;
@@ -71,12 +73,15 @@ void history_row(Editor& editor, size_t done) {
 void draw_scenes(Editor& editor) {
     ImGui::PushID("scenes");
     std::optional<size_t> closed;
+    size_t shown = 0;
+    for (size_t i = 0; i < editor.scenes(); ++i) shown += editor.scene(i).shown;
     for (size_t i = 0; i < editor.scenes(); ++i) {
         const EditedScene& scene = editor.scene(i);
         const float side = ImGui::GetFrameHeight(), gap = ImGui::GetStyle().ItemSpacing.x;
         ImGui::PushID(int(i));
         const Icon eye = scene.shown ? Icon::eye : Icon::eye_off;
-        if (icon_button(eye, say::kShowScene, false, true, side)) editor.show(i, !scene.shown);
+        const bool free = !scene.shown || shown > 1;
+        if (icon_button(eye, say::kShowScene, false, free, side)) editor.show(i, !scene.shown);
         ImGui::SameLine();
         ImGui::PushStyleVar(ImGuiStyleVar_SelectableTextAlign, ImVec2(0, 0.5f));
         const float width = std::max(side, ImGui::GetContentRegionAvail().x - 2 * (side + gap));
@@ -93,7 +98,7 @@ void draw_scenes(Editor& editor) {
             ui::show_hint(say::kUnsaved);
         }
         ImGui::SameLine();
-        if (close_button(scene.unsaved)) closed = i;
+        if (close_button(scene.unsaved, editor.scenes() > 1)) closed = i;
         ImGui::PopID();
     }
     if (ui::button_line({{say::kAddScene}}) == 0) editor.wants_scene = true;
@@ -114,8 +119,9 @@ void draw_history(Editor& editor) {
                 history_row(editor, rows - 1 - size_t(row));
     }
     ImGui::EndChild();
-    if (ui::button_line({{say::kCopyCommand, now.done > 0}}) == 0)
+    if (ui::button_line({{say::kCopyCommand, now.done > 0}}) == 0) {
         ImGui::SetClipboardText(editor.command().c_str());
+    }
     ImGui::TextDisabled(
         "%s", fmt::format(say::kMemory, double(now.history_bytes) / (1 << 20), now.milliseconds).c_str());
     ImGui::PopID();
