@@ -151,10 +151,11 @@ void App::handle_key(const KeyPress& press) {
     if (key == GLFW_KEY_Q && press.control) return state_.window.close();
     const bool confirms = key == GLFW_KEY_ENTER || key == GLFW_KEY_KP_ENTER,
                answers = confirms || key == GLFW_KEY_ESCAPE;
-    if (dialogs_.open() || (answers && ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopup))) {
+    if (dialogs_.open()) {
         if (answers) press_modal(confirms ? Choice::confirm : Choice::cancel);
         return;
     }
+    if (answers && ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopup)) return;
     if (key == GLFW_KEY_S && press.control) return press.shift ? dialogs_.save_as() : dialogs_.save();
     if (key == GLFW_KEY_O && press.control)
         return session_.dialog.ask(press.shift ? Wanted::folder : Wanted::file);

@@ -310,6 +310,13 @@ TEST(EditNews, SaysWhatWasDoneAndWithHowManySplats) {
     EXPECT_EQ(edit_news(deleted, first), "") << "another scene";
 }
 
+TEST(BrokenLines, EndBetweenWordsAndNumbers) {
+    EXPECT_EQ(broken_lines("", 10), "");
+    EXPECT_EQ(broken_lines("--select sphere=0.125,-1.5,2,0.5;front --delete", 20),
+              "--select \nsphere=0.125,-1.5,2,\n0.5;front --delete");
+    EXPECT_EQ(broken_lines("0.940075879 1 2", 4), "0.940075879 \n1 2");
+}
+
 TEST(PartText, SaysTheShareWithoutExponents) {
     EXPECT_EQ(part_text(0, 73'284), "0 splats (0 %)");
     EXPECT_EQ(part_text(0, 0), "0 splats (0 %)");

@@ -98,6 +98,21 @@ std::string edit_news(const EditSnapshot& before, const EditSnapshot& now) {
     return fmt::format("{}, {}, {:.0f} ms", text, core::grouped(splats, "splat"), now.milliseconds);
 }
 
+std::string broken_lines(std::string_view text, size_t most) {
+    std::string lines;
+    for (size_t used = 0; !text.empty();) {
+        const size_t end = std::min(text.find_first_of(" ,;"), text.size() - 1) + 1;
+        if (used > 0 && used + end > most) {
+            lines += '\n';
+            used = 0;
+        }
+        lines += text.substr(0, end);
+        used += end;
+        text.remove_prefix(end);
+    }
+    return lines;
+}
+
 std::string part_text(size_t count, size_t of) {
     constexpr double kLeastPercent = 0.001;
     const double percent = of > 0 ? 100.0 * double(count) / double(of) : 0;

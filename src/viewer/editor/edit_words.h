@@ -17,6 +17,9 @@ std::string selection_title(std::string_view shape);
 /// nothing that is known.
 std::string edit_news(const EditSnapshot& before, const EditSnapshot& now);
 
+/// The text in lines of at most so many letters, which end behind spaces, commas and semicolons. A longer word has a line alone.
+std::string broken_lines(std::string_view text, size_t most);
+
 /// "1,234 splats (0.12 %)": so many of all.
 std::string part_text(size_t count, size_t of);
 

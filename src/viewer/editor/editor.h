@@ -127,6 +127,7 @@ class Editor {
         std::vector<edit::Step> done;     // steps that have changed something
     };
     News take();
+    void say(std::string note) { note_ = std::move(note); }  // News::note of the next take()
     /// The state of the active scene.
     const EditSnapshot& snapshot() const { return *snapshot_; }
     /// The splats of all scenes that are shown, joined: what the render thread gets.

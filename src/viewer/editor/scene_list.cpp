@@ -17,6 +17,7 @@ namespace {
 
 constexpr size_t kMostRows = 10;          // of the history, without scrolling
 constexpr size_t kMostHintLetters = 300;  // of a step's words
+constexpr size_t kHintLetters = 32;       // of a line of them
 
 /// Returns whether the scene is to be closed.
 bool close_button(bool unsaved, bool enabled) {
@@ -57,7 +58,10 @@ void history_row(Editor& editor, size_t done) {
                           ImGui::GetStyleColorVec4(undone ? ImGuiCol_TextDisabled : ImGuiCol_Text));
     const std::string title = done == 0 ? say::kBeginning : core::one_line(now.steps[done - 1].title);
     const bool clicked = ImGui::Selectable("##step", done == now.done);
-    if (done > 0 && ImGui::IsItemHovered()) ui::show_hint(words_of(now.steps[done - 1]).c_str());
+    if (done > 0 && ImGui::IsItemHovered()) {
+        const std::string words = broken_lines(words_of(now.steps[done - 1]), kHintLetters);
+        ui::show_hint((title + "\n" + words).c_str());
+    }
     ImGui::SameLine();
     ImGui::TextUnformatted(title.c_str());
     ImGui::PopStyleColor();
@@ -121,6 +125,7 @@ void draw_history(Editor& editor) {
     ImGui::EndChild();
     if (ui::button_line({{say::kCopyCommand, now.done > 0}}) == 0) {
         ImGui::SetClipboardText(editor.command().c_str());
+        editor.say(say::kCopied);
     }
     ImGui::TextDisabled(
         "%s", fmt::format(say::kMemory, double(now.history_bytes) / (1 << 20), now.milliseconds).c_str());

@@ -230,8 +230,8 @@ inline constexpr const char *kDragRange = "drag a range to select it", *kCountin
 // Scenes and history.
 inline constexpr const char *kShowScene = "Show or hide", *kUnsaved = "has edits that are not saved",
                             *kCloseScene = "Close", *kCloseQuestion = "Close without saving its edits?",
-                            *kDiscard = "Discard edits", *kBeginning = "Opened",
-                            *kMemory = "{:.1f} MiB, last edit {:.0f} ms";
+                            *kDiscard = "Discard edits", *kCopied = "The command is copied.",
+                            *kBeginning = "Opened", *kMemory = "{:.1f} MiB, last edit {:.0f} ms";
 inline constexpr Item kAddScene{"Add a scene", "Open another file beside this one"};
 inline constexpr Item kCopyCommand{"Copy as command",
                                    "The line of ewa convert that does the same to the file"};
