@@ -254,7 +254,10 @@ bool edit_scene(const ConvertArguments& arguments, Work& work, std::optional<fol
     for (const fs::path& journal : arguments.editing.journals)
         for (std::string& remark : edit::journal_remarks(journal, work.gaussians.size()))
             work.lost.push_back(std::move(remark));
-    const edit::Applied applied = edit::apply(work.gaussians, edits, cameras_of(run));
+    std::vector<std::string> compared;
+    const edit::Applied applied =
+        edit::apply(work.gaussians, edits, cameras_of(run, compared, arguments.quiet));
+    work.lost.insert(work.lost.end(), compared.begin(), compared.end());
     work.lost.insert(work.lost.end(), applied.remarks.begin(), applied.remarks.end());
     for (const std::string& warning : applied.warnings) core::warn(core::one_line(warning));
     for (const edit::Outcome& outcome : applied.outcomes) {

@@ -3,6 +3,7 @@
 #pragma once
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "edit/edits.h"
@@ -23,8 +24,10 @@ struct EditArguments {
 /// The edits that the parsed command line names, in the order in which they were typed. Throws InputError for a wrong value.
 std::vector<edit::Edit> typed_edits(const CLI::App& app);
 
-/// The cameras of the run, which some filters of splats use. Empty without a run.
-edit::Cameras cameras_of(const std::optional<folders::Run>& run);
+/// The cameras and photos of the run, which some filters of splats use. Empty without a run. remarks: lives as long as the result, and
+/// gets a line for each comparison with the photos, whose progress is printed unless quiet.
+edit::Cameras cameras_of(const std::optional<folders::Run>& run, std::vector<std::string>& remarks,
+                         bool quiet);
 
 /// Writes an image of the splats `all`: removed ones in red, others in grey. left: indices into `all` of those not removed.
 /// Throws RunError.

@@ -64,6 +64,16 @@ Edit fixed(const char* text) {
     return {.text = text, .filter = [](const Gaussians& g, const Cameras&) { return stay(g); }};
 }
 
+Edit remove_contradicted(const std::string&) {
+    return {.text = "--remove-contradicted", .filter = [](const Gaussians& g, const Cameras& cameras) {
+                std::vector<uint32_t> all(g.size());
+                std::iota(all.begin(), all.end(), 0u);
+                std::vector<bool> flags = contradicted_splats(g, all, cameras, "--remove-contradicted");
+                flags.flip();
+                return flags;
+            }};
+}
+
 void level_by_ground(EditedSplats& splats) {
     const glm::dvec3 up = scene::guessed_up(*splats.splats());
     const auto matrix = level_ground(*splats.splats(), splats.states(), up);
@@ -218,6 +228,9 @@ constexpr std::array kRows{
         "Remove groups of fewer than 10 splats that touch no others of about their size",
         [](const std::string&) { return fixed<grounded_splats>("--remove-floaters"); },
         "Remove small groups of splats far from others"},
+    Row{"remove-contradicted", "",
+        "Of a training run: remove splats without which renders are closer to its training images",
+        remove_contradicted, "Remove splats that the photos of a run contradict"},
     Row{"largest-cluster", "", "Keep only the largest group of splats that touch others of about their size",
         [](const std::string&) { return fixed<largest_cluster>("--largest-cluster"); }},
     Row{"max-sh", "0..3", "Reduce the spherical harmonics to this degree", max_sh,
@@ -230,7 +243,9 @@ constexpr std::array kRows{
     Row{"select", "SHAPE",
         "Select splats; --transform and the options from here on then change these alone. SHAPE: a FILTER of "
         "--where, "
-        "all, none, invert, color=r,g,b,T, flood=x,y,z,T, cluster=x,y,z, floaters, far, grow=R, shrink=R, or "
+        "all, none, invert, color=r,g,b,T, flood=x,y,z,T, cluster=x,y,z, floaters, far, contradicted, "
+        "grow=R, "
+        "shrink=R, splats=0,3,7-9, or "
         "a polygon or "
         "brush in a view, as ewa-view writes it. add:, remove: or and: before it combines it with the "
         "selection",

@@ -161,6 +161,16 @@ std::vector<bool> grounded_splats(const Gaussians& gaussians) {
     return splats_with(gaussians, [&](size_t i) { return groups.sizes[groups.of[i]] >= kLeastGroup; });
 }
 
+std::vector<bool> contradicted_splats(const Gaussians& gaussians, const std::vector<uint32_t>& left,
+                                      const Cameras& cameras, const std::string& what) {
+    if (!cameras.contradicted)
+        throw InputError(
+            what +
+            ": photos are known of the folder of a training run alone, before its splats move or "
+            "others join them");
+    return cameras.contradicted(gaussians, left);
+}
+
 std::vector<bool> largest_cluster(const Gaussians& gaussians) {
     const scene::SplatGroups groups = scene::touching_groups(gaussians);
     return splats_with(gaussians, [&](size_t i) { return groups.of[i] == 0; });

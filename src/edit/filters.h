@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Filters, which decide for each splat of a scene whether it stays.
 #pragma once
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <string>
@@ -12,7 +13,12 @@
 namespace ewa::edit {
 
 /// Returns the cameras of the run that trained the splats. Throws InputError if there are none.
-using Cameras = std::function<std::vector<Camera>()>;
+struct Cameras : std::function<std::vector<Camera>()> {
+    using function::function;
+    /// Returns for each splat whether the run's photos contradict it (pipeline/contradicted.h). left: indices of the splats that there
+    /// are. Empty: there are no photos. Throws InputError and RunError.
+    std::function<std::vector<bool>(const Gaussians&, const std::vector<uint32_t>& left)> contradicted;
+};
 
 /// Returns for each splat whether it stays.
 using Filter = std::function<std::vector<bool>(const Gaussians&, const Cameras&)>;
@@ -41,6 +47,9 @@ Filter parse_filter(const std::string& text, const std::string& what);
 std::vector<bool> drawable_splats(const Gaussians& gaussians);
 /// A filter that keeps splats in groups of at least 10 splats that touch (scene::touching_groups).
 std::vector<bool> grounded_splats(const Gaussians& gaussians);
+/// Cameras::contradicted. Throws InputError that begins with `what` if there are no photos.
+std::vector<bool> contradicted_splats(const Gaussians& gaussians, const std::vector<uint32_t>& left,
+                                      const Cameras& cameras, const std::string& what);
 /// A filter that keeps the largest group of splats that touch.
 std::vector<bool> largest_cluster(const Gaussians& gaussians);
 

@@ -8,6 +8,7 @@
 #include <new>
 #include <utility>
 
+#include "edit/shapes.h"
 #include "ewa/error.h"
 
 namespace ewa::edit {
@@ -83,8 +84,14 @@ bool History::perform(const Step& step) {
     const EditedSplats::Extent extent = splats_.extent();
     const std::vector<uint8_t> states = splats_.states();
     const auto values = splats_.splats();
+    Step done = step;
     try {
-        for (const Edit& edit : edits) perform_on(splats_, edit);
+        for (size_t k = 0; k < edits.size(); ++k) {
+            Words& words = done.edits[k];
+            if (words.name == "select" && write_contradicted(words.value, splats_))
+                edits[k] = parse(words.name, words.value);
+            perform_on(splats_, edits[k]);
+        }
     } catch (...) {
         splats_.rewind(extent);
         splats_.set_states(states);
@@ -94,7 +101,7 @@ bool History::perform(const Step& step) {
     if (!changes && splats_.states() == states) return false;
     steps_.resize(done_);
     before_.resize(done_);
-    steps_.push_back(step);
+    steps_.push_back(std::move(done));
     before_.push_back({extent, packed_difference(states, splats_.states()), changes});
     ++done_;
     ++version_;

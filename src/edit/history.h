@@ -36,7 +36,8 @@ class History {
     explicit History(std::shared_ptr<const Gaussians> splats, Cameras cameras = {});
 
     /// Performs a step, and drops the steps that were undone. Throws InputError, and changes nothing, for an edit that cannot be
-    /// read or done. Only edits of a selection are allowed. Returns whether any splat has changed.
+    /// read or done. Only edits of a selection are allowed. Returns whether any splat has changed. steps().back() is then the step, with
+    /// splats= in place of `contradicted`.
     bool perform(const Step& step);
     bool undo();  // false: there is nothing to undo
     bool redo();

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <optional>
+#include <sstream>
 
 #include "core/text.h"
 #include "core/typing.h"
@@ -157,6 +158,57 @@ Shape shape_of_color(const glm::dvec3& color, double tolerance) {
     };
 }
 
+constexpr std::string_view kContradicted = "contradicted";
+
+Shape contradicted(const std::string& what) {
+    return [=](const EditedSplats& all) {
+        std::vector<uint32_t> left;
+        for (size_t i = 0; i < all.first()->size(); ++i)
+            if ((all.states()[i] & kDeleted) == 0) left.push_back(uint32_t(i));
+        std::vector<bool> flags = contradicted_splats(*all.first(), left, all.cameras(), what);
+        flags.resize(all.size());
+        return flags;
+    };
+}
+
+/// text: "3,7,9-12".
+Shape listed(const std::string& text, const std::string& what) {
+    std::vector<std::pair<uint32_t, uint32_t>> ranges;
+    std::istringstream words(text);
+    for (std::string word; std::getline(words, word, ',');) {
+        const size_t dash = std::min(word.find('-'), word.size());
+        const auto first = core::parse_integer<uint32_t>(word.substr(0, dash));
+        const auto last = dash < word.size() ? core::parse_integer<uint32_t>(word.substr(dash + 1)) : first;
+        if (!first || !last || *first > *last)
+            throw InputError(what + ": '" + word.substr(0, 40) +
+                             "' is no number or range of splats=3,7,9-12");
+        ranges.emplace_back(*first, *last);
+    }
+    if (ranges.empty()) throw InputError(what + ": splats= names no splat");
+    return [=](const EditedSplats& all) {
+        std::vector<bool> flags(all.size());
+        for (const auto& [first, last] : ranges) {
+            if (last >= all.size())
+                throw InputError(fmt::format("{}: there is no splat {} among {}", what, last, all.size()));
+            std::fill(flags.begin() + first, flags.begin() + last + 1, true);
+        }
+        return flags;
+    };
+}
+
+std::string list_of(const std::vector<bool>& flags) {
+    std::string text;
+    for (size_t i = 0; i < flags.size(); ++i) {
+        if (!flags[i]) continue;
+        size_t last = i;
+        while (last + 1 < flags.size() && flags[last + 1]) ++last;
+        text += (text.empty() ? "splats=" : ",") + std::to_string(i);
+        if (last > i) text += "-" + std::to_string(last);
+        i = last;
+    }
+    return text.empty() ? "none" : text;
+}
+
 double radius_of(const std::string& what, const std::string& text, const std::string& value) {
     constexpr const char* kForm = "grow=R or shrink=R with a distance above 0";
     const double radius = numbers_of(what, text, value, 1, kForm).front();
@@ -169,6 +221,7 @@ Shape parse_shape(const std::string& text, const std::string& what) {
     if (text == "none") return same(false);
     if (text == "invert") return inverted();
     if (text == "floaters" || text == "far") return small_groups(text == "far");
+    if (text == kContradicted) return contradicted(what);
     const size_t equals = std::min(text.find('='), text.size());
     const std::string name = text.substr(0, equals),
                       value = equals < text.size() ? text.substr(equals + 1) : "";
@@ -181,6 +234,7 @@ Shape parse_shape(const std::string& text, const std::string& what) {
         const glm::dvec3 at(n[0], n[1], n[2]);
         return name == "color" ? shape_of_color(at, n[3]) : flood(at, n[3]);
     }
+    if (name == "splats") return listed(value, what);
     if (name == "cluster") {
         const auto n = numbers_of(what, text, value, 3, "cluster=x,y,z");
         return cluster({n[0], n[1], n[2]});
@@ -188,10 +242,11 @@ Shape parse_shape(const std::string& text, const std::string& what) {
     if (name == "grow" || name == "shrink") return resized(radius_of(what, text, value), name == "grow");
     if (equals == text.size())
         refuse_shape(what, text,
-                     "all, none, invert, floaters, far, a filter of --where, color=, flood=, cluster=, "
-                     "grow=, shrink=, "
+                     "all, none, invert, floaters, far, contradicted, a filter of --where, color=, flood=, "
+                     "cluster=, grow=, shrink=, splats=, "
                      "polygon= or brush=" +
-                         core::did_you_mean(text, {"all", "none", "invert", "floaters", "far"}));
+                         core::did_you_mean(
+                             text, {"all", "none", "invert", "floaters", "far", std::string(kContradicted)}));
     return of_filter(parse_filter(text, what));
 }
 
@@ -218,6 +273,13 @@ void select(EditedSplats& splats, const Selection& selection) {
         states[i] = uint8_t((states[i] & ~kSelected) | (now ? kSelected : 0));
     }
     splats.set_states(std::move(states));
+}
+
+bool write_contradicted(std::string& selection, const EditedSplats& splats) {
+    const size_t at = selection.find(':') + 1;  // behind an operation; 0 without one
+    if (std::string_view(selection).substr(at) != kContradicted) return false;
+    selection.replace(at, kContradicted.size(), list_of(parse_selection(selection.substr(at)).shape(splats)));
+    return true;
 }
 
 std::string box_shape(const glm::dvec3& low, const glm::dvec3& high) {

@@ -31,10 +31,16 @@ struct Selection {
 ///   cluster=x,y,z                     the group of touching splats that the nearest one to this point is in
 ///   floaters                          groups of fewer than 10 touching splats
 ///   far                               all but the largest group
+///   contradicted                      splats as they were at first, which the photos of their run contradict. Results of devices differ:
+///                                     a history writes splats= in its place.
+///   splats=3,7,9-12                   these splats, by their numbers from 0 on
 ///   grow=R, shrink=R                  of the present selection, by R world units
 /// VIEW is "fx,fy,cx,cy,w,x,y,z,tx,ty,tz": a pinhole's intrinsics (px), and the pose of world points in camera axes. With "parallel:"
 /// before it, fx and fy are px per world unit of parallel rays.
 Selection parse_selection(const std::string& text, const std::string& what = "--select");
+
+/// Replaces `contradicted` in a --select by the numbers of its splats, as splats= or none. Returns whether the text was one.
+bool write_contradicted(std::string& selection, const EditedSplats& splats);
 
 // What tools write; edit/view_shapes.h has the others.
 std::string box_shape(const glm::dvec3& low, const glm::dvec3& high);

@@ -149,6 +149,7 @@ TEST(ConvertClean, RefusesWithTheReason) {
     refuse({"--where", "sphere=1,2,3,0"}, "one above 0");
     refuse({"--where", "sphere=1,2,3,nan"}, "finite");
     refuse({"--where", "views=2.."}, "the folder of a training run");
+    refuse({"--remove-contradicted"}, "photos are known of the folder of a training run alone");
     refuse({"--dry-run", folder / "p.png"}, "no option removes splats");
     refuse({"--select", "all", "--duplicate", "--dry-run", folder / "p.png"}, "no option removes splats");
     refuse({"--where", "x=900.."}, "none of the 16 splats is left");

@@ -185,6 +185,47 @@ TEST(Selection, FollowsGroupsAndColours) {
     EXPECT_EQ(count("color=0.782,0.5,0.5,0.01"), 10);
 }
 
+TEST(Selection, TakesSplatsByTheirNumbers) {
+    const Gaussians g = balls({{0, 0, 0}, {1, 0, 0}, {3, 0, 0}, {9, 9, 9}}, 0.1);
+    using Flags = std::vector<bool>;
+    EXPECT_EQ(taken(g, "splats=3"), (Flags{false, false, false, true}));
+    EXPECT_EQ(taken(g, "splats=0,2-3"), (Flags{true, false, true, true}));
+    for (const char* shape :
+         {"splats=", "splats=1,,2", "splats=2-1", "splats=-1", "splats=1-x", "splats=4294967296"})
+        expect_error<InputError>([&] { parse_selection(shape); }, {"--select: ", "splats="});
+    expect_error<InputError>([&] { taken(g, "splats=2-4"); }, {"there is no splat 4 among 4"});
+    expect_error<InputError>([&] { taken(g, "contradicted"); }, {"--select: photos are known of the folder"});
+}
+
+TEST(Selection, OfContradictedSplatsIsWrittenAsTheirNumbers) {
+    Cameras cameras = [] { return std::vector<Camera>(); };
+    std::vector<std::vector<uint32_t>> asked;
+    cameras.contradicted = [&](const Gaussians& all, const std::vector<uint32_t>& left) {
+        asked.push_back(left);
+        std::vector<bool> flags(all.size());
+        for (const uint32_t i : left) flags[i] = i != 2;
+        return flags;
+    };
+    History history(std::make_shared<const Gaussians>(
+                        balls({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}, {4, 0, 0}}, 0.1)),
+                    cameras);
+    history.perform(step(
+        {{"select", "splats=0"}, {"delete", ""}, {"select", "x=1.5..2.5"}, {"select", "add:contradicted"}}));
+    EXPECT_EQ(asked, (std::vector<std::vector<uint32_t>>{{1, 2, 3, 4}}));
+    EXPECT_EQ(history.steps().back().edits.back(), (Words{"select", "add:splats=1,3-4"}));
+    EXPECT_EQ(selected(history), (std::vector<bool>{false, true, true, true, true}));
+    history.perform(step({{"delete", ""}}));
+    EXPECT_FALSE(history.perform(selection("contradicted")));
+    ASSERT_TRUE(history.undo() && history.undo() && history.redo());
+    EXPECT_EQ(asked.size(), 2u);
+    // Photos show the splats as they were at first.
+    history.perform(
+        step({{"select", "all"}, {"adjust", "opacity=0.1"}, {"duplicate", ""}, {"select", "contradicted"}}));
+    EXPECT_EQ(history.steps().back().edits.back(), (Words{"select", "splats=1,3-4"}));
+    history.perform(step({{"select", "all"}, {"transform", "move=1,0,0"}}));
+    expect_error<InputError>([&] { history.perform(selection("contradicted")); }, {"before its splats move"});
+}
+
 TEST(Selection, OfAPolygonIsThatOfProjectedCentres) {
     const auto splats = some_splats(3, 2000);
     Camera camera = camera_at({0, 1, 9});

@@ -425,12 +425,13 @@ void EditWorker::follow(uint64_t of, size_t step, bool undone) {
 void EditWorker::perform(uint64_t id, edit::Step step) {
     change(id, [this, id, step = std::move(step)](Scene& scene) {
         if (!scene.history->perform(step)) return;
-        steps_.push_back(step);
+        const edit::Step& performed = scene.history->steps().back();
+        steps_.push_back(performed);
         // Steps that were undone are dropped, and with them the scenes that they had separated.
         for (auto& [each, part] : scenes_)
             if (part.from == id && part.from_step >= scene.history->done()) part.from = 0;
         std::erase_if(scenes_, [](const auto& each) { return each.second.closed && each.second.from == 0; });
-        record(scene, [&](edit::Journal& journal) { journal.did(step); });
+        record(scene, [&](edit::Journal& journal) { journal.did(performed); });
     });
 }
 
