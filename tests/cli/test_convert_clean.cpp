@@ -2,12 +2,14 @@
 // What ewa convert removes, and what it says of that.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "cli/expect.h"
 #include "ewa/image.h"
 #include "ewa/splat_files.h"
+#include "support/transforms_scene.h"
 
 namespace {
 
@@ -127,6 +129,51 @@ TEST(ConvertClean, DryRunDrawsCopiesAsLeft) {
     EXPECT_GT(red({"--select", "x=..11", "--duplicate", "--select", "x=12..", "--delete"},
                   "--delete would remove 4 of 28 splats"),
               10u);
+}
+
+/// A run on two black photos, with a bright ball before their camera and 200 splats behind it.
+void make_run_with_a_floater(const TransformsScene& data, const std::filesystem::path& run) {
+    data.write();
+    Gaussians g;
+    g.resize(201);
+    for (size_t i = 0; i < g.size(); ++i) {
+        const float at[] = {i == 0 ? -1.0f : 100.0f + float(i), 2, 3};
+        std::copy_n(at, 3, &g.means[3 * i]);
+        for (size_t k = 0; k < 3; ++k) g.log_scales[3 * i + k] = std::log(0.2f);
+        g.quaternions[4 * i] = 1;
+        g.opacity_logits[i] = 2;
+        for (size_t k = 0; k < 3; ++k) g.sh[3 * i + k] = 1;
+    }
+    std::filesystem::create_directories(run);
+    ewa::save_splats(run / "splats.ply", g);
+    write_file(run / "config.json",
+               nlohmann::json{{"dataset", data.folder.path().string()}, {"test-every", 0}}.dump());
+}
+
+TEST(ConvertClean, RemovesWhatThePhotosOfARunContradict) {
+    const Folder folder;
+    const TransformsScene data;
+    const std::string run = folder / "run", out = folder / "o.ply";
+    make_run_with_a_floater(data, run);
+    const auto says = [&](const std::vector<std::string>& options, const std::string& said) {
+        std::vector<std::string> all = {"convert", run, out};
+        all.insert(all.end(), options.begin(), options.end());
+        const Outcome outcome = run_ewa(all);
+        expect_success(outcome);
+        EXPECT_NE(outcome.out.find(said), std::string::npos) << outcome.out;
+        EXPECT_NE(outcome.out.find("1 splat contradicted by the photos: mean squared error"),
+                  std::string::npos)
+            << outcome.out;
+    };
+    says({"--remove-contradicted", "--dry-run", folder / "p.png"},
+         "--remove-contradicted would remove 1 of 201 splats");
+    says({"--remove-contradicted"}, "--remove-contradicted removed 1 of 201 splats");
+    EXPECT_EQ(ewa::load_splats(out).means[0], 101);
+    says({"--select", "contradicted", "--delete"}, "--delete removed 1 of 201 splats");
+    expect_failure(run_ewa({"convert", run, out, "--transform", "move=1,0,0", "--remove-contradicted"}), 2,
+                   "before its splats move");
+    std::filesystem::remove_all(data.folder / "images");
+    expect_failure(run_ewa({"convert", run, out, "--remove-contradicted"}), 2, "image");
 }
 
 TEST(ConvertClean, RefusesWithTheReason) {
