@@ -18,6 +18,7 @@
 #include "folders/run_folder.h"
 #include "viewer/editor/modal.h"
 #include "viewer/editor/offers.h"
+#include "viewer/editor/photo_check.h"
 #include "viewer/editor/toolbar.h"
 #include "viewer/latest.h"
 
@@ -373,12 +374,14 @@ void App::enter_scene() {
     const std::filesystem::path file = file_of(scene);
     const bool journaled = !file.empty() && !live();
     edit::Cameras cameras;
-    if (scene.dataset && !scene.run.empty())
+    if (scene.dataset && !scene.run.empty()) {
         cameras = [dataset = scene.dataset] {
             std::vector<Camera> all;
             for (const Frame& frame : dataset->frames) all.push_back(frame.camera);
             return all;
         };
+        cameras.contradicted = contradicted_by_photos(scene, state_.startup.open_device, editor_.comparing());
+    }
     const Tool tool = live() ? editor_.settings.tool : Tool::view;
     editor_.enter(scene.title, file, entered_, cameras, journaled);
     editor_.settings.tool = tool;

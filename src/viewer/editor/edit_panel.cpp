@@ -26,7 +26,7 @@ void EditPanel::draw(Editor& editor, bool live) {
     const bool jump = std::exchange(show_cleaning_, false);
     const bool clean = ui::section(say::kClean, false, jump);
     if (jump) ImGui::SetScrollHereY(0);
-    clean ? clean_.draw(editor) : clean_.end(editor);
+    clean ? draw(clean_) : clean_.end(editor);
     if (ui::section(say::kHistogram, false)) draw(histogram_);
     if (ui::section(say::kScenes, editor.scenes() > 1)) draw_scenes(editor);
     if (ui::section(say::kHistory, false)) draw_history(editor);

@@ -2,6 +2,8 @@
 // What the window knows of the scene that is edited.
 #pragma once
 #include <array>
+#include <atomic>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -9,6 +11,15 @@
 #include "edit/history.h"
 
 namespace ewa::viewer {
+
+/// A comparison with photos, which the thread of the editor does for the selection `contradicted`.
+struct Comparing {
+    std::atomic<size_t> photo = 0, photos = 0;  // photo: from 1 on; 0: there is no comparison
+    std::atomic<uint64_t> task = 0,
+                          cancelled =
+                              0;  // numbers of the editor's tasks: in progress, and the last that is to end
+    bool stopped() const { return task <= cancelled; }
+};
 
 /// What the window shows of a scene after the last finished edit. It never changes.
 struct EditSnapshot {

@@ -60,6 +60,7 @@ EditWorker::EditWorker(std::function<void()> wake, size_t budget)
     : wake_(std::move(wake)), budget_(budget), thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
 EditWorker::~EditWorker() {
+    cancel();
     thread_.request_stop();
     thread_.join();
     for (auto& [id, scene] : scenes_)
@@ -69,6 +70,7 @@ EditWorker::~EditWorker() {
 void EditWorker::post(Task task) {
     const std::lock_guard lock(mutex_);
     ++pending_;
+    ++posted_;
     tasks_.push_back(std::move(task));
     waits_.notify_one();
 }
@@ -84,6 +86,7 @@ void EditWorker::work(const std::stop_token& stop) {
             if (stop.stop_requested()) return;
             task = std::move(tasks_.front());
             tasks_.pop_front();
+            ++comparing_->task;
         }
         const auto start = Clock::now();
         const auto attempt = [this](const auto& action) {
@@ -224,11 +227,18 @@ void EditWorker::find_preview() {
     previewed_.clear();
     const auto found = scenes_.find(active_);
     if (preview_.empty() || found == scenes_.end()) return;
-    const edit::EditedSplats& splats = found->second.history->splats();
-    std::vector<bool> flags = edit::parse_selection(preview_).shape(splats);
-    for (size_t i = 0; i < flags.size(); ++i)
-        if (!splats.selectable(i)) flags[i] = false;
-    previewed_ = std::move(flags);
+    edit::EditedSplats splats = found->second.history->splats();
+    previewed_.resize(splats.size());
+    for (const std::string& selection : preview_) {
+        const std::vector<bool> flags = edit::parse_selection(selection).shape(splats);
+        std::vector<uint8_t> states = splats.states();
+        for (size_t i = 0; i < flags.size(); ++i) {
+            if (!flags[i] || !splats.selectable(i)) continue;
+            previewed_[i] = true;
+            states[i] |= edit::kDeleted;
+        }
+        splats.set_states(std::move(states));
+    }
 }
 
 void EditWorker::add(uint64_t id, std::shared_ptr<const Gaussians> splats, edit::Cameras cameras,
@@ -296,6 +306,7 @@ void EditWorker::restore(uint64_t id, uint64_t of, Place place, edit::ReadJourna
 }
 
 void EditWorker::remove(uint64_t id, bool discard) {
+    cancel();
     post([this, id, discard] {
         const auto found = scenes_.find(id);
         if (found == scenes_.end()) return;
@@ -459,10 +470,14 @@ void EditWorker::saved(uint64_t id, const std::vector<edit::Step>& steps) {
     });
 }
 
-void EditWorker::preview(const std::string& selection) {
-    post([this, selection] {
-        preview_ = selection;
-        find_preview();
+void EditWorker::preview(const std::vector<std::string>& selections) {
+    post([this, selections] {
+        preview_ = selections;
+        try {
+            find_preview();
+        } catch (const std::exception& error) {
+            note_ = error.what();  // what is found so far is shown
+        }
     });
 }
 

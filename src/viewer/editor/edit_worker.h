@@ -55,7 +55,8 @@ class EditWorker {
     void redo(uint64_t scene);
     /// These edits of state_of() are in a file that was saved.
     void saved(uint64_t scene, const std::vector<edit::Step>& steps);
-    void preview(const std::string& selection);
+    /// selections: each of the splats that those before leave; empty: none.
+    void preview(const std::vector<std::string>& selections);
     void drag(const std::optional<glm::dmat4>& transform);  // a newer one replaces one that waits
 
     /// The steps in effect and the splats of a scene, once all tasks before are done.
@@ -74,6 +75,10 @@ class EditWorker {
         bool unsaved;    // its lasting edits are others than at the last save
         bool journaled;  // its journal has all edits
     };
+
+    const std::shared_ptr<Comparing>& comparing() const { return comparing_; }
+    /// Ends the comparisons with photos of all tasks up to now. These tasks then change nothing.
+    void cancel() { comparing_->cancelled = posted_.load(); }
 
     /// What has been done since the last take().
     struct Done {
@@ -129,8 +134,8 @@ class EditWorker {
     // The thread alone uses these.
     std::map<uint64_t, Scene> scenes_;
     uint64_t active_ = 0;
-    std::string preview_;          // a selection; empty: none
-    std::vector<bool> previewed_;  // of the active scene's splats; empty: none
+    std::vector<std::string> preview_;  // selections; empty: none
+    std::vector<bool> previewed_;       // of the active scene's splats; empty: none
     std::optional<glm::dmat4> drag_;
     std::shared_ptr<const Gaussians> joined_;
     std::vector<std::pair<uint64_t, uint64_t>> joined_of_;  // scenes, with the versions of their values
@@ -141,6 +146,8 @@ class EditWorker {
     std::string note_;
     uint64_t period_ = 0;  // number of clear() so far
 
+    std::shared_ptr<Comparing> comparing_ = std::make_shared<Comparing>();
+    std::atomic<uint64_t> posted_ = 0;  // tasks so far
     std::atomic<int> pending_ = 0;
     std::mutex mutex_;
     int finished_ = 0;  // tasks since the last take()

@@ -229,8 +229,13 @@ void Editor::redo() {
     if (!scenes_.empty()) worker_->redo(now().id);
 }
 
-void Editor::preview(const std::string& selection) {
-    worker_->preview(selection);
+void Editor::preview(const std::vector<std::string>& selections) {
+    if (selections.empty()) worker_->cancel();
+    worker_->preview(selections);
+}
+
+const std::shared_ptr<Comparing>& Editor::comparing() const {
+    return worker_->comparing();
 }
 
 void Editor::drag(const std::optional<glm::dmat4>& transform) {

@@ -112,8 +112,11 @@ class Editor {
     void select(const std::string& shape, edit::Operation operation);
     void undo();
     void redo();
-    /// Shows what a selection would take, in red, without changing anything; empty: ends that.
-    void preview(const std::string& selection);
+    /// Shows in red what selections would take, each of the splats that those before leave. Nothing changes. None: ends that, and
+    /// comparisons with photos.
+    void preview(const std::vector<std::string>& selections);
+    /// The comparison with photos in progress.
+    const std::shared_ptr<Comparing>& comparing() const;
     std::optional<size_t> preview_count() const { return preview_count_; }
 
     /// While a gizmo is dragged: the transform of the selection that is drawn. Empty: none. The edit itself is perform().

@@ -64,16 +64,18 @@ class CleanSection {
     void draw(Editor& editor);
     /// Ends the preview, if there is one.
     void end(Editor& editor);
+    bool waiting() const { return waiting_; }
 
   private:
     void draw_rule(Editor& editor, const ui::Text& text, std::initializer_list<ui::Button> first,
-                   const char* title, const std::string& shape);
-    void preview(Editor& editor, const std::string& shape);
-    void remove(Editor& editor, const char* title, const std::string& shape);
-    std::string previewed_;  // a shape of edit/shapes.h; empty: none
-    std::string_view rule_;  // the rule of it, also while its number is changed
+                   const char* title, const std::vector<std::string>& shapes);
+    void preview(Editor& editor, const std::vector<std::string>& shapes);
+    void remove(Editor& editor, const char* title, const std::vector<std::string>& shapes);
+    std::vector<std::string> previewed_;  // shapes of edit/shapes.h; empty: none
+    std::string_view rule_;               // the rule of it, also while its number is changed
     uint64_t version_ = 0;
     size_t scene_ = 0;
+    bool waiting_ = false;
     int views_ = 3;
     float opacity_ = 0.02f, scale_ = 0;  // scale_: 0: not chosen yet
 };

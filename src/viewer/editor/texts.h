@@ -204,18 +204,22 @@ inline constexpr Item kTint{"Tint", "Factor of each channel"},
     kNeutral{"Reset colours", "Take back what these controls have changed"};
 
 // Clean.
-inline constexpr Item kCleanUp{"Clean up", "Shows floaters in red first, then removes them"},
+inline constexpr Item kCleanUp{
+    "Clean up", "Shows floaters in red first, then removes them; a run's photos help to find them"},
     kPreview{"Preview", "Show in red what would be removed"}, kRemove{"Remove", "Delete these splats"},
     kCancel{"Cancel", "Keep them"};
 inline constexpr Item kFloaters{"Floaters", "Groups of fewer than 10 splats that touch nothing else"},
+    kContradicted{"Not in the photos", "Splats without which the scene is closer to the photos"},
     kFar{"Far clusters", "All but the largest group of splats that touch"},
     kFewViews{"Seen by fewer than", "Splats that fewer photos than this see"},
     kFaint{"Almost transparent", "Splats with an opacity below this"},
     kLarge{"Too large", "Splats with a larger standard deviation than this, world units"};
 inline constexpr const char *kPart = "{} ({}{:.3g} %)", *kFinding = "looking ...",
+                            *kComparing = "Comparing with photo {} of {}",
                             *kNothingFound = "nothing to remove";
 
 inline constexpr const char *kRemoveFloaters = "Remove floaters", *kRemoveFar = "Remove far clusters",
+                            *kRemoveContradicted = "Remove what is not in the photos",
                             *kRemoveFewViews = "Remove rarely seen splats",
                             *kRemoveFaint = "Remove almost transparent splats",
                             *kRemoveLarge = "Remove large splats";
