@@ -43,7 +43,8 @@ namespace {
 pipeline::Contradicted compared_with_photos(const folders::Run& run, const Gaussians& gaussians,
                                             const std::vector<uint32_t>& left, bool quiet) {
     CLI::App app("", "eval");  // whose options are those of the run
-    ViewArguments views;
+    const auto arguments = std::make_unique<ViewArguments>();
+    ViewArguments& views = *arguments;
     views.splats = run.folder;
     add_view_positionals(app, views);
     add_view_options(app, views);

@@ -184,7 +184,9 @@ std::vector<std::string> journal_remarks(const std::filesystem::path& file, size
 }
 
 std::filesystem::path journal_of(const std::filesystem::path& file, size_t part) {
-    return file.string() + (part < 2 ? "" : "." + std::to_string(part)) + ".edits";
+    std::string name = file.string();
+    if (part >= 2) name.append(".").append(std::to_string(part));
+    return name + ".edits";
 }
 
 void set_aside(const std::filesystem::path& journal) {

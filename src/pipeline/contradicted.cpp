@@ -15,8 +15,21 @@
 namespace ewa::pipeline {
 namespace {
 
-constexpr double kLimits[] = {700, 350, 170, 85, 42};  // times E / splats
-constexpr double kAgreement = 0.8;
+constexpr double kLimits[] = {300, 100, 40, 40, 20, 20};  // times E / splats
+constexpr double kAgreement = 0.5;
+
+/// The splats whose removal lowers E by more than the limit. factor: of the sums.
+std::vector<bool> above(const PhotoScores& scores, double limit, double factor) {
+    std::vector<bool> flags(scores.sums.size());
+    for (size_t k = 0; k < flags.size(); ++k)
+        flags[k] = factor * scores.sums[k] > limit && scores.sums[k] > kAgreement * scores.sizes[k];
+    return flags;
+}
+
+float logit_of_half(float logit) {
+    const double half = 0.5 / (1 + std::exp(-double(logit)));
+    return float(std::log(half / (1 - half)));
+}
 
 /// The weight of pixel i.
 double weight_of(const TrainingImage& photo, size_t i) {
@@ -172,25 +185,31 @@ Contradicted contradicted_splats(const std::shared_ptr<gpu::Device>& device, con
     Contradicted result;
     result.flags.resize(gaussians.size());
     size_t round = 0;
-    const auto scores_of_left = [&] {
-        return photo_scores(device, scene::rows_of(gaussians, left), photos, ++round, before);
+    const auto scores_of = [&](const Gaussians& some) {
+        return photo_scores(device, some, photos, ++round, before);
     };
-    PhotoScores scores = scores_of_left();
+    Gaussians some = scene::rows_of(gaussians, left);
+    PhotoScores scores = scores_of(some);
     const auto mean_error = [&] { return scores.values > 0 ? scores.error / scores.values : 0; };
     result.before = mean_error();
     const double share = scores.error / double(std::max<size_t>(left.size(), 1));
     for (const double limit : kLimits) {
+        std::vector<bool> found = above(scores, limit * share, 1);
+        if (std::ranges::find(found, true) == found.end()) continue;
+        for (size_t k = 0; k < left.size(); ++k)
+            if (found[k]) some.opacity_logits[k] = logit_of_half(some.opacity_logits[k]);
+        const std::vector<bool> sure = above(scores_of(some), limit * share, 2);
         std::vector<uint32_t> staying;
         for (size_t k = 0; k < left.size(); ++k) {
-            const bool found =
-                scores.sums[k] > limit * share && scores.sums[k] > kAgreement * scores.sizes[k];
-            if (!found) staying.push_back(left[k]);
-            result.flags[left[k]] = found;
+            found[k] = found[k] && sure[k];
+            if (!found[k]) staying.push_back(left[k]);
+            result.flags[left[k]] = found[k];
         }
+        some = scene::rows_of(gaussians, staying);
         if (staying.size() == left.size()) continue;
         result.count += left.size() - staying.size();
         left = std::move(staying);
-        scores = scores_of_left();
+        scores = scores_of(some);
     }
     result.after = mean_error();
     return result;

@@ -2,9 +2,11 @@
 // Splats that photos contradict: without them, renders are closer to the photos.
 //
 // E is the sum over photos, pixels and channels of the squared difference of render and photo. For a splat of opacity a, the first-order
-// change of a photo's E by its removal is -g, with g = a dE/da. A splat is contradicted if the sum of g over the photos exceeds a
-// limit, and 0.8 times the sum of |g|. The limit is a multiple of E / splats, and falls from round to round. Each round leaves the
-// contradicted splats out and computes g again. So what is behind a floater is not blamed for it.
+// change of a photo's E by its removal is -g, with g = a dE/da. A splat is suspected if the sum of g over the photos exceeds a limit,
+// and half the sum of |g|. A pixel is linear in a, and E is quadratic. So the change of E by the removal of one splat is -a dE/da at a / 2.
+// A suspected splat is contradicted if this exceeds the same two limits, with the opacities of all suspected splats halved.
+// The limit is a multiple of E / splats, and falls from round to round. Each round leaves the contradicted splats out and computes g
+// again. So what is behind a floater is not blamed for it.
 #pragma once
 #include <functional>
 #include <memory>
