@@ -24,8 +24,16 @@ std::shared_ptr<const Gaussians> chain_and_one() {
 }
 
 EditWorker::Done done_with(EditWorker& worker) {
-    while (worker.busy()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    return worker.take();
+    EditWorker::Done all;
+    for (;;) {
+        EditWorker::Done done = worker.take();
+        done.steps.insert(done.steps.begin(), all.steps.begin(), all.steps.end());
+        if (!done.snapshot) done.snapshot = all.snapshot;
+        if (done.note.empty()) done.note = all.note;
+        all = std::move(done);
+        if (!worker.busy()) return all;
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
 }
 
 TEST(Comparing, IsOfWhatTheFloatersLeave) {
@@ -39,14 +47,12 @@ TEST(Comparing, IsOfWhatTheFloatersLeave) {
         return flags;
     };
     EditWorker worker([] {}, 1000);
-    worker.add(1, chain_and_one(), cameras);
-    worker.activate(1);
+    worker.add(1, chain_and_one(), cameras, {});
     worker.preview({"floaters", "contradicted"});
     EXPECT_EQ(done_with(worker).preview_count, 4u);
     worker.preview({});
     worker.perform(
-        1, {{"Clean", {{"select", "floaters"}, {"delete", ""}, {"select", "contradicted"}, {"delete", ""}}}},
-        nullptr);
+        1, {"Clean", {{"select", "floaters"}, {"delete", ""}, {"select", "contradicted"}, {"delete", ""}}});
     const EditWorker::Done done = done_with(worker);
     EXPECT_EQ(done.note, "");
     EXPECT_EQ(done.preview_count, std::nullopt);
@@ -65,8 +71,7 @@ TEST(Comparing, EndsWhenItIsCancelled) {
         while (!state->stopped()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
         throw InputError("");
     };
-    worker.add(1, chain_and_one(), cameras);
-    worker.activate(1);
+    worker.add(1, chain_and_one(), cameras, {});
     const auto begun = [&] {
         while (worker.comparing()->photo.exchange(0) == 0)
             std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -74,21 +79,20 @@ TEST(Comparing, EndsWhenItIsCancelled) {
     worker.preview({"contradicted"});
     begun();
     worker.cancel();
-    worker.perform(1, {{"Clean", {{"select", "contradicted"}, {"delete", ""}}}}, nullptr);
+    worker.perform(1, {"Clean", {{"select", "contradicted"}, {"delete", ""}}});
     begun();
     worker.cancel();
     const EditWorker::Done done = done_with(worker);
     EXPECT_EQ(done.note, "");
     EXPECT_TRUE(done.steps.empty());
-    EXPECT_EQ(worker.state_of(1).get().edits.size(), 0u);
+    EXPECT_TRUE(worker.state_of(1).get().steps.empty());
     worker.preview({"contradicted"});  // the worker's end cancels it
     begun();
 }
 
 TEST(Comparing, SaysWhyThereIsNone) {
     EditWorker worker([] {}, 1000);
-    worker.add(1, chain_and_one(), {});
-    worker.activate(1);
+    worker.add(1, chain_and_one(), {}, {});
     worker.preview({"floaters", "contradicted"});
     const EditWorker::Done done = done_with(worker);
     EXPECT_NE(done.note.find("photos are known of the folder of a training run"), std::string::npos);
