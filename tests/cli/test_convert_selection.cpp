@@ -79,7 +79,7 @@ TEST_F(ConvertSelection, ReplaysAJournal) {
     const Outcome replay = run_ewa({"convert", splats_, out_, "--edits", journal});
     expect_success(replay);
     EXPECT_NE(replay.out.find("edits were made on 7 splats, and the scene has 200"), std::string::npos);
-    EXPECT_NE(replay.out.find("is cut off, and left out"), std::string::npos);
+    EXPECT_NE(replay.out.find("is cut off and skipped"), std::string::npos);
 }
 
 TEST_F(ConvertSelection, NamesTheShapeThatItCannotRead) {

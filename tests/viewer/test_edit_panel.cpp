@@ -399,8 +399,12 @@ TEST(LiveEdits, AreRefusedAtOnce) {
     editor.enter("two", {}, std::make_shared<const Gaussians>(two), {}, false);
     editor.settings.live = true;
     const auto settled = [&] {
-        EXPECT_TRUE(test::soon([&] { return !editor.busy(); }));
-        return editor.take().note;
+        std::string note;
+        EXPECT_TRUE(test::soon([&] {
+            note += editor.take().note;
+            return !editor.busy();
+        }));
+        return note;
     };
     editor.perform({"Select all", {{"select", "all"}}});
     EXPECT_EQ(settled(), "");

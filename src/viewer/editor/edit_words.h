@@ -6,7 +6,8 @@
 #include <vector>
 
 #include "edit/history.h"
-#include "viewer/editor/editor.h"
+#include "viewer/editor/edit_settings.h"
+#include "viewer/editor/edit_snapshot.h"
 
 namespace ewa::viewer {
 

@@ -2,7 +2,6 @@
 // The editor of the window: scenes with their histories, and the edits that tools and panels ask for. Edits run on a thread of their
 // own, one after another, so that the window answers while a large scene is edited.
 #pragma once
-#include <array>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -14,52 +13,11 @@
 #include "edit/journal.h"
 #include "edit/shapes.h"
 #include "viewer/draft.h"
+#include "viewer/editor/edit_settings.h"
 #include "viewer/editor/edit_snapshot.h"
 #include "viewer/latest.h"
 
 namespace ewa::viewer {
-
-/// The tools of the toolbar. One is active at a time; `view` moves the camera alone.
-enum class Tool {
-    view,
-    rectangle,
-    lasso,
-    polygon,
-    brush,
-    sphere,
-    box,
-    flood,
-    eyedropper,
-    move,
-    rotate,
-    scale,
-    measure,
-    level,
-    origin
-};
-
-/// Whether a tool moves splats, which a training that runs does not take.
-constexpr bool moves_splats(Tool tool) {
-    return tool == Tool::move || tool == Tool::rotate || tool == Tool::scale || tool == Tool::level ||
-           tool == Tool::origin;
-}
-
-/// What the tools and the panel share: settings of selecting and of gizmos. The keys of docs/editor.md change them too.
-struct EditSettings {
-    bool shown = true;  // the toolbar and the panel of edits
-    Tool tool = Tool::view;
-    std::string progress;   // of the tool, for the status line; empty: its hint
-    bool live = false;      // edits go to a training, which takes selections, deletes and locks alone
-    size_t sent = 0;        // steps that the training has
-    bool unfreeze = false;  // the user wants the training to change all splats again
-    edit::Operation operation = edit::Operation::set;  // Shift: add, Ctrl: remove, both: intersect
-    bool front = false, extent = false;
-    float brush = 40;                                       // radius, px of the window
-    float tolerance = 0.15f;                                // of flood and eyedropper, 0 to 1
-    bool local = false;                                     // axes of gizmos
-    glm::dvec3 box_low{-1}, box_high{1}, sphere_center{0};  // world
-    double sphere_radius = 1;
-};
 
 /// A scene in the list of scenes.
 struct EditedScene {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The icons of the window. They are lines in a grid of 24 units, so that they are sharp in any size.
 #pragma once
-#include "viewer/editor/editor.h"
+#include "viewer/editor/edit_settings.h"
 
 struct ImVec2;
 

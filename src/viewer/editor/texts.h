@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The English texts of the editor, in one place. A translation replaces this file.
 #pragma once
-#include "viewer/editor/editor.h"
+#include "viewer/editor/edit_settings.h"
 
 namespace ewa::viewer::texts {
 
