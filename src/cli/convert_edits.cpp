@@ -49,7 +49,8 @@ pipeline::Contradicted compared_with_photos(const folders::Run& run, const Gauss
     add_view_positionals(app, views);
     add_view_options(app, views);
     resolve_views(app, views);
-    pipeline::ComparedPhotos photos{.frames = {}, .options = views.draw.options()};
+    pipeline::ComparedPhotos photos{
+        .frames = {}, .load = load_training_image, .options = views.draw.options()};
     views.draw.load(views.splats, photos.options);
     const int test_every =
         run.number("test-every", 0, std::numeric_limits<int>::max(), RunOptions().test_every);

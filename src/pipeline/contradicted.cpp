@@ -84,6 +84,7 @@ class PhotoComparison {
                     const ComparedPhotos& photos)
         : device_(*device),
           gaussians_(gaussians),
+          photos_(photos),
           options_(photos.options),
           fit_(photos.fit_colors),
           cache_(device_),
@@ -94,8 +95,8 @@ class PhotoComparison {
 
     void add(const Frame& frame, PhotoScores& scores) {
         scene::check_lens(options_, frame.camera);
-        TrainingImage photo = load_training_image(
-            frame, options_.sky ? std::array<float, 3>{} : options_.background);  // as inputs_of
+        TrainingImage photo =
+            photos_.load(frame, options_.sky ? std::array<float, 3>{} : options_.background);  // as inputs_of
         if (photo.image.width != frame.camera.width || photo.image.height != frame.camera.height)
             throw InputError("frame " + frame.name + ": the picture's size is not the camera's");
         const bool masks = !photo.weights.pixels.empty();
@@ -153,6 +154,7 @@ class PhotoComparison {
 
     gpu::Device& device_;
     const Gaussians& gaussians_;
+    const ComparedPhotos& photos_;
     const RenderOptions& options_;
     bool fit_;
     passes::PassCache cache_;

@@ -8,6 +8,7 @@
 // The limit is a multiple of E / splats, and falls from round to round. Each round leaves the contradicted splats out and computes g
 // again. So what is behind a floater is not blamed for it.
 #pragma once
+#include <array>
 #include <functional>
 #include <memory>
 #include <span>
@@ -23,6 +24,8 @@ namespace ewa::pipeline {
 /// The photos that splats are compared with, and how these are drawn. Masked pixels do not count.
 struct ComparedPhotos {
     std::vector<Frame> frames;
+    /// load_training_image. A program that compares no photos needs no codecs then.
+    std::function<TrainingImage(const Frame&, const std::array<float, 3>& background)> load;
     RenderOptions options;
     /// Fits each channel of a render to its photo, by a factor and an offset that minimise E. For runs that learned colours per photo.
     bool fit_colors = false;

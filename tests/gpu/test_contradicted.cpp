@@ -76,6 +76,7 @@ class ContradictedSplats : public testing::Test {
             frame.camera = frame.source = frame.pinhole = camera;
             photos_.frames.push_back(frame);
         }
+        photos_.load = load_training_image;
         photos_.options.background = {0.2f, 0.5f, 0.8f};
         write_photos(1, 0);
     }

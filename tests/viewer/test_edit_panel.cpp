@@ -355,7 +355,7 @@ TEST(EditSnapshot, TheMiddleIsThatOfWhatAMoveChanges) {
     EXPECT_EQ((*editor.snapshot().bounds_of_all)[1].x, 3);
 }
 
-TEST(Editor, ShowsTheSceneThatIsEdited) {
+TEST(EditedScenes, AreShownWhileTheyAreActive) {
     auto splats = std::make_shared<Gaussians>();
     splats->resize(1);
     constexpr size_t kBudget = 1000;

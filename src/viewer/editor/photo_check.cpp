@@ -46,6 +46,7 @@ struct ComparisonEnds {
 decltype(edit::Cameras::contradicted) contradicted_by_photos(const OpenedScene& scene, const OpenDevice& open,
                                                              const std::shared_ptr<Comparing>& comparing) {
     pipeline::ComparedPhotos photos;
+    photos.load = load_training_image;
     try {
         photos.frames = training_photos(scene);
     } catch (const InputError&) {
