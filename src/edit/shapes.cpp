@@ -8,7 +8,6 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <optional>
-#include <sstream>
 
 #include "core/text.h"
 #include "core/typing.h"
@@ -174,17 +173,15 @@ Shape contradicted(const std::string& what) {
 /// text: "3,7,9-12".
 Shape listed(const std::string& text, const std::string& what) {
     std::vector<std::pair<uint32_t, uint32_t>> ranges;
-    std::istringstream words(text);
-    for (std::string word; std::getline(words, word, ',');) {
+    for (const std::string_view word : core::split_list(text)) {
         const size_t dash = std::min(word.find('-'), word.size());
         const auto first = core::parse_integer<uint32_t>(word.substr(0, dash));
         const auto last = dash < word.size() ? core::parse_integer<uint32_t>(word.substr(dash + 1)) : first;
         if (!first || !last || *first > *last)
-            throw InputError(what + ": '" + word.substr(0, 40) +
+            throw InputError(what + ": '" + std::string(word.substr(0, 40)) +
                              "' is no number or range of splats=3,7,9-12");
         ranges.emplace_back(*first, *last);
     }
-    if (ranges.empty()) throw InputError(what + ": splats= names no splat");
     return [=](const EditedSplats& all) {
         std::vector<bool> flags(all.size());
         for (const auto& [first, last] : ranges) {
