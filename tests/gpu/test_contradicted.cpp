@@ -82,9 +82,10 @@ class ContradictedSplats : public testing::Test {
     }
 
     /// Each photo is the render of the wall, times a factor, plus an offset and noise.
-    void write_photos(float factor, float offset) {
+    void write_photos(float factor, float offset) { write_photos_of(wall_, factor, offset); }
+    void write_photos_of(const Gaussians& splats, float factor, float offset) {
         Random random(5);
-        Renderer renderer(device(), wall_, photos_.options);
+        Renderer renderer(device(), splats, photos_.options);
         for (const Frame& frame : photos_.frames) {
             Image photo = renderer.render(frame.camera).color;
             for (float& value : photo.pixels)
@@ -141,6 +142,19 @@ TEST_F(ContradictedSplats, AreTheFloatersUnderFittedColours) {
     photos_.fit_colors = true;
     write_photos(0.6f, 0.2f);
     expect_floaters();
+}
+
+/// The error falls with the opacity of these splats at first, but the photos need them.
+TEST_F(ContradictedSplats, AreNotThoseThatShouldBeFainter) {
+    Gaussians fainter = floated_;
+    for (size_t i = wall_.size(); i < fainter.size(); ++i)
+        fainter.opacity_logits[i] = float(std::log(0.6 / (1 - 0.6)));
+    write_photos_of(fainter, 1, 0);
+    const PhotoScores scores = pipeline::photo_scores(device(), floated_, photos_);
+    constexpr double kFirstLimit = 300;
+    for (size_t i = wall_.size(); i < floated_.size(); ++i)
+        EXPECT_GT(scores.sums[i], kFirstLimit * scores.error / double(floated_.size())) << "splat " << i;
+    EXPECT_EQ(found(floated_).count, 0u);
 }
 
 TEST_F(ContradictedSplats, SumsAreChangesOfTheError) {
