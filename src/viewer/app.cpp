@@ -19,6 +19,7 @@
 #include "viewer/editor/modal.h"
 #include "viewer/editor/offers.h"
 #include "viewer/editor/photo_check.h"
+#include "viewer/editor/texts.h"
 #include "viewer/editor/toolbar.h"
 #include "viewer/latest.h"
 
@@ -452,7 +453,8 @@ void App::send_edits() {
     }
     nlohmann::json edits = nlohmann::json::array();
     bool changes = std::exchange(editor_.settings.unfreeze, false);
-    if (changes && snapshot.locked > 0) return editor_.perform({"Unfreeze all", {{"unlock", ""}}});
+    if (changes && snapshot.locked > 0)
+        return editor_.perform({texts::edit_panel::kUnfreeze.name, {{"unlock", ""}}});
     if (changes) edits.push_back({"unlock", ""});
     for (size_t i = sent; i < snapshot.done; ++i)
         for (const edit::Words& words : snapshot.steps[i].edits) {

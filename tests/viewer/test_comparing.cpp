@@ -27,7 +27,6 @@ EditWorker::Done done_with(EditWorker& worker) {
     EditWorker::Done all;
     for (;;) {
         EditWorker::Done done = worker.take();
-        done.steps.insert(done.steps.begin(), all.steps.begin(), all.steps.end());
         if (!done.snapshot) done.snapshot = all.snapshot;
         if (done.note.empty()) done.note = all.note;
         all = std::move(done);
@@ -56,8 +55,8 @@ TEST(Comparing, IsOfWhatTheFloatersLeave) {
     const EditWorker::Done done = done_with(worker);
     EXPECT_EQ(done.note, "");
     EXPECT_EQ(done.preview_count, std::nullopt);
-    ASSERT_EQ(done.steps.size(), 1u);
-    EXPECT_EQ(done.steps[0].edits[2], (edit::Words{"select", "splats=3-4,7"}));
+    ASSERT_EQ(done.snapshot->steps.size(), 1u);
+    EXPECT_EQ(done.snapshot->steps[0].edits[2], (edit::Words{"select", "splats=3-4,7"}));
     EXPECT_EQ(done.snapshot->left, 9u);
     EXPECT_EQ(asked, 2u);
 }
@@ -84,7 +83,6 @@ TEST(Comparing, EndsWhenItIsCancelled) {
     worker.cancel();
     const EditWorker::Done done = done_with(worker);
     EXPECT_EQ(done.note, "");
-    EXPECT_TRUE(done.steps.empty());
     EXPECT_TRUE(worker.state_of(1).get().steps.empty());
     worker.preview({"contradicted"});  // the worker's end cancels it
     begun();

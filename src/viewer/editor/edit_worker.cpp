@@ -140,7 +140,6 @@ void EditWorker::publish() {
     done_.marks = bits;
     done_.preview_count =
         previewed_.empty() ? std::nullopt : std::optional(size_t(std::ranges::count(previewed_, true)));
-    std::ranges::move(std::exchange(steps_, {}), std::back_inserter(done_.steps));
     std::ranges::move(std::exchange(moves_, {}), std::back_inserter(done_.moves));
     done_.scenes = std::move(states);
 }
@@ -267,7 +266,6 @@ void EditWorker::separate(uint64_t id, uint64_t of, Place place) {
         part.from_step = from.history->done();
         write_journal(part);
         record(from, [&](edit::Journal& journal) { journal.did(step); });
-        steps_.push_back(step);
         scenes_[id] = std::move(part);
         moves_.pop_back();
         if (!previewed_.empty()) find_preview();
@@ -330,7 +328,6 @@ void EditWorker::clear() {
             if (scene.journal && scene.untouched()) scene.journal->remove();
         scenes_.clear();
         previewed_.clear();
-        steps_.clear();
         moves_.clear();
         joined_.reset();
         draft_ = {};
@@ -436,13 +433,11 @@ void EditWorker::follow(uint64_t of, size_t step, bool undone) {
 void EditWorker::perform(uint64_t id, edit::Step step) {
     change(id, [this, id, step = std::move(step)](Scene& scene) {
         if (!scene.history->perform(step)) return;
-        const edit::Step& performed = scene.history->steps().back();
-        steps_.push_back(performed);
         // Steps that were undone are dropped, and with them the scenes that they had separated.
         for (auto& [each, part] : scenes_)
             if (part.from == id && part.from_step >= scene.history->done()) part.from = 0;
         std::erase_if(scenes_, [](const auto& each) { return each.second.closed && each.second.from == 0; });
-        record(scene, [&](edit::Journal& journal) { journal.did(performed); });
+        record(scene, [&](edit::Journal& journal) { journal.did(scene.history->steps().back()); });
     });
 }
 

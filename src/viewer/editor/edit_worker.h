@@ -87,7 +87,6 @@ class EditWorker {
         Draft draft;
         std::shared_ptr<const std::vector<uint8_t>> marks;
         std::optional<size_t> preview_count;
-        std::vector<edit::Step> steps;
         std::vector<SceneState> scenes;
         std::vector<std::pair<uint64_t, bool>>
             moves;  // scenes that an undo has closed (false), or a redo opened
@@ -141,7 +140,6 @@ class EditWorker {
     std::vector<std::pair<uint64_t, uint64_t>> joined_of_;  // scenes, with the versions of their values
     Draft draft_;  // of the joined splats, if they are more than the budget
     double milliseconds_ = 0;
-    std::vector<edit::Step> steps_;
     std::vector<std::pair<uint64_t, bool>> moves_;
     std::string note_;
     uint64_t period_ = 0;  // number of clear() so far

@@ -248,7 +248,7 @@ bool Editor::busy() const {
 
 Editor::News Editor::take() {
     EditWorker::Done done = worker_->take();
-    News news{.any = done.any, .marks = false, .note = std::exchange(note_, {}), .done = done.steps};
+    News news{.any = done.any, .marks = false, .note = std::exchange(note_, {})};
     if (!done.note.empty()) news.note = done.note;
     preview_count_ = done.preview_count;
     if (done.snapshot) {

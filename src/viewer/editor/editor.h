@@ -85,7 +85,6 @@ class Editor {
     struct News {
         bool any = false, marks = false;  // marks: splats() and marks() may be others
         std::string note;                 // a message for the user; empty: none
-        std::vector<edit::Step> done;     // steps that have changed something
     };
     News take();
     void say(std::string note) { note_ = std::move(note); }  // News::note of the next take()
