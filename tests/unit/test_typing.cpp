@@ -135,7 +135,7 @@ TEST(Typing, ListsHaveCommasBetweenTheirParts) {
 }
 
 TEST(Typing, WordsHaveValues) {
-    const core::Words<int> words{{"gray", 1}, {"black", 2}, {"dark", 2}};
+    const ewa::core::Words<int> words{{"gray", 1}, {"black", 2}, {"dark", 2}};
     EXPECT_EQ(value_of(words, "dark"), 2);
     EXPECT_EQ(value_of(words, "grey"), 1);
     EXPECT_STREQ(word_for(words, 2), "black");
