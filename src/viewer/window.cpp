@@ -96,10 +96,13 @@ Window& Window::of(GLFWwindow* window) {
 
 void Window::watch() {
     glfwSetKeyCallback(window_, [](GLFWwindow* window, int key, int, int action, int mods) {
-        of(window).stirred_ = true;
-        if (action == GLFW_PRESS)
-            of(window).pressed_.push_back(
-                {key, (mods & GLFW_MOD_SHIFT) != 0, (mods & GLFW_MOD_CONTROL) != 0});
+        Window& self = of(window);
+        self.stirred_ = true;
+        const bool control = (mods & GLFW_MOD_CONTROL) != 0;
+        if (action == GLFW_RELEASE) self.commands_.erase(key);
+        if (action != GLFW_PRESS) return;
+        if (control) self.commands_.insert(key);
+        self.pressed_.push_back({key, (mods & GLFW_MOD_SHIFT) != 0, control});
     });
     glfwSetDropCallback(window_, [](GLFWwindow* window, int count, const char** paths) {
         of(window).stirred_ = true;
@@ -162,7 +165,7 @@ void Window::stay() {
 }
 
 bool Window::held(int key) const {
-    return glfwGetKey(window_, key) == GLFW_PRESS;
+    return glfwGetKey(window_, key) == GLFW_PRESS && !commands_.contains(key);
 }
 
 std::vector<KeyPress> Window::wait(double seconds) {
