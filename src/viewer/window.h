@@ -60,7 +60,7 @@ class Window {
     bool closed() const;
     void close();
     void stay();  // closed() is false again
-    /// Whether a key is held. A key that was pressed with Ctrl is a command, even once Ctrl is let go.
+    /// Whether a key is down. A key that was pressed with Ctrl is a command, even once Ctrl is let go.
     bool held(int key) const;
 
     /// Waits for input, at most so many seconds (0: no wait). Returns the keys pressed since the last call.
@@ -78,7 +78,7 @@ class Window {
     GLFWwindow* window_ = nullptr;
     float least_scale_ = 1;
     std::vector<KeyPress> pressed_;
-    std::set<int> commands_;  // keys pressed with Ctrl and still held
+    std::set<int> commands_;  // keys pressed with Ctrl and still down
     std::vector<std::filesystem::path> dropped_;
     bool stirred_ = false;
 };
