@@ -110,7 +110,8 @@ void App::run() {
         shown_.take_renders();
         shown_.take_comparison(screen_->presenter);
         session_.take_saved();
-        session_.take_live(keeps_edits());
+        // New splats wait for the edits in progress, which would be lost.
+        if (!live() || !editor_.busy()) session_.take_live(keeps_edits());
         if (!state_.scripted()) sync_editor();
         film_.edits = editor_.snapshot().done;
         film_.take();
@@ -365,6 +366,14 @@ void App::take_chosen() {
     }
 }
 
+/// The steps that a training does not have yet: a selection lasts when newer splats of the training come.
+std::vector<edit::Step> App::unsent_steps() const {
+    const EditSnapshot& snapshot = editor_.snapshot();
+    if (!live() || editor_.scenes() != 1 || snapshot.scene != editor_.scene(0).id) return {};
+    const auto step = [&](size_t i) { return snapshot.steps.begin() + std::ptrdiff_t(i); };
+    return {step(std::min(editor_.settings.sent, snapshot.done)), step(snapshot.done)};
+}
+
 /// The scene that the window shows becomes the one that is edited.
 void App::enter_scene() {
     const OpenedScene& scene = state_.scene;
@@ -384,9 +393,11 @@ void App::enter_scene() {
         cameras.contradicted = contradicted_by_photos(scene, state_.startup.open_device, editor_.comparing());
     }
     const Tool tool = live() ? editor_.settings.tool : Tool::view;
+    const std::vector<edit::Step> unsent = unsent_steps();
     editor_.enter(scene.title, file, entered_, cameras, journaled);
     editor_.settings.tool = tool;
     editor_.settings.sent = sent_before_ = 0;
+    for (const edit::Step& step : unsent) editor_.perform(step);
     if (journaled) dialogs_.offer_journals();
 }
 

@@ -48,6 +48,7 @@ class App {
     bool live() const;     // edits go to a training
     void sync_editor();
     void take_chosen();
+    std::vector<edit::Step> unsent_steps() const;
     void enter_scene();
     void add_scene();
     void send_edits();

@@ -147,8 +147,7 @@ inline constexpr Item kSelection{"Selection", "Which splats the edits below chan
     kClean{"Clean", "Finds splats that no scene needs"}, kHistogram{"Histogram", "Select splats by a value"},
     kScenes{"Scenes", "The file, and what Separate has made of it"},
     kHistory{"History", "All edits; a click goes there"};
-inline constexpr const char *kNoScene = "Open splats to edit them.",
-                            *kLive = "Edits go to the training: pause it, edit, go on.";
+inline constexpr const char *kNoScene = "Open splats to edit them.", *kLive = "Edits go to the training.";
 
 // Selection.
 inline constexpr Item kAll{"All", "Select all splats", "Ctrl+A", "select", "all"},
