@@ -117,7 +117,9 @@ std::vector<Option> from_a_to_o() {
         row("blur-samples", "render", kQuality, "N",
             "Renders that --aperture and --shutter average for an image", within(2, 4096), kUsual),
         row("budget", "ewa-view", kQuality, "N",
-            "Splats to show of a lod-meta.json while the view changes: a level with at most so many [1M]",
+            "Most splats to draw while the view changes: those that cover most, or a level of a "
+            "lod-meta.json "
+            "[1M; on a CPU 200k where there are no levels]",
             within(1, 4294967296.0)),
         row("cameras", "ewa-view", kData, "DATASET", "Dataset whose cameras to show and to look through",
             kInput),

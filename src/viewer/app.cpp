@@ -50,7 +50,7 @@ App::App(const Startup& startup)
       navigation_(state_),
       shown_(state_, navigation_),
       session_(state_, navigation_, shown_),
-      editor_(core::own_program().parent_path() / "ewa", state_.wake, startup.budget),
+      editor_(core::own_program().parent_path() / "ewa", state_.wake, startup.budget.value_or(kUsualBudget)),
       tools_(state_, navigation_, shown_, editor_),
       dialogs_(editor_, session_.dialog, state_.wake, [this](const std::string& note) { state_.say(note); }),
       film_(state_, navigation_, shown_, dialogs_, session_.dialog) {
@@ -420,6 +420,8 @@ void App::sync_editor() {
     const OpenedScene& scene = state_.scene;
     if (!scene.path.empty() && scene.path != opened_) remember_file(opened_ = scene.path);
     if (scene.gaussians != entered_) enter_scene();
+    // A CPU takes a second for a draft of the usual size.
+    if (state_.on_cpu.value_or(false) && !state_.startup.budget) editor_.set_budget(kCpuBudget);
     if (editor_.scenes() > 0) add_scene();
     const Editor::News news = editor_.take();
     if (news.any) state_.redraw(Loop::kRedraws);

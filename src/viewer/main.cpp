@@ -43,7 +43,7 @@ constexpr int kLargestSide = 16384;  // px
 
 struct Arguments {
     std::filesystem::path path, cameras, picture, views, film, output;
-    size_t budget = kUsualBudget;
+    std::optional<size_t> budget;
     struct {
         std::string address, token;
         std::filesystem::path token_file;
@@ -125,7 +125,8 @@ OpenedScene open_what(const Arguments& arguments, Startup& startup) {
                               live::parse_address(arguments.connect.address),
                               live::find_token(arguments.connect.token, arguments.connect.token_file)};
         const std::filesystem::path& what = arguments.path.empty() ? arguments.cameras : arguments.path;
-        OpenedScene scene = what.empty() ? OpenedScene() : open_scene(what, {}, arguments.budget);
+        OpenedScene scene =
+            what.empty() ? OpenedScene() : open_scene(what, {}, arguments.budget.value_or(kUsualBudget));
         scene.title = arguments.connect.address;
         return scene;
     }
@@ -135,7 +136,8 @@ OpenedScene open_what(const Arguments& arguments, Startup& startup) {
             throw InputError("PATH is required: splats, a dataset, or a run's folder (see ewa-view --help)");
         return {};  // files are dropped on the window
     }
-    OpenedScene scene = open_scene(arguments.path, arguments.cameras, arguments.budget);
+    OpenedScene scene =
+        open_scene(arguments.path, arguments.cameras, arguments.budget.value_or(kUsualBudget));
     if (!scene.photos.empty() && (!arguments.picture.empty() || !arguments.film.empty()))
         throw InputError(arguments.path.string() +
                          " has no cameras yet; ewa cameras finds them, and so does the window");

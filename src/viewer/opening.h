@@ -14,7 +14,8 @@
 
 namespace ewa::viewer {
 
-inline constexpr size_t kUsualBudget = 1'000'000;  // splats
+inline constexpr size_t kUsualBudget = 1'000'000,
+                        kCpuBudget = 200'000;  // splats to draw while the view changes
 
 struct OpenedScene {
     std::string title;           // empty: nothing is open

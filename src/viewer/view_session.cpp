@@ -60,7 +60,7 @@ void ViewSession::open(const std::vector<std::filesystem::path>& paths, const Op
     if (opening_.running()) return state_.say("another file is being opened");
     if (search.running()) return state_.say("cameras of photos are being found; Esc stops that");
     state_.say("opening " + core::one_line(paths.front().string()));
-    opening_.start(state_.wake, [paths, shown, budget = state_.startup.budget] {
+    opening_.start(state_.wake, [paths, shown, budget = state_.startup.budget.value_or(kUsualBudget)] {
         return open_dropped(paths, shown, budget);
     });
 }

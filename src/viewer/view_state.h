@@ -42,7 +42,7 @@ struct Startup {
     std::optional<std::filesystem::path>
         film;  // write a film through `views` into this folder, without a window
     std::vector<io::NamedView> views;
-    size_t budget = kUsualBudget;  // as of open_scene(), for what is dropped on the window
+    std::optional<size_t> budget;  // most splats to draw while the view changes
     PanelSettings settings;
     OpenDevice open_device;
     struct {

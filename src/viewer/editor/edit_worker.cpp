@@ -59,6 +59,10 @@ struct Spread {
 EditWorker::EditWorker(std::function<void()> wake, size_t budget)
     : wake_(std::move(wake)), budget_(budget), thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
+void EditWorker::set_budget(size_t budget) {
+    if (budget_.exchange(budget) != budget) post([this] { joined_of_.clear(); });  // the draft is made again
+}
+
 EditWorker::~EditWorker() {
     cancel();
     thread_.request_stop();

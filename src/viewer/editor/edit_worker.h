@@ -25,6 +25,7 @@ class EditWorker {
   public:
     /// wake: called on the thread when take() has something new. budget: as Editor's.
     EditWorker(std::function<void()> wake, size_t budget);
+    void set_budget(size_t budget);
     /// Drops the tasks that wait, and removes journals without edits.
     ~EditWorker();
 
@@ -128,7 +129,7 @@ class EditWorker {
     void find_preview();
 
     std::function<void()> wake_;
-    size_t budget_;
+    std::atomic<size_t> budget_;
 
     // The thread alone uses these.
     std::map<uint64_t, Scene> scenes_;

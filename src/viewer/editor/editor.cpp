@@ -96,6 +96,10 @@ Editor::Editor(fs::path program, std::function<void()> wake, size_t budget)
 
 Editor::~Editor() = default;
 
+void Editor::set_budget(size_t budget) {
+    worker_->set_budget(budget);
+}
+
 bool EditedScene::as_opened() const {
     return edit::same_version(head, edit::head_of(file, head.splats));
 }

@@ -43,6 +43,7 @@ class Editor {
     /// budget: most splats of a draft, which is drawn while the view changes.
     Editor(std::filesystem::path program, std::function<void()> wake, size_t budget);
     ~Editor();
+    void set_budget(size_t budget);
 
     // Scenes.
     /// Replaces all scenes by this one. journaled: it is a file of its own, and gets a journal.
