@@ -52,7 +52,7 @@ App::App(const Startup& startup)
       session_(state_, navigation_, shown_),
       editor_(core::own_program().parent_path() / "ewa", state_.wake, startup.budget.value_or(kUsualBudget)),
       tools_(state_, navigation_, shown_, editor_),
-      dialogs_(editor_, session_.dialog, state_.wake, [this](const std::string& note) { state_.say(note); }),
+      dialogs_(state_, editor_, session_.dialog),
       film_(state_, navigation_, shown_, dialogs_, session_.dialog) {
     dialogs_.views_file = [this] { return film_.views_file(); };
     change_text();
@@ -92,8 +92,9 @@ void App::run() {
         const double seconds = std::chrono::duration<double>(now - loop.last_frame).count();
         loop.last_frame = now;
         if (state_.window.stirred()) loop.redraws = Loop::kRedraws;
-        // Some dialogs show the seconds.
-        if (state_.woken.exchange(false) || dialogs_.open()) state_.redraw();
+        // Some dialogs show the seconds. Others change their size with news.
+        const bool news = state_.woken.exchange(false), dialog = dialogs_.open();
+        if (news || dialog) state_.redraw(news && dialog ? Loop::kRedraws : 1);
         if (state_.message.expire(now)) state_.redraw();
         if (!state_.scripted()) {
             for (const KeyPress& key : keys) handle_key(key);
@@ -101,7 +102,7 @@ void App::run() {
             film_.advance(seconds);
             if (const auto dropped = state_.window.take_dropped(); !dropped.empty())
                 open(dropped, state_.scene);
-            if (dialogs_.take()) state_.redraw(Loop::kRedraws);
+            dialogs_.take();
             take_chosen();
             change_text();
         }

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <set>
 #include <utility>
 
 #include "core/folders.h"
@@ -13,12 +12,11 @@
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/splat_files.h"
-#include "viewer/editor/modal.h"
-#include "viewer/editor/publish_dialog.h"
 #include "viewer/editor/save_choices.h"
 #include "viewer/editor/texts.h"
 #include "viewer/editor/theme.h"
 #include "viewer/overlay.h"
+#include "viewer/view_state.h"
 
 namespace ewa::viewer {
 namespace {
@@ -46,113 +44,65 @@ const io::FormatRow* first_row(const fs::path& file) {
 
 }  // namespace
 
-enum class DialogKind { none, save, publish, leave, journal, saving, other };
-
-struct Dialogs::State {
-    State(Editor& edited, FileDialog& dialog, std::function<void()> wake,
-          std::function<void(const std::string&)> tell)
-        : editor(edited), files(dialog), say(std::move(tell)), publish(edited, dialog, std::move(wake)) {}
-
-    Editor& editor;
-    FileDialog& files;
-    std::function<void(const std::string&)> say;
-    PublishDialog publish;
-    DialogKind shown = DialogKind::none, drawn = DialogKind::none;
-    bool keyboard = false;  // ImGui's keyboard navigation is on for a dialog
-
-    // Save as.
-    const io::FormatRow* row = nullptr;
-    bool all = false;
-    PathField path;
-    struct Saved {
-        fs::path original, file;
-        std::string name;
-        bool all = false;
-    } last;
-    std::set<fs::path> written;  // by this session, so they are no originals
-
-    std::function<bool()> draw_other;  // a dialog of another part
-    std::function<void()> go_on;       // after the save; null: nothing
-    bool offers = false;               // journals are looked for
-    std::vector<Editor::Left> left;
-
-    const EditedScene& scene() const { return editor.scene(editor.active()); }
-    fs::path target() const;
-    std::vector<fs::path> originals() const;
-    void write(const fs::path& out, bool all_scenes);
-    void pass(const std::function<void()>& on);
-    void save_as();
-    void confirm_save();
-    void ask_or_pass();
-    void draw_formats(const Gaussians* splats, size_t count);
-    void draw_losses(const Gaussians& splats) const;
-    void draw_save();
-    bool draw_open(const std::function<void(const fs::path&)>& open);
-    void draw_leave();
-    void draw_journal();
-    void draw_saving();
-    void draw_shown();
-};
-
 /// The file to write. A name without an extension gets that of the chosen format.
-fs::path Dialogs::State::target() const {
-    const fs::path typed = path.path();
+fs::path Dialogs::target() const {
+    const fs::path typed = path_.path();
     if (typed.empty()) return typed;
     std::error_code error;
     const fs::path whole = fs::absolute(typed, error).lexically_normal();
-    return io::row_of_name(whole) ? whole : with_format(whole, *row);
+    return io::row_of_name(whole) ? whole : with_format(whole, *row_);
 }
 
-std::vector<fs::path> Dialogs::State::originals() const {
+std::vector<fs::path> Dialogs::originals() const {
     std::vector<fs::path> files_opened;
-    for (size_t i = 0; i < editor.scenes(); ++i)
-        if (const fs::path& file = editor.scene(i).file; !written.contains(file))
+    for (size_t i = 0; i < editor_.scenes(); ++i)
+        if (const fs::path& file = editor_.scene(i).file; !written_.contains(file))
             files_opened.push_back(file);
     return files_opened;
 }
 
-void Dialogs::State::write(const fs::path& out, bool all_scenes) {
-    last = {scene().file, out, scene().name, all_scenes};
-    written.insert(out);
-    editor.save(out, all_scenes);
-    shown = go_on ? DialogKind::saving : DialogKind::none;
+void Dialogs::write(const fs::path& out, bool all_scenes) {
+    last_ = {scene().file, out, scene().name, all_scenes};
+    written_.insert(out);
+    editor_.save(out, all_scenes);
+    shown_ = go_on_ ? &Dialogs::draw_saving : nullptr;
 }
 
 /// Calls `on`, which may open other scenes. Files that were written before may then be originals.
-void Dialogs::State::pass(const std::function<void()>& on) {
-    last = {};
-    written.clear();
+void Dialogs::pass(const std::function<void()>& on) {
+    last_ = {};
+    written_.clear();
     if (on) on();
 }
 
-void Dialogs::State::save_as() {
-    if (editor.scenes() == 0) return say(texts::files::kNothingToSave);
-    if (editor.saving()) return say(texts::files::kStillSaving);
-    row = first_row(scene().file);
-    path.set(proposed_file(scene().file, scene().name, *row, scene().part));
-    all = all && editor.scenes() > 1;
-    shown = DialogKind::save;
+void Dialogs::save_as() {
+    if (editor_.scenes() == 0) return state_.say(texts::files::kNothingToSave);
+    if (editor_.saving()) return state_.say(texts::files::kStillSaving);
+    row_ = first_row(scene().file);
+    path_.set(proposed_file(scene().file, scene().name, *row_, scene().part));
+    all_ = all_ && editor_.scenes() > 1;
+    shown_ = &Dialogs::draw_save;
 }
 
-void Dialogs::State::confirm_save() {
+void Dialogs::confirm_save() {
     const fs::path out = target();
-    if (!path.accept(out, refusal(out, originals()))) return;
+    if (!path_.accept(out, refusal(out, originals()))) return;
     try {
         core::make_folder(out.parent_path());
-        write(out, all);
+        write(out, all_);
     } catch (const std::exception& error) {
-        path.complain(core::one_line(error.what()));
+        path_.complain(core::one_line(error.what()));
     }
 }
 
 /// Once all edits are done, and no save is on its way.
-void Dialogs::State::ask_or_pass() {
-    if (editor.unsaved()) return void(shown = DialogKind::leave);
-    if (shown == DialogKind::saving) shown = publish.running() ? DialogKind::publish : DialogKind::none;
-    pass(std::exchange(go_on, nullptr));
+void Dialogs::ask_or_pass() {
+    if (editor_.unsaved()) return void(shown_ = &Dialogs::draw_leave);
+    if (shown_ == &Dialogs::draw_saving) shown_ = publish_.running() ? &Dialogs::draw_publish : nullptr;
+    pass(std::exchange(go_on_, nullptr));
 }
 
-void Dialogs::State::draw_formats(const Gaussians* splats, size_t count) {
+void Dialogs::draw_formats(const Gaussians* splats, size_t count) {
     constexpr auto kFlags = ImGuiTableFlags_ScrollY | ImGuiTableFlags_BordersOuter;
     constexpr auto kRowFlags = ImGuiSelectableFlags_SpanAllColumns | ImGuiSelectableFlags_DontClosePopups;
     const float height = std::min(kFormatLines * ImGui::GetTextLineHeightWithSpacing(),
@@ -178,9 +128,9 @@ void Dialogs::State::draw_formats(const Gaussians* splats, size_t count) {
         ImGui::TableSetColumnIndex(2);
         ImGui::TextUnformatted((texts::files::kAbout + core::bytes_text(bytes)).c_str());
         ImGui::TableSetColumnIndex(0);
-        if (ImGui::Selectable(name.c_str(), &each == row, kRowFlags, ImVec2(0, lines))) {
-            if (const fs::path typed = path.path(); !typed.empty()) path.set(with_format(typed, each));
-            row = &each;
+        if (ImGui::Selectable(name.c_str(), &each == row_, kRowFlags, ImVec2(0, lines))) {
+            if (const fs::path typed = path_.path(); !typed.empty()) path_.set(with_format(typed, each));
+            row_ = &each;
         }
     }
     ImGui::PopStyleColor();
@@ -188,7 +138,7 @@ void Dialogs::State::draw_formats(const Gaussians* splats, size_t count) {
 }
 
 /// What the chosen format does not keep, in the room that the longest of these texts needs.
-void Dialogs::State::draw_losses(const Gaussians& splats) const {
+void Dialogs::draw_losses(const Gaussians& splats) const {
     const auto text_of = [&](const io::FormatRow& format) {
         std::string text;
         for (const std::string& line : losses(format, splats)) text += (text.empty() ? "- " : "\n- ") + line;
@@ -200,52 +150,52 @@ void Dialogs::State::draw_losses(const Gaussians& splats) const {
             height =
                 std::max(height, ImGui::CalcTextSize(text_of(each).c_str(), nullptr, false, modal_width()).y);
     const float top = ImGui::GetCursorPosY();
-    modal_text(text_of(*row));
+    modal_text(text_of(*row_));
     reserve(top, height + ImGui::GetStyle().ItemSpacing.y);
 }
 
-void Dialogs::State::draw_save() {
-    if (editor.scenes() == 0) return void(shown = DialogKind::none);
+void Dialogs::draw_save() {
+    if (editor_.scenes() == 0) return void(shown_ = nullptr);
     if (!begin_modal(texts::files::kSaveAsTitle)) return;
-    if (const io::FormatRow* typed = io::row_of_name(path.path()); typed && typed->writable()) row = typed;
-    const Gaussians* splats = all ? editor.splats().get() : editor.snapshot().splats.get();
-    draw_formats(splats, !splats ? 0 : all ? splats->size() : editor.snapshot().left);
+    if (const io::FormatRow* typed = io::row_of_name(path_.path()); typed && typed->writable()) row_ = typed;
+    const Gaussians* splats = all_ ? editor_.splats().get() : editor_.snapshot().splats.get();
+    draw_formats(splats, !splats ? 0 : all_ ? splats->size() : editor_.snapshot().left);
     if (splats) draw_losses(*splats);
-    if (editor.scenes() > 1) {
-        if (modal_radio(texts::files::kScopeActive, !all)) all = false;
+    if (editor_.scenes() > 1) {
+        if (modal_radio(texts::files::kScopeActive, !all_)) all_ = false;
         ImGui::SameLine();
-        if (modal_radio(texts::files::kScopeAll, all)) all = true;
+        if (modal_radio(texts::files::kScopeAll, all_)) all_ = true;
     }
     if (begin_form()) {
         form_row(texts::files::kFile);
-        path.draw(&files);
+        path_.draw(&files_);
         end_form();
     }
-    const char* save = path.replaces() ? texts::files::kReplace : texts::files::kSave;
-    const Choice choice = draw_choices(save, nullptr, texts::files::kCancel, !path.path().empty());
+    const char* save = path_.replaces() ? texts::files::kReplace : texts::files::kSave;
+    const Choice choice = draw_choices(save, nullptr, texts::files::kCancel, !path_.path().empty());
     if (choice == Choice::confirm) confirm_save();
     if (choice == Choice::cancel) {
-        go_on = nullptr;
-        shown = DialogKind::none;
+        go_on_ = nullptr;
+        shown_ = nullptr;
     }
-    end_modal(shown != DialogKind::none);
+    end_modal(shown_ != nullptr);
 }
 
-bool Dialogs::State::draw_open(const std::function<void(const fs::path&)>& open) {
+bool Dialogs::draw_open(const std::function<void(const fs::path&)>& open) {
     if (!begin_modal(texts::files::kOpenTitle)) return true;
     if (begin_form()) {
         form_row(texts::files::kFile);
-        path.draw(nullptr);
+        path_.draw(nullptr);
         end_form();
     }
     std::optional<fs::path> chosen = draw_recent();
-    if (chosen) path.set(*chosen);
+    if (chosen) path_.set(*chosen);
     const Choice choice =
-        draw_choices(texts::files::kOpen, nullptr, texts::files::kCancel, !path.path().empty());
-    if (choice == Choice::confirm) chosen = path.path();
+        draw_choices(texts::files::kOpen, nullptr, texts::files::kCancel, !path_.path().empty());
+    if (choice == Choice::confirm) chosen = path_.path();
     std::error_code error;
     if (chosen && !fs::exists(*chosen, error)) {
-        path.complain(texts::files::kNoSuchFile);
+        path_.complain(texts::files::kNoSuchFile);
         chosen.reset();
     }
     const bool stays = choice != Choice::cancel && !chosen;
@@ -254,173 +204,132 @@ bool Dialogs::State::draw_open(const std::function<void(const fs::path&)>& open)
     return stays;
 }
 
-void Dialogs::State::draw_leave() {
+void Dialogs::draw_leave() {
     if (!begin_modal(texts::files::kLeaveTitle)) return;
     std::string names;
-    for (size_t i = 0; i < editor.scenes(); ++i)
-        if (editor.scene(i).unsaved)
-            names += (names.empty() ? "" : ", ") + core::one_line(editor.scene(i).name);
+    for (size_t i = 0; i < editor_.scenes(); ++i)
+        if (editor_.scene(i).unsaved)
+            names += (names.empty() ? "" : ", ") + core::one_line(editor_.scene(i).name);
     modal_text(names + texts::files::kUnsavedEdits);
     const Choice choice = draw_choices(texts::files::kSave, texts::files::kDontSave, texts::files::kCancel);
-    if (choice != Choice::none) shown = publish.running() ? DialogKind::publish : DialogKind::none;
-    const std::function<void()> then = go_on;
-    if (choice == Choice::other || choice == Choice::cancel) go_on = nullptr;
-    end_modal(choice == Choice::none || shown != DialogKind::none);
+    if (choice != Choice::none) shown_ = publish_.running() ? &Dialogs::draw_publish : nullptr;
+    const std::function<void()> then = go_on_;
+    if (choice == Choice::other || choice == Choice::cancel) go_on_ = nullptr;
+    end_modal(choice == Choice::none || shown_ != nullptr);
     if (choice == Choice::other) {
-        editor.discard();
+        editor_.discard();
         pass(then);
     } else if (choice == Choice::confirm) {
-        for (size_t i = 0; i < editor.scenes() && !scene().unsaved; ++i)
-            if (editor.scene(i).unsaved) editor.activate(i);
-        const bool again = last.original == scene().file && last.name == scene().name && !last.file.empty();
-        if (editor.saving())
-            shown = DialogKind::saving;
-        else if (again)
-            write(last.file, last.all);
+        for (size_t i = 0; i < editor_.scenes() && !scene().unsaved; ++i)
+            if (editor_.scene(i).unsaved) editor_.activate(i);
+        if (editor_.saving())
+            shown_ = &Dialogs::draw_saving;
         else
-            save_as();
+            save();
     }
 }
 
-void Dialogs::State::draw_journal() {
+void Dialogs::draw_journal() {
     if (!begin_modal(texts::files::kJournalTitle)) return;
     size_t edits = 0;
-    for (const Editor::Left& each : left) edits += each.journal.steps.size();
+    for (const Editor::Left& each : left_) edits += each.journal.steps.size();
     const fs::path file = scene().file;
     modal_text(texts::files::kEndedUnsaved + core::counted(edits, "edit") + " of " +
                core::one_line(file.filename().string()) + ".");
     const Choice choice = draw_choices(texts::files::kJournalRestore, texts::files::kJournalDiscard,
                                        texts::files::kJournalLater);
-    if (choice != Choice::none) shown = DialogKind::none;
-    end_modal(shown != DialogKind::none);
+    if (choice != Choice::none) shown_ = nullptr;
+    end_modal(shown_ != nullptr);
     std::error_code error;
     if (choice == Choice::other)
-        for (const Editor::Left& each : left)
+        for (const Editor::Left& each : left_)
             if (const fs::path journal = edit::journal_of(file, each.part); !edit::in_use(journal))
                 fs::remove(journal, error);
-    if (choice == Choice::confirm) editor.restore(std::move(left));
-    if (choice != Choice::none) left.clear();
+    if (choice == Choice::confirm) editor_.restore(std::move(left_));
+    if (choice != Choice::none) left_.clear();
 }
 
-void Dialogs::State::draw_saving() {
+void Dialogs::draw_saving() {
     if (!begin_modal(texts::files::kSavingTitle)) return;
-    modal_text(editor.saving() ? texts::files::kWriting + core::one_line(last.file.string()) + " ..."
-                               : std::string(texts::files::kFinishing));
+    modal_text(editor_.saving() ? texts::files::kWriting + core::one_line(last_.file.string()) + " ..."
+                                : std::string(texts::files::kFinishing));
     if (draw_choices(nullptr, nullptr, texts::files::kCancel) == Choice::cancel) {
-        go_on = nullptr;
-        shown = DialogKind::none;
+        go_on_ = nullptr;
+        shown_ = nullptr;
     }
-    end_modal(shown != DialogKind::none);
+    end_modal(shown_ != nullptr);
 }
 
-void Dialogs::State::draw_shown() {
-    drawn = shown;
-    switch (shown) {
-        case DialogKind::save:
-            return draw_save();
-        case DialogKind::publish:
-            if (!publish.draw()) shown = DialogKind::none;
-            return;
-        case DialogKind::leave:
-            return draw_leave();
-        case DialogKind::journal:
-            return draw_journal();
-        case DialogKind::saving:
-            return draw_saving();
-        case DialogKind::other:
-            if (!draw_other() && shown == DialogKind::other) shown = DialogKind::none;
-            return;
-        case DialogKind::none:
-            return close_modal();
-    }
+void Dialogs::draw_publish() {
+    if (!publish_.draw()) shown_ = nullptr;
 }
 
-Dialogs::Dialogs(Editor& editor, FileDialog& files, std::function<void()> wake,
-                 std::function<void(const std::string&)> say)
-    : state_(std::make_unique<State>(editor, files, std::move(wake), std::move(say))) {}
+void Dialogs::draw_other() {
+    if (!draw_other_() && shown_ == &Dialogs::draw_other) shown_ = nullptr;
+}
 
-Dialogs::~Dialogs() = default;
+Dialogs::Dialogs(ViewState& state, Editor& editor, FileDialog& files)
+    : state_(state), editor_(editor), files_(files), publish_(editor, files, state.wake) {}
 
 void Dialogs::save() {
-    State& state = *state_;
-    if (state.editor.scenes() == 0) return state.say(texts::files::kNothingToSave);
-    if (state.editor.saving()) return state.say(texts::files::kStillSaving);
-    const EditedScene& scene = state.scene();
-    const State::Saved& last = state.last;
-    if (last.file.empty() || last.original != scene.file || last.name != scene.name) return state.save_as();
-    state.write(last.file, last.all);
-}
-
-void Dialogs::save_as() {
-    state_->save_as();
+    if (editor_.scenes() == 0) return state_.say(texts::files::kNothingToSave);
+    if (editor_.saving()) return state_.say(texts::files::kStillSaving);
+    if (last_.file.empty() || last_.original != scene().file || last_.name != scene().name) return save_as();
+    write(last_.file, last_.all);
 }
 
 void Dialogs::publish() {
-    State& state = *state_;
-    if (state.editor.scenes() == 0) return state.say(texts::files::kNothingToSave);
-    state.publish.begin(views_file ? views_file() : fs::path());
-    state.shown = DialogKind::publish;
+    if (editor_.scenes() == 0) return state_.say(texts::files::kNothingToSave);
+    publish_.begin(views_file ? views_file() : fs::path());
+    shown_ = &Dialogs::draw_publish;
 }
 
 void Dialogs::leave(std::function<void()> go_on) {
-    State& state = *state_;
-    state.go_on = std::move(go_on);
-    if (!state.editor.busy() && !state.editor.saving()) return state.ask_or_pass();
-    state.shown = DialogKind::saving;
-}
-
-bool Dialogs::leaving() const {
-    return state_->shown == DialogKind::leave;
-}
-
-void Dialogs::offer_journals() {
-    state_->offers = true;
+    go_on_ = std::move(go_on);
+    if (!editor_.busy() && !editor_.saving()) return ask_or_pass();
+    shown_ = &Dialogs::draw_saving;
 }
 
 void Dialogs::ask_path(const std::string& why, std::function<void(const fs::path&)> open) {
-    state_->path.set({});
-    state_->path.complain(core::one_line(why));
-    show([state = state_.get(), open = std::move(open)] { return state->draw_open(open); });
+    path_.set({});
+    path_.complain(core::one_line(why));
+    show([this, open = std::move(open)] { return draw_open(open); });
 }
 
 void Dialogs::show(std::function<bool()> draw) {
     if (open()) return;
-    state_->draw_other = std::move(draw);
-    state_->shown = DialogKind::other;
+    draw_other_ = std::move(draw);
+    shown_ = &Dialogs::draw_other;
 }
 
 void Dialogs::draw() {
-    State& state = *state_;
     int& flags = ImGui::GetIO().ConfigFlags;
     if (open() && (flags & ImGuiConfigFlags_NavEnableKeyboard) == 0) {
         flags |= ImGuiConfigFlags_NavEnableKeyboard;
-        state.keyboard = true;
-    } else if (!open() && std::exchange(state.keyboard, false)) {
+        keyboard_ = true;
+    } else if (!open() && std::exchange(keyboard_, false)) {
         flags &= ~ImGuiConfigFlags_NavEnableKeyboard;
     }
-    if (open() || state.drawn != DialogKind::none) state.draw_shown();
+    const bool before = std::exchange(drawn_, open());
+    if (open())
+        (this->*shown_)();
+    else if (before)
+        close_modal();
 }
 
-bool Dialogs::open() const {
-    return state_->shown != DialogKind::none;
-}
-
-bool Dialogs::take() {
-    State& state = *state_;
-    const bool chosen = state.path.take(state.files), published = state.publish.take();
-    if (state.editor.busy() || state.editor.saving()) return chosen || published;
-    bool changed = chosen || published;
-    if (std::exchange(state.offers, false) && state.editor.snapshot().done == 0 && !open()) {
-        state.left = state.editor.left_journals();
-        if (!state.left.empty()) state.shown = DialogKind::journal;
-        changed = true;
+void Dialogs::take() {
+    path_.take(files_);
+    publish_.take();
+    if (editor_.busy() || editor_.saving()) return;
+    if (std::exchange(offers_, false) && editor_.snapshot().done == 0 && !open()) {
+        left_ = editor_.left_journals();
+        if (!left_.empty()) shown_ = &Dialogs::draw_journal;
+        state_.redraw(Loop::kRedraws);
     }
     // A save that has failed, and scenes that were not saved, leave unsaved edits.
-    if (state.shown == DialogKind::saving) {
-        state.ask_or_pass();
-        changed = true;
-    }
-    return changed;
+    if (shown_ != &Dialogs::draw_saving) return;
+    ask_or_pass();
+    state_.redraw(Loop::kRedraws);
 }
 
 }  // namespace ewa::viewer

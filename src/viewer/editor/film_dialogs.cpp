@@ -161,7 +161,7 @@ void FilmStrip::stop_film() {
 }
 
 void FilmStrip::take() {
-    if (file_.take(files_)) state_.redraw(Loop::kRedraws);
+    file_.take(files_);
     const std::vector<ExtraDone> done = std::exchange(shown_.extras, {});
     const auto say = [&](const std::exception_ptr& failure) {
         try {
@@ -177,7 +177,6 @@ void FilmStrip::take() {
         pictures_.erase(picture);
     }
     if (!writer_) return;
-    if (!done.empty() || writer_->ending()) state_.redraw();
     try {
         if (!writer_->step(shown_.renders, done, steady_now())) return;
         state_.say("wrote " + writer_->output().file.string() + ": " + std::to_string(writer_->frames()) +

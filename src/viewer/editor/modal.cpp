@@ -214,15 +214,14 @@ void PathField::draw(FileDialog* files) {
     asked_ = true;
 }
 
-bool PathField::take(FileDialog& files) {
-    if (!asked_) return false;
+void PathField::take(FileDialog& files) {
+    if (!asked_) return;
     try {
         if (const auto chosen = files.take()) set(*chosen);
     } catch (const std::exception& error) {
         complain(core::one_line(error.what()));
     }
     asked_ = files.open();
-    return !asked_;
 }
 
 }  // namespace ewa::viewer

@@ -59,8 +59,8 @@ class PathField {
     std::filesystem::path path() const;
     /// Draws the field, and below it what is wrong with the path. files: of the button "Browse"; null: it has none.
     void draw(FileDialog* files);
-    /// Takes the answer of the dialog that draw() has opened. Returns whether there was one.
-    bool take(FileDialog& files);
+    /// Takes the answer of the dialog that draw() has opened.
+    void take(FileDialog& files);
     /// Sets the path, and returns whether it can be written. An existing file needs a second call, after a warning. refusal: why it
     /// cannot be written; empty: it can.
     bool accept(const std::filesystem::path& out, const std::string& refusal);

@@ -180,17 +180,16 @@ void PublishDialog::start() {
     publisher_.start(std::move(order));
 }
 
-bool PublishDialog::take() {
-    if (!running()) return path_.take(files_);
+void PublishDialog::take() {
+    path_.take(files_);
     const std::optional<Publisher::Result> result = publisher_.take();
-    if (!result) return true;  // the seconds change
+    if (!result) return;
     done_ = result->done;
     if (done_) wrote_ = wrote_text(out_, left_);
     text_ = result->stopped                  ? texts::files::kStopped
             : result->text.empty() && !done_ ? texts::files::kFailed
                                              : result->text;
     path_.complain({});
-    return true;
 }
 
 }  // namespace ewa::viewer

@@ -20,8 +20,8 @@ class PublishDialog {
     void begin(const std::filesystem::path& views);
     /// Draws the modal. Returns whether it stays open.
     bool draw();
-    /// Returns whether draw() shows something else than before.
-    bool take();
+    /// Takes the answers of the file dialog and of the program.
+    void take();
     bool running() const { return publisher_.running(); }
 
   private:
