@@ -87,17 +87,12 @@ void ImageComparison::compare(const std::optional<ComparisonRequest>& request) {
     requested_ = request;
 }
 
-ImageComparison::News ImageComparison::take() {
-    News news = News::none;
-    if (const auto compared = comparisons_.result(); compared != compared_) {
-        compared_ = compared;
-        news = News::comparison;
-    }
-    if (const auto image = images_.result(); image != image_ && image && image->scene == scene_) {
-        image_ = image;
-        news = News::image;
-    }
-    return news;
+bool ImageComparison::take() {
+    compared_ = comparisons_.result();
+    const auto image = images_.result();
+    if (image == image_ || !image || image->scene != scene_) return false;
+    image_ = image;
+    return true;
 }
 
 std::shared_ptr<const Compared> ImageComparison::compared() const {

@@ -68,8 +68,8 @@ class ImageComparison {
     void load(int index, const Frame& frame, Size place, const std::array<float, 3>& background);
     /// Starts this comparison, unless it is running or done. An empty request drops the last comparison.
     void compare(const std::optional<ComparisonRequest>& request);
-    enum class News { none, comparison, image };
-    News take();
+    /// Takes what is new. Returns whether image() is another one.
+    bool take();
 
     /// Whether loading the image of this frame has ended, with the image or a failure.
     bool loaded(int frame) const { return image_ && image_->frame == frame; }

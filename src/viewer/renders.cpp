@@ -154,12 +154,11 @@ void Renders::forget_points() {
     points_forgotten_ = points_asked_;
 }
 
-Renders::News Renders::take() {
-    News news{thread_.take_news()};
+RenderThread::News Renders::take() {
+    RenderThread::News news = thread_.take_news();
     if (!news.points.empty()) points_ = news.points.back().number;
     std::erase_if(news.points, [&](const SurfacePoint& point) { return point.number <= points_forgotten_; });
-    news.frame = news.picture != shown_;
-    if (news.frame) {
+    if (news.picture != shown_) {
         shown_ = news.picture;
         // The frames of a resting view have other splats than those that set the pace.
         if (shown_->request.coarse == has_draft_) pace_.drawn(shown_->request.divisor, shown_->milliseconds);

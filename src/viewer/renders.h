@@ -102,10 +102,7 @@ class Renders {
     /// The number of the present scene.
     uint64_t scene() const { return scene_; }
 
-    struct News : RenderThread::News {
-        bool frame = false;  // shown() is another one
-    };
-    News take();
+    RenderThread::News take();
 
     /// The last frame, or null.
     const std::shared_ptr<const RenderedFrame>& shown() const { return shown_; }

@@ -35,7 +35,7 @@ void Shown::enter_scene() {
 }
 
 void Shown::take_renders() {
-    const Renders::News news = renders.take();
+    const RenderThread::News news = renders.take();
     if (news.device) {
         state_.device_name = news.device->name;
         state_.on_cpu = news.device->type == "cpu";
@@ -48,7 +48,6 @@ void Shown::take_renders() {
     for (const auto& file : news.written) state_.say("wrote " + std::filesystem::absolute(file).string());
     extras.insert(extras.end(), news.extras.begin(), news.extras.end());
     quality_.take(news.full);
-    if (news.frame) state_.redraw();
 }
 
 void Shown::forget_points() {
@@ -87,10 +86,7 @@ void Shown::ask_point(const glm::dvec2& pixel, PointUse use) {
 }
 
 void Shown::take_comparison(Presenter& presenter) {
-    if (navigation_.at_camera && quality_.psnr(*navigation_.at_camera) != psnr_) state_.redraw();
-    const ImageComparison::News news = images_.take();
-    if (news == ImageComparison::News::none) return;
-    if (news == ImageComparison::News::comparison) return state_.redraw();
+    if (!images_.take()) return;
     if (images_.image()->failure.empty()) presenter.set_picture(Layer::image, images_.image()->picture);
     state_.redraw(Loop::kRedraws);
 }
@@ -151,8 +147,8 @@ std::string Shown::image_failure() const {
     return navigation_.at_camera ? images_.failure_of(*navigation_.at_camera) : std::string();
 }
 
-const std::optional<double>& Shown::psnr() {
-    return psnr_ = comparing() ? quality_.psnr(*navigation_.at_camera) : std::nullopt;
+std::optional<double> Shown::psnr() const {
+    return comparing() ? quality_.psnr(*navigation_.at_camera) : std::nullopt;
 }
 
 void Shown::load_image() {

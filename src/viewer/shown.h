@@ -57,8 +57,8 @@ class Shown {
     Camera camera(Size size) const;
     /// The look of the settings, for a screenshot without tints. If the camera's lens has distortion, splats are not drawn as points.
     Look look_for(const Camera& camera) const;
-    std::string image_failure() const;    // why the camera has no image; else empty
-    const std::optional<double>& psnr();  // for the panel, dB
+    std::string image_failure() const;   // why the camera has no image; else empty
+    std::optional<double> psnr() const;  // dB
 
     Renders renders;
     std::vector<ExtraDone> extras;  // that take_renders() has brought; who has asked for them takes them out
@@ -78,7 +78,6 @@ class Shown {
     std::shared_ptr<const ByteImage> picture_;  // the presenter's: a render or a difference
     bool difference_ = false;
     bool measuring_ = false;
-    std::optional<double> psnr_;  // in the panel
     ImageComparison images_;
     ViewQuality quality_;
 };

@@ -94,8 +94,6 @@ void ViewSession::find_cameras(const std::filesystem::path& photos) {
 }
 
 void ViewSession::take_found() {
-    if (!search.running()) return;
-    state_.redraw();
     if (!search.ended()) return;
     try {
         std::optional<OpenedScene> scene = search.take();
