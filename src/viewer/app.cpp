@@ -22,6 +22,7 @@
 #include "viewer/editor/texts.h"
 #include "viewer/editor/toolbar.h"
 #include "viewer/latest.h"
+#include "viewer/panel.h"
 
 namespace ewa::viewer {
 namespace {
@@ -226,26 +227,6 @@ void App::handle_mouse() {
 }
 
 void App::panel() {
-    const EditSnapshot& edited = editor_.snapshot();
-    const PanelFacts facts{
-        .scene = state_.scene,
-        .splats = editor_.scenes() > 0 && edited.splats ? edited.left : state_.scene.gaussians->size(),
-        .device = state_.device_name,
-        .on_cpu = state_.on_cpu,
-        .picture = shown_.renders.shown().get(),
-        .views = navigation_.views,
-        .run = session_.live_run.update(),
-        .run_folder = session_.live_run.folder(),
-        .drawing = !shown_.renders.settled(),
-        .note = state_.message.noting(Clock::now()) ? std::string() : state_.message.note,
-        .image_failure = shown_.image_failure(),
-        .psnr = shown_.psnr(),
-        .times = state_.loop.times,
-        .up = navigation_.view.up(),
-        .at_camera = navigation_.at_camera,
-        .place = state_.panel_area(),
-        .over_picture = !state_.panel_fits(),
-    };
     std::function<void()> rows = [this] {
         edit_panel_.draw(editor_, live());
         state_.settings.look.plain = edit_panel_.shows_colours();
@@ -253,19 +234,12 @@ void App::panel() {
     };
     if (editor_.scenes() == 0) rows = nullptr;
     const float text = state_.settings.text_scale;
-    obey(draw_panel(facts, state_.settings, rows));
+    const EditSnapshot& edited = editor_.snapshot();
+    const size_t splats =
+        editor_.scenes() > 0 && edited.splats ? edited.left : state_.scene.gaussians->size();
+    draw_panel({state_, navigation_, shown_, session_, film_.shown, splats}, rows);
     // The row that changes it stays in view.
     if (state_.settings.text_scale != text) state_.panel_beside = state_.panel_over = true;
-}
-
-void App::obey(const PanelActions& actions) {
-    if (actions.screenshot) state_.loop.capture = true;
-    if (actions.exr) shown_.write_exr();
-    if (actions.open) session_.dialog.ask(*actions.open);
-    if (actions.train) session_.train();
-    if (actions.command) session_.live_run.command(*actions.command);
-    if (actions.film) toggle(film_.shown);
-    navigation_.obey(actions);
 }
 
 void App::draw_overlays() {

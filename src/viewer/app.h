@@ -34,7 +34,6 @@ class App {
     // Input.
     void handle_key(const KeyPress& press);
     void handle_mouse();
-    void obey(const PanelActions& actions);
 
     // One frame of the window.
     void draw();

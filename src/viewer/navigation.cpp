@@ -10,6 +10,7 @@
 
 #include "ewa/error.h"
 #include "viewer/editor/film.h"
+#include "viewer/panel.h"
 
 namespace ewa::viewer {
 namespace {
@@ -65,18 +66,6 @@ void Navigation::handle_key(const KeyPress& press) {
     if (key == GLFW_KEY_G) go_to_nearest_camera();
     if (key == GLFW_KEY_LEFT) step_camera(-1);
     if (key == GLFW_KEY_RIGHT) step_camera(1);
-}
-
-void Navigation::obey(const PanelActions& actions) {
-    if (actions.reset) reset();
-    if (actions.whole_scene) show_whole_scene();
-    if (actions.frame) go_to_camera(*actions.frame);
-    if (actions.up) view.set_up(*actions.up);
-    if (actions.save_view) add_view({});
-    if (actions.view && *actions.view < views.size()) go_to(views[*actions.view]);
-    if (actions.forget && *actions.forget < views.size())
-        views.erase(views.begin() + std::ptrdiff_t(*actions.forget));
-    if (actions.write_views) write_views();
 }
 
 void Navigation::drag(double right, double down, Size place) {

@@ -23,12 +23,14 @@ class Navigation {
     void take_splats();
 
     void handle_key(const KeyPress& press);
-    void obey(const PanelActions& actions);
     void drag(double right, double down, Size place);
     /// Moves the camera by the motion of so many seconds: around the turntable, and in the directions of the held keys.
     void move(double seconds);
     bool flying() const;
 
+    /// Returns to the first view.
+    void reset();
+    void show_whole_scene();
     void go_to_camera(int frame);
     void go_to_nearest_camera();
     void leave_camera() { at_camera.reset(); }
@@ -56,8 +58,6 @@ class Navigation {
   private:
     void handle_number(size_t number, const KeyPress& press);
     void step_camera(int step);
-    void reset();
-    void show_whole_scene();
     std::vector<io::NamedView>::iterator find(size_t number);
     void save_view(size_t number);
 

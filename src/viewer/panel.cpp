@@ -30,18 +30,19 @@ const std::array kAxes{Axis{"-y", {0, -1, 0}}, Axis{"+y", {0, 1, 0}}, Axis{"+z",
                        Axis{"-z", {0, 0, -1}}, Axis{"+x", {1, 0, 0}}, Axis{"-x", {-1, 0, 0}}};
 
 /// What is open, in two lines.
-void show_title(const PanelFacts& facts) {
-    ImGui::TextUnformatted(facts.scene.title.c_str());
-    const char* what = facts.scene.points ? "point" : "splat";
-    std::string text = core::grouped(facts.splats, what);
-    if (facts.picture && facts.picture->skipped_nonfinite > 0)
-        text += ", " + core::grouped(facts.picture->skipped_nonfinite) + " not finite";
+void show_title(const PanelParts& parts) {
+    const OpenedScene& scene = parts.state.scene;
+    ImGui::TextUnformatted(scene.title.c_str());
+    const char* what = scene.points ? "point" : "splat";
+    std::string text = core::grouped(parts.splats, what);
+    if (const RenderedFrame* picture = parts.picture(); picture && picture->skipped_nonfinite > 0)
+        text += ", " + core::grouped(picture->skipped_nonfinite) + " not finite";
     ImGui::TextDisabled("%s", text.c_str());
 }
 
 /// What the colours of the mode mean, or the background behind them.
-void edit_background(const PanelFacts& facts, Look& look) {
-    const bool shown = facts.picture && facts.picture->request.look.mode == look.mode;
+void edit_background(const RenderedFrame* picture, Look& look) {
+    const bool shown = picture && picture->request.look.mode == look.mode;
     const bool color = look.mode == Mode::color || look.mode == Mode::ellipsoids;
     const bool depth = look.mode == Mode::depth || look.mode == Mode::median_depth;
     if (!color && !depth && look.mode != Mode::count) return;
@@ -53,18 +54,18 @@ void edit_background(const PanelFacts& facts, Look& look) {
     else if (!shown)
         ImGui::TextUnformatted("...");  // it is being rendered
     else if (depth)
-        ImGui::Text("%.4g to %.4g", double(facts.picture->picture.dark),
-                    double(facts.picture->picture.white));
+        ImGui::Text("%.4g to %.4g", double(picture->picture.dark), double(picture->picture.white));
     else
-        ImGui::Text("red to white: %.0f", double(facts.picture->picture.white));
+        ImGui::Text("red to white: %.0f", double(picture->picture.white));
 }
 
-void edit_look(const PanelFacts& facts, PanelSettings& settings) {
+void edit_look(const PanelParts& parts) {
+    PanelSettings& settings = parts.state.settings;
     Look& look = settings.look;
     int mode = int(look.mode);
     label_field("Show");
     if (ImGui::Combo("##mode", &mode, texts::kModes)) look.mode = Mode(mode);
-    edit_background(facts, look);
+    edit_background(parts.picture(), look);
     label_field("Splat size");
     ImGui::SliderFloat("##splat scale", &look.splat_scale, 0.05f, 2.0f, "%.2f", ImGuiSliderFlags_AlwaysClamp);
     ImGui::Checkbox("Turntable", &settings.turntable);
@@ -74,11 +75,11 @@ void edit_look(const PanelFacts& facts, PanelSettings& settings) {
 }
 
 /// What the rendering of splats depends on.
-void edit_rendering(const PanelFacts& facts, Look& look) {
-    look.sh_degree = std::min(look.sh_degree, facts.scene.sh_degree);
-    if (facts.scene.sh_degree > 0) {
+void edit_rendering(const OpenedScene& scene, Look& look) {
+    look.sh_degree = std::min(look.sh_degree, scene.sh_degree);
+    if (scene.sh_degree > 0) {
         label_field("SH degree");
-        ImGui::SliderInt("##SH degree", &look.sh_degree, 0, facts.scene.sh_degree, "%d",
+        ImGui::SliderInt("##SH degree", &look.sh_degree, 0, scene.sh_degree, "%d",
                          ImGuiSliderFlags_AlwaysClamp);
     }
     constexpr int kPoints = 3;
@@ -90,39 +91,39 @@ void edit_rendering(const PanelFacts& facts, Look& look) {
     }
 }
 
-void choose_up(const PanelFacts& facts, PanelActions& actions) {
+void choose_up(ViewCamera& view) {
     const char* present = "from cameras";
     for (const Axis& choice : kAxes)
-        if (choice.axis == facts.up) present = choice.name;
+        if (choice.axis == view.up()) present = choice.name;
     label_field("Up");
     if (!ImGui::BeginCombo("##up", present)) return;
     for (const Axis& choice : kAxes)
-        if (ImGui::Selectable(choice.name, choice.name == present)) actions.up = choice.axis;
+        if (ImGui::Selectable(choice.name, choice.name == present)) view.set_up(choice.axis);
     ImGui::EndCombo();
 }
 
-std::string comparison_text(const PanelFacts& facts, const PanelSettings& settings) {
-    if (settings.comparison == Comparison::none) return "";
-    if (!facts.image_failure.empty()) return facts.image_failure;
-    if (!facts.at_camera) return "G: go to the nearest camera";
-    if (!facts.psnr || std::isnan(*facts.psnr)) return "";
-    const Camera& camera = facts.scene.dataset->frames[size_t(*facts.at_camera)].camera;
+std::string comparison_text(const PanelParts& parts) {
+    if (std::string failure = parts.shown.image_failure(); !failure.empty()) return failure;
+    if (!parts.navigation.at_camera) return "G: go to the nearest camera";
+    const std::optional<double> psnr = parts.shown.psnr();
+    if (!psnr || std::isnan(*psnr)) return "";
+    const Camera& camera = parts.navigation.frame().camera;
     std::array<char, 96> text{};
-    std::snprintf(text.data(), text.size(), "PSNR of this view %.2f dB\nat the image's %d x %d px",
-                  *facts.psnr, camera.width, camera.height);
+    std::snprintf(text.data(), text.size(), "PSNR of this view %.2f dB\nat the image's %d x %d px", *psnr,
+                  camera.width, camera.height);
     return text.data();
 }
 
-void edit_cameras(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
-    const int last = int(facts.scene.dataset->frames.size()) - 1;
-    int frame = facts.at_camera.value_or(0);
+void edit_cameras(const PanelParts& parts) {
+    PanelSettings& settings = parts.state.settings;
+    Navigation& navigation = parts.navigation;
+    const int last = int(parts.state.scene.dataset->frames.size()) - 1;
+    int frame = navigation.at_camera.value_or(0);
     label_field("Camera");
-    if (ImGui::SliderInt("##camera", &frame, 0, last, facts.at_camera ? "%d" : "-",
+    if (ImGui::SliderInt("##camera", &frame, 0, last, navigation.at_camera ? "%d" : "-",
                          ImGuiSliderFlags_AlwaysClamp))
-        actions.frame = frame;
-    ImGui::TextDisabled("%s", facts.at_camera
-                                  ? facts.scene.dataset->frames[size_t(*facts.at_camera)].name.c_str()
-                                  : "between the cameras");
+        navigation.go_to_camera(frame);
+    ImGui::TextDisabled("%s", navigation.at_camera ? navigation.frame().name.c_str() : "between the cameras");
     ImGui::Checkbox("Show cameras", &settings.cameras);
     int comparison = int(settings.comparison);
     label_field("Compare");
@@ -137,22 +138,26 @@ void edit_cameras(const PanelFacts& facts, PanelSettings& settings, PanelActions
         ImGui::SliderFloat("##gain", &settings.gain, 1, 16, "%.0f", ImGuiSliderFlags_AlwaysClamp);
     }
     // The rows below do not move while the slider goes from camera to camera.
-    draw_text_box("comparison", comparison_text(facts, settings), 2, 2);
+    draw_text_box("comparison", comparison_text(parts), 2, 2);
 }
 
-void edit_views(const PanelFacts& facts, PanelActions& actions) {
-    if (ImGui::Button("Save this view")) actions.save_view = true;
-    for (size_t i = 0; i < facts.views.size(); ++i) {
+void edit_views(const PanelParts& parts) {
+    Navigation& navigation = parts.navigation;
+    std::vector<io::NamedView>& views = navigation.views;
+    if (ImGui::Button("Save this view")) navigation.add_view({});
+    std::optional<size_t> forgotten;
+    for (size_t i = 0; i < views.size(); ++i) {
         ImGui::PushID(int(i));
-        if (ImGui::Button(facts.views[i].name.c_str())) actions.view = i;
+        if (ImGui::Button(views[i].name.c_str())) navigation.go_to(views[i]);
         ImGui::SameLine();
-        if (ImGui::SmallButton("x")) actions.forget = i;
+        if (ImGui::SmallButton("x")) forgotten = i;
         ImGui::PopID();
     }
-    if (facts.views.empty()) return;
-    if (ImGui::Button("Write to a file")) actions.write_views = true;
+    if (forgotten) views.erase(views.begin() + std::ptrdiff_t(*forgotten));
+    if (views.empty()) return;
+    if (ImGui::Button("Write to a file")) navigation.write_views();
     ImGui::SameLine();
-    actions.film = ImGui::Button("Film");
+    if (ImGui::Button("Film")) parts.film = !parts.film;
 }
 
 void cells(const char* name, const char* format, double value) {
@@ -162,39 +167,40 @@ void cells(const char* name, const char* format, double value) {
     ImGui::Text(format, value);
 }
 
-void show_times(const PanelFacts& facts) {
+void show_times(const RenderedFrame& picture, const SessionTimes& times) {
     if (!ImGui::BeginTable("times", 2, ImGuiTableFlags_SizingStretchProp)) return;
-    for (const PassTime& time : facts.picture->pass_times)
+    for (const PassTime& time : picture.pass_times)
         if (time.milliseconds >= 0.005) cells(time.pass.c_str(), "%.2f ms", time.milliseconds);
-    cells("request to frame", "%.2f ms", facts.picture->milliseconds);
-    if (const double rate = facts.times.rate(); rate > 0) cells("moving, per second", "%.1f", rate);
-    if (const auto first = facts.times.first_frame()) cells("first frame", "%.0f ms", 1000 * *first);
+    cells("request to frame", "%.2f ms", picture.milliseconds);
+    if (const double rate = times.rate(); rate > 0) cells("moving, per second", "%.1f", rate);
+    if (const auto first = times.first_frame()) cells("first frame", "%.0f ms", 1000 * *first);
     ImGui::EndTable();
 }
 
-void show_details(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
-    if (facts.picture) {
-        const RenderedFrame& shown = *facts.picture;
-        ImGui::TextDisabled(
-            "%s visible", core::grouped(shown.splats_drawn, facts.scene.points ? "point" : "splat").c_str());
-        ImGui::TextDisabled("%d x %d px in %.1f ms%s", shown.picture.width, shown.picture.height,
-                            shown.milliseconds, facts.drawing ? "  ..." : "");
+void show_details(const PanelParts& parts) {
+    const OpenedScene& scene = parts.state.scene;
+    const RenderedFrame* picture = parts.picture();
+    if (picture) {
+        ImGui::TextDisabled("%s visible",
+                            core::grouped(picture->splats_drawn, scene.points ? "point" : "splat").c_str());
+        ImGui::TextDisabled("%d x %d px in %.1f ms%s", picture->picture.width, picture->picture.height,
+                            picture->milliseconds, parts.shown.renders.settled() ? "" : "  ...");
     }
-    edit_rendering(facts, settings.look);
-    choose_up(facts, actions);
-    if (draw_section("Time", false) && facts.picture) show_times(facts);
+    edit_rendering(scene, parts.state.settings.look);
+    choose_up(parts.navigation.view);
+    if (draw_section("Time", false) && picture) show_times(*picture, parts.state.loop.times);
     if (draw_section("Skipped work", false)) {
         ImGui::PushTextWrapPos(0);
-        for (const PlanLine& line : facts.scene.plan) {
+        for (const PlanLine& line : scene.plan) {
             ImGui::TextUnformatted(line.what.c_str());
             if (line.bytes_saved > 0)
                 ImGui::TextDisabled("    saves %.1f MiB", double(line.bytes_saved) / (1 << 20));
         }
         ImGui::PopTextWrapPos();
     }
-    if (draw_section("Memory and device", false) && facts.picture) {
-        ImGui::Text("%.1f MiB on the device", double(facts.picture->device_bytes) / (1 << 20));
-        ImGui::TextWrapped("%s", facts.device.c_str());
+    if (draw_section("Memory and device", false) && picture) {
+        ImGui::Text("%.1f MiB on the device", double(picture->device_bytes) / (1 << 20));
+        ImGui::TextWrapped("%s", parts.state.device_name.c_str());
     }
 }
 
@@ -213,17 +219,18 @@ void choose_window(PanelSettings& settings) {
     if (ImGui::Combo("##theme", &theme, texts::kThemes)) settings.light = theme == 1;
 }
 
-void draw_rows(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
-    show_title(facts);
+void draw_rows(const PanelParts& parts) {
+    const OpenedScene& scene = parts.state.scene;
+    show_title(parts);
     ImGui::PushItemWidth(ImGui::GetTextLineHeight() * 9.5f);
-    if (draw_section(texts::kLook, true)) edit_look(facts, settings);
-    const bool trainable = facts.scene.dataset && !facts.scene.path.empty() && facts.scene.points;
-    if ((facts.run || trainable) && draw_section(texts::kTraining, true))
-        draw_training(facts, settings, actions);
-    if (facts.scene.dataset && draw_section(texts::kCameras, true)) edit_cameras(facts, settings, actions);
-    if (draw_section(texts::kSavedViews, false)) edit_views(facts, actions);
-    if (draw_section(texts::kDetails, false)) show_details(facts, settings, actions);
-    if (draw_section(texts::kWindow, false)) choose_window(settings);
+    if (draw_section(texts::kLook, true)) edit_look(parts);
+    const bool trainable = scene.dataset && !scene.path.empty() && scene.points;
+    if ((parts.session.live_run.update() || trainable) && draw_section(texts::kTraining, true))
+        draw_training(parts);
+    if (scene.dataset && draw_section(texts::kCameras, true)) edit_cameras(parts);
+    if (draw_section(texts::kSavedViews, false)) edit_views(parts);
+    if (draw_section(texts::kDetails, false)) show_details(parts);
+    if (draw_section(texts::kWindow, false)) choose_window(parts.state.settings);
     ImGui::PopItemWidth();
 }
 
@@ -255,30 +262,31 @@ bool footer_button(const char* name, const char* explanation) {
     return clicked;
 }
 
-void draw_footer(const PanelFacts& facts, PanelActions& actions) {
-    draw_text_box("note", facts.note, 0, kNoteLines);
-    actions.whole_scene = footer_button("Whole scene", "From the front (F, if nothing is selected)");
+void draw_footer(const PanelParts& parts, const std::string& note) {
+    draw_text_box("note", note, 0, kNoteLines);
+    if (footer_button("Whole scene", "From the front (F, if nothing is selected)"))
+        parts.navigation.show_whole_scene();
     ImGui::SameLine();
-    actions.reset = footer_button("First view", "As at the start (R in the tab View)");
+    if (footer_button("First view", "As at the start (R in the tab View)")) parts.navigation.reset();
     if (footer_button("Open", "A file or a folder")) ImGui::OpenPopup("open");
     ImGui::SameLine();
     if (footer_button("Save picture", "F12: a PNG. Shift + F12: an EXR")) ImGui::OpenPopup("picture");
     if (ImGui::BeginPopup("open")) {
-        if (ImGui::MenuItem("A file", "Ctrl+O")) actions.open = Wanted::file;
-        if (ImGui::MenuItem("A folder", "Ctrl+Shift+O")) actions.open = Wanted::folder;
+        if (ImGui::MenuItem("A file", "Ctrl+O")) parts.session.dialog.ask(Wanted::file);
+        if (ImGui::MenuItem("A folder", "Ctrl+Shift+O")) parts.session.dialog.ask(Wanted::folder);
         ImGui::EndPopup();
     }
     if (ImGui::BeginPopup("picture")) {
-        actions.screenshot = ImGui::MenuItem("What you see (PNG)", "F12");
-        actions.exr = ImGui::MenuItem("The render in floating point (EXR)", "Shift+F12");
+        if (ImGui::MenuItem("What you see (PNG)", "F12")) parts.state.loop.capture = true;
+        if (ImGui::MenuItem("The render in floating point (EXR)", "Shift+F12")) parts.shown.write_exr();
         ImGui::EndPopup();
     }
 }
 
 /// The height of draw_footer() and of the separator above it.
-float footer_height(const PanelFacts& facts) {
+float footer_height(const std::string& note) {
     const float gap = ImGui::GetStyle().ItemSpacing.y;
-    const int lines = text_lines(facts.note, kNoteLines);
+    const int lines = text_lines(note, kNoteLines);
     return 2 * ImGui::GetFrameHeightWithSpacing() + gap +
            (lines > 0 ? float(lines) * ImGui::GetTextLineHeight() + gap : 0);
 }
@@ -337,15 +345,16 @@ glm::dvec3 next_up(const glm::dvec3& up) {
     return kAxes[0].axis;
 }
 
-PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings,
-                        const std::function<void()>& edit_rows) {
-    PanelActions actions;
-    const Rectangle& place = facts.place;
+void draw_panel(const PanelParts& parts, const std::function<void()>& edit_rows) {
+    ViewState& state = parts.state;
+    const Rectangle place = state.panel_area();
+    // The last message, after the picture no longer shows it.
+    const std::string note = state.message.noting(Message::Clock::now()) ? "" : state.message.note;
     const ImVec2 size = gui_point(place.width, place.height);
     const float height = size.y;
     ImGui::SetNextWindowPos(gui_point(place.x, place.y));
     ImGui::SetNextWindowSize(size);
-    ImGui::SetNextWindowBgAlpha(facts.over_picture ? 0.93f : 1.0f);
+    ImGui::SetNextWindowBgAlpha(state.panel_fits() ? 1.0f : 0.93f);
     constexpr auto kFlags = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
                             ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus |
                             ImGuiWindowFlags_NoFocusOnAppearing;
@@ -354,26 +363,25 @@ PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings,
     const bool open = ImGui::Begin("panel", nullptr, kFlags);
     ImGui::PopStyleVar(2);
     if (open) {
-        if (edit_rows) draw_tabs(settings.tab);
-        const bool editing = edit_rows && settings.tab == PanelTab::edit;
+        if (edit_rows) draw_tabs(state.settings.tab);
+        const bool editing = edit_rows && state.settings.tab == PanelTab::edit;
         // In a low window the footer scrolls with the rows.
-        const float footer = footer_height(facts);
+        const float footer = footer_height(note);
         const bool low = height < 3 * footer;
         ImGui::BeginChild(editing ? "edits" : "rows", ImVec2(0, low ? 0 : -footer));
         keep_rows(editing ? PanelTab::edit : PanelTab::view);
         if (editing)
             edit_rows();
         else
-            draw_rows(facts, settings, actions);
-        if (low) draw_footer(facts, actions);
+            draw_rows(parts);
+        if (low) draw_footer(parts, note);
         ImGui::EndChild();
         if (!low) {
             ImGui::Separator();
-            draw_footer(facts, actions);
+            draw_footer(parts, note);
         }
     }
     ImGui::End();
-    return actions;
 }
 
 }  // namespace ewa::viewer

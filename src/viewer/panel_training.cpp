@@ -9,10 +9,9 @@
 
 #include "core/text.h"
 #include "run/option_table.h"
+#include "viewer/editor/modal.h"
 #include "viewer/editor/offers.h"
-#include "viewer/editor/theme.h"
 #include "viewer/panel.h"
-#include "viewer/training.h"
 
 namespace ewa::viewer {
 namespace {
@@ -76,13 +75,12 @@ void show_progress(const live::Update& run) {
 }
 
 /// Which step the picture is of.
-void show_step(const PanelFacts& facts) {
-    const live::Update& run = *facts.run;
-    if (facts.scene.points)
+void show_step(const OpenedScene& scene, const live::Update& run) {
+    if (scene.points)
         ImGui::TextDisabled("picture: points, of step 0");
     else if (run.splats_step >= 0)
         ImGui::TextDisabled("picture: splats of step %d", run.splats_step);
-    else if (facts.scene.gaussians->size() > 0)
+    else if (scene.gaussians->size() > 0)
         ImGui::TextDisabled("picture: the last saved splats");
 }
 
@@ -101,73 +99,64 @@ void show_curves(const live::Status& status) {
 /// What the window offers, in the order of train::kQualities.
 constexpr std::array kQualityNames{"Quick look", "Good", "Best"};
 
-/// The name with the time that such a training usually takes, if the device is known.
-std::string quality_text(const PanelFacts& facts, const char* name, int steps) {
-    const std::string time = usual_time_text(facts.scene, facts.on_cpu, steps);
-    return time.empty() ? name : std::string(name) + ", " + time;
-}
-
-void choose_training(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
+void choose_training(const PanelParts& parts) {
+    int& chosen = parts.state.settings.train_steps;
     std::vector<std::string> texts;
-    std::string present = core::grouped(uint64_t(settings.train_steps), "step");
+    std::string present = core::grouped(uint64_t(chosen), "step");
     for (size_t i = 0; i < kQualityNames.size(); ++i) {
         const int steps = train::kQualities[i].second;
-        texts.push_back(quality_text(facts, kQualityNames[i], steps));
-        if (steps == settings.train_steps) present = texts.back();
+        const std::string time = usual_time_text(parts.state.scene, parts.state.on_cpu, steps);
+        texts.push_back(kQualityNames[i] + (time.empty() ? "" : ", " + time));
+        if (steps == chosen) present = texts.back();
     }
     ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x);
     if (ImGui::BeginCombo("##quality", present.c_str())) {
         for (size_t i = 0; i < texts.size(); ++i)
             if (ImGui::Selectable(texts[i].c_str(), texts[i] == present))
-                settings.train_steps = train::kQualities[i].second;
+                chosen = train::kQualities[i].second;
         ImGui::EndCombo();
     }
-    ImGui::PushStyleColor(ImGuiCol_Button, accent());
-    ImGui::PushStyleColor(ImGuiCol_ButtonHovered, accent(0.9f));
-    ImGui::PushStyleColor(ImGuiCol_ButtonActive, accent(0.75f));
-    ImGui::PushStyleColor(ImGuiCol_Text, on_accent());
-    actions.train = ImGui::Button("Train splats", ImVec2(ImGui::GetContentRegionAvail().x, 0));
-    ImGui::PopStyleColor(4);
+    if (accent_button("Train splats", ImGui::GetContentRegionAvail().x)) parts.session.train();
     label_field("Steps");
-    if (ImGui::InputInt("##steps", &settings.train_steps, 0))
-        settings.train_steps = std::clamp(settings.train_steps, 1, kMostSteps);
+    if (ImGui::InputInt("##steps", &chosen, 0)) chosen = std::clamp(chosen, 1, kMostSteps);
 }
 
-void draw_commands(const live::Update& run, PanelActions& actions) {
+void draw_commands(const live::Update& run, LiveRun& live_run) {
     const bool paused = run.status.state == live::State::paused;
     ImGui::BeginDisabled(run.status.state == live::State::done || !run.connected || !run.status.commands);
     if (ImGui::Button(paused ? "Resume###pause" : "Pause###pause"))
-        actions.command = paused ? "resume" : "pause";
+        live_run.command(paused ? "resume" : "pause");
     ImGui::SameLine();
-    if (ImGui::Button("Save now")) actions.command = "save";
+    if (ImGui::Button("Save now")) live_run.command("save");
     ImGui::EndDisabled();
 }
 
-std::string remark_of(const PanelFacts& facts) {
-    const live::Update& run = *facts.run;
+std::string remark_of(const PanelParts& parts, const live::Update& run) {
     if (!run.problem.empty()) return run.problem;
-    if (has_trained(run)) return how_to_share(facts.run_folder);
+    if (has_trained(run)) return how_to_share(parts.session.live_run.folder());
     if (run.status.state == live::State::done) return "";
     if (run.connected) return run.status.commands ? "" : "watching; --token lets you pause and save";
-    if (facts.scene.points) return "no splats are saved yet; --serve or --save-every lets the picture move";
+    if (parts.state.scene.points)
+        return "no splats are saved yet; --serve or --save-every lets the picture move";
     return "watching the files of the run; ewa train --serve shows more";
 }
 
 }  // namespace
 
-void draw_training(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
-    if (!facts.run) return choose_training(facts, settings, actions);
-    const live::Update& run = *facts.run;
+void draw_training(const PanelParts& parts) {
+    LiveRun& live_run = parts.session.live_run;
+    if (!live_run.update()) return choose_training(parts);
+    const live::Update& run = *live_run.update();
     if (has_trained(run)) {
         ImGui::TextUnformatted(("trained: " + core::grouped(uint64_t(run.status.steps)) +
                                 (run.status.steps == 1 ? " step" : " steps"))
                                    .c_str());
     } else {
         show_progress(run);
-        draw_commands(run, actions);
-        show_step(facts);
+        draw_commands(run, live_run);
+        show_step(parts.state.scene, run);
     }
-    draw_text_box("training remark", remark_of(facts), 0, 3);
+    draw_text_box("training remark", remark_of(parts, run), 0, 3);
     show_curves(run.status);
 }
 

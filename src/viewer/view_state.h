@@ -17,7 +17,6 @@
 #include "viewer/layout.h"
 #include "viewer/message.h"
 #include "viewer/opening.h"
-#include "viewer/panel.h"
 #include "viewer/renders.h"
 #include "viewer/training.h"
 #include "viewer/view_camera.h"
@@ -30,6 +29,26 @@ struct LaterTraining {
     std::vector<std::string> options;  // of ewa train, with the photos
     std::filesystem::path folder;      // of the run
     CaptureOptions capture;
+};
+
+/// The tabs of the panel.
+enum class PanelTab { view, edit };
+
+/// What the panel and keys change.
+struct PanelSettings {
+    Look look;
+    Comparison comparison = Comparison::none;
+    float wipe = 0.5f;  // share of the width that shows the image
+    float gain = 4;     // factor of the difference image
+    bool cameras = false, turntable = false;
+    bool parallel = false;   // orthographic projection
+    bool measure = false;    // clicks choose points, whose distance is shown
+    float film_seconds = 2;  // from one key of a film to the next
+    float text_scale = 1;    // times the size that the monitor asks for
+    bool light = false;      // the light theme
+    PanelTab tab = PanelTab::view;
+    /// Steps of a training that the window starts: those of a row of train::kQualities, or another number.
+    int train_steps = 0;
 };
 
 /// The options of the command line.

@@ -83,12 +83,12 @@ bool modal_radio(const char* name, bool chosen) {
     return clicked;
 }
 
-bool accent_button(const char* text) {
+bool accent_button(const char* text, float width) {
     ImGui::PushStyleColor(ImGuiCol_Button, accent());
     ImGui::PushStyleColor(ImGuiCol_ButtonHovered, accent(0.9f));
     ImGui::PushStyleColor(ImGuiCol_ButtonActive, accent(0.75f));
     ImGui::PushStyleColor(ImGuiCol_Text, on_accent());
-    const bool clicked = ImGui::Button(text);
+    const bool clicked = ImGui::Button(text, ImVec2(width, 0));
     ImGui::PopStyleColor(4);
     return clicked;
 }

@@ -30,8 +30,8 @@ void modal_box(const char* name, const std::string& text, int lines);
 /// A radio button with a border. Returns whether it is clicked.
 bool modal_radio(const char* name, bool chosen);
 
-/// A button in the colour of the accent. Returns whether it is clicked.
-bool accent_button(const char* text);
+/// A button in the colour of the accent. width: in ImGui's coordinates; 0: that of the text. Returns whether it is clicked.
+bool accent_button(const char* text, float width = 0);
 
 /// Fills the space down to `height` below `top`, a vertical position of the cursor. What follows stays where it is.
 void reserve(float top, float height);
