@@ -33,6 +33,19 @@ Drawing drawing_for(Mode mode) {
     return mode == Mode::ellipsoids ? Drawing::ellipsoids : Drawing::color;
 }
 
+/// plain: without tints. values: gets what the picture is made of; null: nobody wants that.
+ByteImage drawn(Renderer& renderer, const Camera& camera, const Look& look, bool plain,
+                Rendering* values = nullptr) {
+    DrawOptions options{options_of(look), drawing_for(look.mode), double(look.splat_scale)};
+    options.plain_colors = plain;
+    if (!values && (look.mode == Mode::color || look.mode == Mode::ellipsoids))
+        return {camera.width, camera.height, renderer.render_bytes(camera, options), 0};
+    Rendering rendering = renderer.render(camera, options);
+    ByteImage picture = picture_of(rendering, look.mode);
+    if (values) *values = std::move(rendering);
+    return picture;
+}
+
 /// Writes a file as `ewa render` does: EXR holds the values with alpha, PNG what the window shows.
 void save(const std::filesystem::path& file, const Rendering& rendering, const ByteImage& picture,
           Mode mode) {
@@ -174,19 +187,10 @@ std::shared_ptr<const RenderedFrame> RenderThread::Scene::draw(const RenderReque
     const Camera camera = downscale(request.camera, request.divisor);
     fit_to(look);
     Renderer& renderer = request.coarse && draft_renderer_ ? *draft_renderer_ : *renderer_;
-    DrawOptions options{options_of(look), drawing_for(look.mode), double(look.splat_scale)};
-    options.plain_colors = look.plain || !request.file.empty();
     auto finished = std::make_shared<RenderedFrame>();
     finished->request = request;
     finished->scene = scene;
-    const bool bytes_do = request.file.empty() && (look.mode == Mode::color || look.mode == Mode::ellipsoids);
-    if (bytes_do) {
-        finished->picture = {camera.width, camera.height, renderer.render_bytes(camera, options), 0};
-    } else {
-        const Rendering rendering = renderer.render(camera, options);
-        finished->picture = picture_of(rendering, look.mode);
-        if (!request.file.empty()) save(request.file, rendering, finished->picture, look.mode);
-    }
+    finished->picture = drawn(renderer, camera, look, look.plain);
     finished->pass_times = renderer.pass_times();
     finished->skipped_nonfinite = renderer.skipped_nonfinite();
     finished->splats_drawn = renderer.splats_drawn();
@@ -227,22 +231,16 @@ Image RenderThread::Scene::color(const Full& full) {
 }
 
 std::exception_ptr RenderThread::Scene::draw_extra(const ExtraRequest& request) {
-    const Look& look = request.look;
-    fit_to(look);
-    DrawOptions options{options_of(look), drawing_for(look.mode), double(look.splat_scale)};
-    options.plain_colors = true;
-    const bool bytes_do = request.file.empty() && (look.mode == Mode::color || look.mode == Mode::ellipsoids);
-    std::optional<Rendering> rendering;
-    ByteImage picture;
-    if (bytes_do)
-        picture.rgba = renderer_->render_bytes(request.camera, options);
-    else
-        picture = picture_of(rendering.emplace(renderer_->render(request.camera, options)), look.mode);
+    fit_to(request.look);
+    const bool bytes = request.file.empty();
+    Rendering values;
+    const ByteImage picture =
+        drawn(*renderer_, request.camera, request.look, true, bytes ? nullptr : &values);
     try {
-        if (request.file.empty())
+        if (bytes)
             request.take(picture.rgba);
         else
-            save(request.file, *rendering, picture, look.mode);
+            save(request.file, values, picture, request.look.mode);
     } catch (const std::exception&) {
         return std::current_exception();  // the device is not to blame
     }
@@ -279,8 +277,7 @@ void RenderThread::set_marks(std::shared_ptr<const std::vector<uint8_t>> marks) 
 
 void RenderThread::ask(const RenderRequest& request) {
     const std::lock_guard lock(mutex_);
-    if (!waiting_.empty() && waiting_.back().file.empty()) waiting_.pop_back();
-    waiting_.push_back(request);
+    next_.request = request;
     wake_.notify_one();
 }
 
@@ -316,7 +313,6 @@ uint64_t RenderThread::ask_extra(ExtraRequest request) {
 RenderThread::News RenderThread::take_news() {
     const std::lock_guard lock(mutex_);
     News news = news_;
-    news_.written.clear();
     news_.points.clear();
     news_.extras.clear();
     return news;
@@ -333,27 +329,21 @@ void RenderThread::report(const std::function<void(News&)>& change) {
 bool RenderThread::next(const std::stop_token& stop, Work& work) {
     std::unique_lock lock(mutex_);
     wake_.wait(lock, stop, [this] {
-        return !probes_waiting_.empty() || next_.full || !waiting_.empty() || !extras_waiting_.empty() ||
+        return !probes_waiting_.empty() || next_.full || next_.request || !extras_waiting_.empty() ||
                next_.scene || next_.draft || next_.marks;
     });
     if (stop.stop_requested()) return false;
-    work.scene = std::exchange(next_.scene, nullptr);
-    work.draft = std::exchange(next_.draft, std::nullopt);
-    work.marks = std::exchange(next_.marks, std::nullopt);
-    work.scene_number = next_.scene_number;
+    work = std::exchange(next_, {});
+    next_.scene_number = work.scene_number;
+    // What the window shows comes first.
+    if (work.request) next_.full = std::exchange(work.full, std::nullopt);
     if (!probes_waiting_.empty()) {
         work.probe = probes_waiting_.front();
         probes_waiting_.erase(probes_waiting_.begin());
     }
-    if (!waiting_.empty()) {
-        work.request = waiting_.front();
-        waiting_.erase(waiting_.begin());
-    } else {
-        work.full = std::exchange(next_.full, std::nullopt);  // what the window shows comes first
-    }
     if (!extras_waiting_.empty()) {
         work.extra = std::move(extras_waiting_.front());
-        extras_waiting_.erase(extras_waiting_.begin());
+        extras_waiting_.pop_front();
     }
     return true;
 }
@@ -382,7 +372,6 @@ void RenderThread::carry_out(Work& work) {
         report([&](News& news) {
             news.picture = finished;
             news.failure = nullptr;
-            if (!work.request->file.empty()) news.written.push_back(work.request->file);
         });
         work.request.reset();
     }
@@ -395,7 +384,7 @@ void RenderThread::carry_out(Work& work) {
 void RenderThread::fail(Work& work) {
     if (work.extra && (work.request || work.probe)) {
         const std::lock_guard lock(mutex_);  // its own turn comes next
-        extras_waiting_.insert(extras_waiting_.begin(), *std::exchange(work.extra, std::nullopt));
+        extras_waiting_.push_front(*std::exchange(work.extra, std::nullopt));
     }
     report([&](News& news) {
         news.failure = std::current_exception();

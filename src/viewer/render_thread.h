@@ -2,6 +2,7 @@
 // Renders frames on a thread of its own, so that a slow frame never blocks input.
 #pragma once
 #include <condition_variable>
+#include <deque>
 #include <filesystem>
 #include <functional>
 #include <glm/vec2.hpp>
@@ -37,7 +38,6 @@ struct RenderRequest {
     int divisor = 1;      // the frame has 1/divisor of that size
     bool coarse = false;  // of the draft, if there is one
     uint64_t serial = 0;
-    std::filesystem::path file;  // written as by `ewa render` with this extension; empty: no file
 };
 
 /// The use of a point under a pixel. edit: by a tool of the editor; color: also by one, which needs SurfacePoint::color.
@@ -72,7 +72,8 @@ struct FullRender {
 struct ExtraRequest {
     Camera camera;  // of the size of the render
     Look look = {};
-    std::filesystem::path file = {};  // as RenderRequest::file; empty: `take` gets the render
+    std::filesystem::path file =
+        {};  // written as by `ewa render` with this extension; empty: `take` gets the render
     /// Gets RGBA on the render thread, and may throw.
     std::function<void(const std::vector<uint8_t>&)> take = {};
     uint64_t number = 0;
@@ -98,7 +99,7 @@ class RenderThread {
     void set_draft(Draft draft);
     /// Sets the marks of the scene's splats (Renderer::mark), until the next set_scene(). A file has no tints. null: none.
     void set_marks(std::shared_ptr<const std::vector<uint8_t>> marks);
-    /// Replaces a waiting request that has no file. The frame that is being rendered is finished first.
+    /// Replaces a request that waits. The frame that is being rendered is finished first.
     void ask(const RenderRequest& request);
     /// Requests the surface point at a pixel, by its median depth. News::points has it with the returned number. Each request with
     /// another use than PointUse::look_at renders at full resolution, and is answered. One with PointUse::look_at replaces a waiting one.
@@ -121,7 +122,6 @@ class RenderThread {
         std::optional<DeviceInfo> device;              // once it is open
         std::vector<SurfacePoint> points;              // in order, since the last take_news()
         std::shared_ptr<const FullRender> full;        // the last one, or null
-        std::vector<std::filesystem::path> written;    // files, since the last take_news()
         std::vector<ExtraDone> extras;                 // in order, since the last take_news()
     };
     News take_news();
@@ -161,10 +161,9 @@ class RenderThread {
 
     mutable std::mutex mutex_;
     std::condition_variable_any wake_;
-    std::vector<RenderRequest> waiting_;        // in order; only the last may have no file
-    std::vector<Probe> probes_waiting_;         // in order
-    std::vector<ExtraRequest> extras_waiting_;  // in order
-    Work next_;                                 // but for `request`, `probe` and `extra`
+    std::vector<Probe> probes_waiting_;        // in order
+    std::deque<ExtraRequest> extras_waiting_;  // in order
+    Work next_;                                // but for `probe` and `extra`
     uint64_t probes_ = 0, fulls_ = 0, extras_ = 0;
     News news_;
     std::jthread thread_;

@@ -118,15 +118,8 @@ void Renders::set_marks(std::shared_ptr<const std::vector<uint8_t>> marks) {
     thread_.set_marks(std::move(marks));
 }
 
-void Renders::send(const RenderRequest& request) {
-    asked_ = request;
-    asked_scene_ = scene_;
-    asked_marks_ = marks_;
-    thread_.ask(asked_);
-}
-
 void Renders::ask(const Camera& camera, const Look& look, bool full) {
-    RenderRequest request{camera, look, 1, false, asked_.serial + 1, {}};
+    RenderRequest request{camera, look, 1, false, asked_.serial + 1};
     const auto now = Clock::now();
     const bool first = asked_.serial == 0;
     if (first || asked_scene_ != scene_ || asked_marks_ != marks_ || !same_view(request, asked_)) {
@@ -137,12 +130,10 @@ void Renders::ask(const Camera& camera, const Look& look, bool full) {
         // A full frame takes long: a moving camera should not wait for it, and a resting one needs it once.
         return;
     }
-    send(request);
-}
-
-uint64_t Renders::write(const Camera& camera, const Look& look, const std::filesystem::path& file) {
-    send({camera, look, 1, false, asked_.serial + 1, file});
-    return asked_.serial;
+    asked_ = request;
+    asked_scene_ = scene_;
+    asked_marks_ = marks_;
+    thread_.ask(asked_);
 }
 
 void Renders::ask_point(const Camera& camera, const glm::dvec2& pixel, PointUse use) {

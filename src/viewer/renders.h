@@ -88,8 +88,6 @@ class Renders {
     /// Asks for the view if it changed, or in full resolution once it has rested. full: always in full
     /// resolution.
     void ask(const Camera& camera, const Look& look, bool full);
-    /// Renders the view and writes it to a file. Returns the serial of the request.
-    uint64_t write(const Camera& camera, const Look& look, const std::filesystem::path& file);
     /// Asks for the point under a pixel, as RenderThread::ask_point(); News::points has the answer.
     void ask_point(const Camera& camera, const glm::dvec2& pixel, PointUse use);
     /// News has no answers to what was asked before.
@@ -113,7 +111,6 @@ class Renders {
 
   private:
     using Clock = std::chrono::steady_clock;
-    void send(const RenderRequest& request);
 
     uint64_t scene_ = 0, asked_scene_ = 0;
     bool has_draft_ = false, marked_ = false;

@@ -45,8 +45,14 @@ void Shown::take_renders() {
         if (state_.message.note != reason(news.failure)) state_.say(reason(news.failure));
     }
     for (const SurfacePoint& point : news.points) take_point(point);
-    for (const auto& file : news.written) state_.say("wrote " + std::filesystem::absolute(file).string());
-    extras.insert(extras.end(), news.extras.begin(), news.extras.end());
+    for (const ExtraDone& one : news.extras) {
+        const auto file = files_.extract(one.number);
+        if (!file)
+            extras.push_back(one);
+        else
+            state_.say(one.failure ? reason(one.failure)
+                                   : "wrote " + std::filesystem::absolute(file.mapped()).string());
+    }
     quality_.take(news.full);
 }
 
@@ -101,9 +107,12 @@ void Shown::ask() {
     if (const auto asked = requested_camera()) renders.ask(*asked, look_for(*asked), state_.scripted());
 }
 
+void Shown::write(const Camera& camera, const std::filesystem::path& file) {
+    files_[renders.ask_extra({.camera = camera, .look = look_for(camera), .file = file})] = file;
+}
+
 void Shown::write_exr() {
-    if (const auto asked = requested_camera())
-        renders.write(*asked, look_for(*asked), free_name("ewa-view", ".exr"));
+    if (const auto asked = requested_camera()) write(*asked, free_name("ewa-view", ".exr"));
 }
 
 Arrangement Shown::arrangement() const {

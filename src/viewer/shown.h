@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The picture on the screen, and how it compares with the image of its camera.
 #pragma once
+#include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "viewer/comparison.h"
@@ -31,7 +34,9 @@ class Shown {
     void ask_point(const glm::dvec2& pixel, PointUse use);
     /// Turns measuring on or off. Off: drops the points, and requests that still wait.
     void set_measuring(bool on);
-    /// Writes the render as an EXR file in floating point, without the panel and other drawings.
+    /// Writes a render to a file, without the panel and other drawings.
+    void write(const Camera& camera, const std::filesystem::path& file);
+    /// Writes the view as an EXR file in floating point.
     void write_exr();
 
     /// Loads the camera's image if the next frame of the window needs it. Call it before that frame.
@@ -61,7 +66,8 @@ class Shown {
     std::optional<double> psnr() const;  // dB
 
     Renders renders;
-    std::vector<ExtraDone> extras;  // that take_renders() has brought; who has asked for them takes them out
+    std::vector<ExtraDone>
+        extras;  // of others, that take_renders() has brought; who has asked for them takes them out
     Measurement measurement;
     std::function<void(const SurfacePoint&)> take_edit_point;  // gets the answers to PointUse::edit and color
 
@@ -78,6 +84,7 @@ class Shown {
     std::shared_ptr<const ByteImage> picture_;  // the presenter's: a render or a difference
     bool difference_ = false;
     bool measuring_ = false;
+    std::map<uint64_t, std::filesystem::path> files_;  // of write(), by the numbers of their renders
     ImageComparison images_;
     ViewQuality quality_;
 };

@@ -146,9 +146,7 @@ bool FilmStrip::start_picture() {
         file_.complain(core::one_line(error.what()));
         return false;
     }
-    const Camera camera = shown_.camera(picture_size_);
-    pictures_[shown_.renders.ask_extra({.camera = camera, .look = shown_.look_for(camera), .file = file})] =
-        file;
+    shown_.write(shown_.camera(picture_size_), file);
     return true;
 }
 
@@ -163,26 +161,13 @@ void FilmStrip::stop_film() {
 void FilmStrip::take() {
     file_.take(files_);
     const std::vector<ExtraDone> done = std::exchange(shown_.extras, {});
-    const auto say = [&](const std::exception_ptr& failure) {
-        try {
-            std::rethrow_exception(failure);
-        } catch (const std::exception& error) {
-            state_.say(error.what());
-        }
-    };
-    for (const ExtraDone& one : done) {
-        const auto picture = pictures_.find(one.number);
-        if (picture == pictures_.end()) continue;
-        one.failure ? say(one.failure) : state_.say("wrote " + picture->second.string());
-        pictures_.erase(picture);
-    }
     if (!writer_) return;
     try {
         if (!writer_->step(shown_.renders, done, steady_now())) return;
         state_.say("wrote " + writer_->output().file.string() + ": " + std::to_string(writer_->frames()) +
                    " frames");
-    } catch (...) {
-        say(std::current_exception());
+    } catch (const std::exception& error) {
+        state_.say(error.what());
     }
     writer_.reset();
 }

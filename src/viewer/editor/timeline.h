@@ -2,7 +2,6 @@
 // The strip of the film at the lower border of the picture: its keys on a timeline, its preview, and the dialogs that save films and
 // pictures.
 #pragma once
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -102,7 +101,6 @@ class FilmStrip {
     FilmOutput output_;
     Size picture_size_{1920, 1080};
     std::unique_ptr<FilmWriter> writer_;
-    std::map<uint64_t, std::filesystem::path> pictures_;  // on their way, by the numbers of their renders
 };
 
 }  // namespace ewa::viewer
