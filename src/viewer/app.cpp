@@ -403,20 +403,20 @@ void App::sync_editor() {
     if (!news.note.empty()) state_.say(news.note);
     editor_.settings.live = live();
     if (live()) send_edits();
-    if (editor_.scenes() == 0 || !news.marks) return;
-    if (editor_.splats() != drawn_) {
-        drawn_ = editor_.splats();
+    if (editor_.scenes() == 0 || !news.snapshot) return;
+    const EditSnapshot& now = editor_.snapshot();
+    if (now.drawn != drawn_) {
+        drawn_ = now.drawn;
         marked_ = false;
         drafted_ = nullptr;
         shown_.renders.set_scene(drawn_);
     }
-    const auto& marks = *editor_.marks();
-    const bool any = std::ranges::any_of(marks, [](uint8_t mark) { return mark != 0; });
+    const bool any = std::ranges::any_of(*now.marks, [](uint8_t mark) { return mark != 0; });
     // A level that the file has shows no edits.
     const bool level = scene.coarse && drawn_ == entered_ && !any && !marked_;
-    if (const Draft& draft = editor_.draft(); !level && draft.splats != drafted_)
-        shown_.renders.set_draft({drafted_ = draft.splats, draft.rows});
-    if (any || marked_) shown_.renders.set_marks(editor_.marks());
+    if (!level && now.draft.splats != drafted_)
+        shown_.renders.set_draft({drafted_ = now.draft.splats, now.draft.rows});
+    if (any || marked_) shown_.renders.set_marks(now.marks);
     marked_ = any;
 }
 

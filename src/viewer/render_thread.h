@@ -14,9 +14,15 @@
 #include <vector>
 
 #include "viewer/byte_image.h"
-#include "viewer/draft.h"
 
 namespace ewa::viewer {
+
+/// A scene with fewer splats, which is shown while the view changes.
+struct Draft {
+    std::shared_ptr<const Gaussians> splats;  // null: no draft
+    std::shared_ptr<const std::vector<uint32_t>>
+        rows;  // where they are in the scene; null: they are other splats, without marks
+};
 
 /// What a frame depends on besides splats and camera.
 struct Look {

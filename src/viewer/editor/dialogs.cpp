@@ -158,7 +158,7 @@ void Dialogs::draw_save() {
     if (editor_.scenes() == 0) return void(shown_ = nullptr);
     if (!begin_modal(texts::files::kSaveAsTitle)) return;
     if (const io::FormatRow* typed = io::row_of_name(path_.path()); typed && typed->writable()) row_ = typed;
-    const Gaussians* splats = all_ ? editor_.splats().get() : editor_.snapshot().splats.get();
+    const Gaussians* splats = (all_ ? editor_.snapshot().drawn : editor_.snapshot().splats).get();
     draw_formats(splats, !splats ? 0 : all_ ? splats->size() : editor_.snapshot().left);
     if (splats) draw_losses(*splats);
     if (editor_.scenes() > 1) {

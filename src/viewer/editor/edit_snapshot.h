@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "edit/history.h"
+#include "viewer/render_thread.h"
 
 namespace ewa::viewer {
 
@@ -35,7 +36,10 @@ struct EditSnapshot {
     std::vector<edit::Step> steps;
     size_t done = 0;
     uint64_t version = 0, values_version = 0, history_bytes = 0;
-    double milliseconds = 0;  // of the last edit
+    double milliseconds = 0;                            // of the last edit
+    std::shared_ptr<const Gaussians> drawn;             // the splats of all scenes that are shown, joined
+    std::shared_ptr<const std::vector<uint8_t>> marks;  // ewa::Mark bits of these
+    Draft draft;  // of these; without splats if there are no more than the budget
 };
 
 }  // namespace ewa::viewer

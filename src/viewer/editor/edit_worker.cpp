@@ -128,7 +128,6 @@ void EditWorker::publish() {
     if (scenes_.empty()) return;
     join();
     const auto present = snapshot();
-    const auto bits = marks();
     std::vector<SceneState> states;
     for (auto& [id, scene] : scenes_) {
         const bool unsaved = scene.unsaved();
@@ -139,9 +138,6 @@ void EditWorker::publish() {
     const std::lock_guard lock(mutex_);
     if (period_ != next_period_) return;
     done_.snapshot = present;
-    done_.splats = joined_;
-    done_.draft = draft_;
-    done_.marks = bits;
     done_.preview_count =
         previewed_.empty() ? std::nullopt : std::optional(size_t(std::ranges::count(previewed_, true)));
     std::ranges::move(std::exchange(moves_, {}), std::back_inserter(done_.moves));
@@ -178,6 +174,9 @@ void EditWorker::join() {
 
 std::shared_ptr<const EditSnapshot> EditWorker::snapshot() const {
     auto result = std::make_shared<EditSnapshot>();
+    result->drawn = joined_;
+    result->draft = draft_;
+    result->marks = marks();
     const auto found = scenes_.find(active_);
     if (found == scenes_.end()) return result;
     const edit::History& history = *found->second.history;

@@ -16,7 +16,6 @@
 
 #include "edit/journal.h"
 #include "edit/shapes.h"
-#include "viewer/draft.h"
 #include "viewer/editor/edit_snapshot.h"
 
 namespace ewa::viewer {
@@ -83,10 +82,7 @@ class EditWorker {
 
     /// What has been done since the last take().
     struct Done {
-        std::shared_ptr<const EditSnapshot> snapshot;  // null: as before; so the next two
-        std::shared_ptr<const Gaussians> splats;
-        Draft draft;
-        std::shared_ptr<const std::vector<uint8_t>> marks;
+        std::shared_ptr<const EditSnapshot> snapshot;  // null: as before
         std::optional<size_t> preview_count;
         std::vector<SceneState> scenes;
         std::vector<std::pair<uint64_t, bool>>

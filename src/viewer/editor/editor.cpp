@@ -9,7 +9,6 @@
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 #include "viewer/editor/edit_words.h"
-#include "viewer/editor/edit_worker.h"
 #include "viewer/editor/publish.h"
 #include "viewer/editor/texts.h"
 
@@ -90,11 +89,7 @@ EditWorker::Place place_of(const EditedScene& scene) {
 }  // namespace
 
 Editor::Editor(fs::path program, std::function<void()> wake, size_t budget)
-    : program_(std::move(program)),
-      wake_(std::move(wake)),
-      worker_(std::make_unique<EditWorker>(wake_, budget)) {}
-
-Editor::~Editor() = default;
+    : program_(std::move(program)), wake_(std::move(wake)), worker_(wake_, budget) {}
 
 void Editor::set_budget(size_t budget) {
     worker_->set_budget(budget);
@@ -108,13 +103,13 @@ void Editor::insert(std::unique_ptr<EditedScene> scene, std::shared_ptr<const Ga
                     edit::Cameras cameras) {
     scene->id = ++ids_;
     scene->head = edit::head_of(scene->file, splats->size());
-    worker_->add(scene->id, std::move(splats), std::move(cameras), place_of(*scene));
+    worker_.add(scene->id, std::move(splats), std::move(cameras), place_of(*scene));
     scenes_.push_back(std::move(scene));
     active_ = scenes_.size() - 1;
 }
 
 void Editor::clear() {
-    worker_->clear();
+    worker_.clear();
     scenes_.clear();
     closed_.clear();
     active_ = 0;
@@ -142,7 +137,7 @@ void Editor::add(const std::string& name, const fs::path& file, std::shared_ptr<
 void Editor::activate(size_t scene) {
     if (scene >= scenes_.size()) return;
     active_ = scene;
-    worker_->activate(scenes_[scene]->id);
+    worker_.activate(scenes_[scene]->id);
     if (!scenes_[scene]->shown) show(scene, true);
 }
 
@@ -155,12 +150,12 @@ void Editor::show(size_t scene, bool shown) {
         activate(size_t(other - scenes_.begin()));
     }
     scenes_[scene]->shown = shown;
-    worker_->show(scenes_[scene]->id, shown);
+    worker_.show(scenes_[scene]->id, shown);
 }
 
 void Editor::close(size_t scene) {
     if (scene >= scenes_.size() || scenes_.size() == 1) return;
-    worker_->remove(scenes_[scene]->id, true);
+    worker_.remove(scenes_[scene]->id, true);
     scenes_.erase(scenes_.begin() + std::ptrdiff_t(scene));
     activate(active_ > scene || active_ == scenes_.size() ? active_ - 1 : active_);
 }
@@ -196,7 +191,7 @@ void Editor::separate() {
         for (const auto& scene : *list)
             if (scene->file == from.file) part = std::max(part, scene->part);
     const EditedScene& added = add_part(part + 1);
-    worker_->separate(added.id, from.id, place_of(added));
+    worker_.separate(added.id, from.id, place_of(added));
 }
 
 void Editor::perform(edit::Step step) {
@@ -210,7 +205,7 @@ void Editor::perform(edit::Step step) {
         return;
     }
     if (step.title.empty()) step.title = selection_title(step.edits.front().value);
-    worker_->perform(now().id, std::move(step));
+    worker_.perform(now().id, std::move(step));
 }
 
 void Editor::select(const std::string& shape, edit::Operation operation) {
@@ -226,42 +221,24 @@ void Editor::undo() {
     if (settings.live && snapshot_->done <= settings.sent)
         note_ = snapshot_->done > 0 ? texts::kLiveUndo : "";
     else if (!scenes_.empty())
-        worker_->undo(now().id);
+        worker_.undo(now().id);
 }
 
 void Editor::redo() {
-    if (!scenes_.empty()) worker_->redo(now().id);
+    if (!scenes_.empty()) worker_.redo(now().id);
 }
 
 void Editor::preview(const std::vector<std::string>& selections) {
-    if (selections.empty()) worker_->cancel();
-    worker_->preview(selections);
-}
-
-const std::shared_ptr<Comparing>& Editor::comparing() const {
-    return worker_->comparing();
-}
-
-void Editor::drag(const std::optional<glm::dmat4>& transform) {
-    worker_->drag(transform);
-}
-
-bool Editor::busy() const {
-    return worker_->busy();
+    if (selections.empty()) worker_.cancel();
+    worker_.preview(selections);
 }
 
 Editor::News Editor::take() {
-    EditWorker::Done done = worker_->take();
-    News news{.any = done.any, .marks = false, .note = std::exchange(note_, {})};
+    EditWorker::Done done = worker_.take();
+    News news{.any = done.any, .snapshot = done.snapshot != nullptr, .note = std::exchange(note_, {})};
     if (!done.note.empty()) news.note = done.note;
     preview_count_ = done.preview_count;
-    if (done.snapshot) {
-        snapshot_ = done.snapshot;
-        news.marks = true;
-        drawn_ = done.splats;
-        draft_ = done.draft;
-        marks_ = done.marks;
-    }
+    if (done.snapshot) snapshot_ = done.snapshot;
     for (const auto& [id, opens] : done.moves) move(id, opens);
     for (const EditWorker::SceneState& state : done.scenes)
         for (const auto& scene : scenes_)
@@ -273,7 +250,7 @@ Editor::News Editor::take() {
         const Saved saved = saving_.take();
         news.any = true;
         news.note = saved.note;
-        for (const auto& [id, steps] : saved.scenes) worker_->saved(id, steps);
+        for (const auto& [id, steps] : saved.scenes) worker_.saved(id, steps);
     }
     return news;
 }
@@ -283,7 +260,7 @@ void Editor::save(const fs::path& file, bool all) {
     std::vector<Part> parts;
     for (size_t i = 0; i < scenes_.size(); ++i)
         if (all ? scenes_[i]->shown : i == active_)
-            parts.push_back({*scenes_[i], worker_->state_of(scenes_[i]->id)});
+            parts.push_back({*scenes_[i], worker_.state_of(scenes_[i]->id)});
     saving_.start(wake_, [this, file, parts = std::move(parts)]() mutable {
         try {
             Saved saved{save_parts(program_, parts, file), {}};
@@ -297,10 +274,6 @@ void Editor::save(const fs::path& file, bool all) {
 
 bool Editor::unsaved() const {
     return std::ranges::any_of(scenes_, [](const auto& scene) { return scene->unsaved; });
-}
-
-void Editor::discard() {
-    worker_->discard();
 }
 
 std::vector<Editor::Left> Editor::left_journals() {
@@ -338,7 +311,7 @@ void Editor::restore(std::vector<Left> left) {
     if (scenes_.empty()) return;
     for (Left& each : left) {
         const EditedScene& scene = each.part == 1 ? now() : add_part(each.part);
-        worker_->restore(scene.id, now().id, place_of(scene), std::move(each.journal));
+        worker_.restore(scene.id, now().id, place_of(scene), std::move(each.journal));
     }
 }
 

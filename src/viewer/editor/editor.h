@@ -12,9 +12,8 @@
 #include "edit/history.h"
 #include "edit/journal.h"
 #include "edit/shapes.h"
-#include "viewer/draft.h"
 #include "viewer/editor/edit_settings.h"
-#include "viewer/editor/edit_snapshot.h"
+#include "viewer/editor/edit_worker.h"
 #include "viewer/latest.h"
 
 namespace ewa::viewer {
@@ -35,14 +34,11 @@ struct EditedScene {
     bool as_opened() const;
 };
 
-class EditWorker;
-
 class Editor {
   public:
     /// program: the file of `ewa`, which writes what is saved. wake: called on a thread of the editor when take() has something new.
     /// budget: most splats of a draft, which is drawn while the view changes.
     Editor(std::filesystem::path program, std::function<void()> wake, size_t budget);
-    ~Editor();
     void set_budget(size_t budget);
 
     // Scenes.
@@ -75,36 +71,30 @@ class Editor {
     /// comparisons with photos.
     void preview(const std::vector<std::string>& selections);
     /// The comparison with photos in progress.
-    const std::shared_ptr<Comparing>& comparing() const;
+    const std::shared_ptr<Comparing>& comparing() const { return worker_.comparing(); }
     std::optional<size_t> preview_count() const { return preview_count_; }
 
     /// While a gizmo is dragged: the transform of the selection that is drawn. Empty: none. The edit itself is perform().
-    void drag(const std::optional<glm::dmat4>& transform);
+    void drag(const std::optional<glm::dmat4>& transform) { worker_.drag(transform); }
 
-    bool busy() const;  // edits are being done, or take() has not taken them yet
+    bool busy() const { return worker_.busy(); }  // edits are being done, or take() has not taken them yet
     /// Takes what has been done. Call it once per turn of the window's loop, before anything reads snapshot().
     struct News {
-        bool any = false, marks = false;  // marks: splats() and marks() may be others
-        std::string note;                 // a message for the user; empty: none
+        bool any = false, snapshot = false;  // snapshot: it may be another one
+        std::string note;                    // a message for the user; empty: none
     };
     News take();
     void say(std::string note) { note_ = std::move(note); }  // News::note of the next take()
     /// The state of the active scene.
     const EditSnapshot& snapshot() const { return *snapshot_; }
-    /// The splats of all scenes that are shown, joined: what the render thread gets.
-    std::shared_ptr<const Gaussians> splats() const { return drawn_; }
-    /// The draft of splats(); without splats if there are no more than the budget.
-    const Draft& draft() const { return draft_; }
-    /// ewa::Mark bits of splats(); null: none.
-    std::shared_ptr<const std::vector<uint8_t>> marks() const { return marks_; }
 
     // Files.
     /// `ewa convert` replays the edits on the file and writes the result, on a thread of its own. If the file has changed since it
     /// was opened, the splats that were opened take its place. all: joins all scenes that are shown.
     void save(const std::filesystem::path& file, bool all);
     bool saving() const { return saving_.running(); }
-    bool unsaved() const;  // any scene has edits that were not saved
-    void discard();        // removes the journals of unsaved edits
+    bool unsaved() const;                  // any scene has edits that were not saved
+    void discard() { worker_.discard(); }  // removes the journals of unsaved edits
     /// The journals that an earlier session has left of the active scene's file and its parts. Empty if all of its edits were
     /// saved. An error is News::note. Call it while the editor is not busy.
     struct Left {
@@ -135,14 +125,11 @@ class Editor {
     std::vector<std::unique_ptr<EditedScene>> closed_;  // by undo
     size_t active_ = 0;
     std::shared_ptr<const EditSnapshot> snapshot_ = std::make_shared<EditSnapshot>();
-    std::shared_ptr<const Gaussians> drawn_;
-    Draft draft_;
-    std::shared_ptr<const std::vector<uint8_t>> marks_;
     std::optional<size_t> preview_count_;
     std::function<void()> wake_;
     std::string note_;
     uint64_t ids_ = 0;  // that were given to scenes
-    std::unique_ptr<EditWorker> worker_;
+    EditWorker worker_;
     Task<Saved> saving_;  // its thread ends before the rest
 };
 

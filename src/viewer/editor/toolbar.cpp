@@ -227,8 +227,9 @@ std::string status_text(const Editor& editor) {
     if (now.version != last.snapshot.version || editor.active() != last.scene) {
         last.text = editor.active() == last.scene ? edit_news(last.snapshot, now) : "";
         last.snapshot = now;
-        last.snapshot.splats.reset();
-        last.snapshot.states.reset();
+        last.snapshot.splats = last.snapshot.drawn = nullptr;
+        last.snapshot.states = last.snapshot.marks = nullptr;
+        last.snapshot.draft = {};
         last.snapshot.cameras = {};
         last.scene = editor.active();
         last.until = ImGui::GetTime() + kEditShown;
