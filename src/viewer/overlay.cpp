@@ -80,17 +80,6 @@ void draw_message(const char* name, const std::string& text, const Rectangle& ar
     ImGui::End();
 }
 
-/// Begins a window with buttons, centred at a height from 0 (top) to 1.
-bool begin_box(const char* name, const Rectangle& area, float at) {
-    const ImVec2 low = gui_point(area.x, area.y), high = gui_point(area.x + area.width, area.y + area.height);
-    ImGui::SetNextWindowPos(ImVec2((low.x + high.x) / 2, low.y + (high.y - low.y) * at), ImGuiCond_Always,
-                            ImVec2(0.5f, 0.5f));
-    return ImGui::Begin(name, nullptr,
-                        ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
-                            ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
-                            ImGuiWindowFlags_NoFocusOnAppearing);
-}
-
 /// A line in the middle of the area, wrapped, whose upper border is at y. Returns the lower border.
 float centered_text(ImDrawList& list, ImFont* font, float size, ImU32 color, const std::string& text,
                     const ImVec2& low, const ImVec2& high, float y) {
@@ -106,6 +95,16 @@ ImVec2 gui_point(double x, double y) {
     const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
     return {float(std::clamp(x, -kFar, kFar)) / std::max(scale.x, 1e-3f),
             float(std::clamp(y, -kFar, kFar)) / std::max(scale.y, 1e-3f)};
+}
+
+bool begin_card(const char* name, const Rectangle& area, float at) {
+    const ImVec2 low = gui_point(area.x, area.y), high = gui_point(area.x + area.width, area.y + area.height);
+    ImGui::SetNextWindowPos(ImVec2((low.x + high.x) / 2, low.y + (high.y - low.y) * at), ImGuiCond_Always,
+                            ImVec2(0.5f, 0.5f));
+    return ImGui::Begin(name, nullptr,
+                        ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
+                            ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
+                            ImGuiWindowFlags_NoFocusOnAppearing);
 }
 
 std::optional<int> draw_cameras(const CamerasShown& cameras) {
@@ -223,7 +222,7 @@ void draw_headline(const Headline& headline, const Rectangle& area) {
 
 bool draw_search(const CaptureProgress& progress, const Rectangle& area) {
     bool stop = false;
-    if (begin_box("search", area, 0.5f)) {
+    if (begin_card("search", area, 0.5f)) {
         ImGui::TextUnformatted("finding the cameras of the photos");
         std::string text = "looking at them ...";
         if (progress.total > 0)

@@ -19,6 +19,9 @@ namespace ewa::viewer {
 /// Converts px of the framebuffer to ImGui's coordinates.
 ImVec2 gui_point(double x, double y);
 
+/// Begins a window with buttons, centred at a height of the area (px of the window) from 0 (top) to 1. ImGui::End() follows.
+bool begin_card(const char* name, const Rectangle& area, float at);
+
 /// The list of keys. A click outside closes it.
 void draw_help(bool& open);
 

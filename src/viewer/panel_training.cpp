@@ -96,9 +96,6 @@ void show_curves(const live::Status& status) {
     plot("held-out PSNR", psnr, "held-out PSNR %.2f dB");
 }
 
-/// What the window offers, in the order of train::kQualities.
-constexpr std::array kQualityNames{"Quick look", "Good", "Best"};
-
 void choose_training(const PanelParts& parts) {
     int& chosen = parts.state.settings.train_steps;
     std::vector<std::string> texts;

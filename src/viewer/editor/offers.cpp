@@ -3,19 +3,16 @@
 
 #include <imgui.h>
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "core/typing.h"
 #include "run/forecast.h"
 #include "run/option_table.h"
+#include "viewer/overlay.h"
 
 namespace ewa::viewer {
 namespace {
 
-/// In the order of train::kQualities.
-constexpr std::array kOfferNames{"Quick look", "Good", "Best"};
 constexpr const char *kTrainNow = "Train splats:", *kNotNow = "Not now";
 constexpr float kOfferPlace = 0.62f;  // share of the area's height, below the middle of the picture
 constexpr float kOfferWidth = 14;     // of the buttons, heights of the text
@@ -45,25 +42,17 @@ std::string usual_time_text(const OpenedScene& scene, std::optional<bool> on_cpu
 
 std::optional<int> draw_training_offer(const OpenedScene& scene, std::optional<bool> on_cpu,
                                        const Rectangle& area) {
-    const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
-    ImGui::SetNextWindowPos(
-        ImVec2((float(area.x) + float(area.width) / 2) / std::max(scale.x, 1e-3f),
-               (float(area.y) + float(area.height) * kOfferPlace) / std::max(scale.y, 1e-3f)),
-        ImGuiCond_Always, ImVec2(0.5f, 0.5f));
     std::optional<int> chosen;
-    if (ImGui::Begin("training offer", nullptr,
-                     ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
-                         ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
-                         ImGuiWindowFlags_NoFocusOnAppearing)) {
+    if (begin_card("training offer", area, kOfferPlace)) {
         const std::string found =
             "Cameras of " + core::counted(scene.dataset->frames.size(), "photo") + " found. ";
         ImGui::TextUnformatted((found + kTrainNow).c_str());
         const ImVec2 size(kOfferWidth * ImGui::GetTextLineHeight(), 0);
-        for (size_t i = 0; i < kOfferNames.size(); ++i) {
+        for (size_t i = 0; i < kQualityNames.size(); ++i) {
             const int steps = train::kQualities[i].second;
             const std::string time = usual_time_text(scene, on_cpu, steps);
-            const std::string text = kOfferNames[i] + (time.empty() ? "" : " (" + time + ")");
-            if (ImGui::Button((text + "###" + kOfferNames[i]).c_str(), size)) chosen = steps;
+            const std::string text = kQualityNames[i] + (time.empty() ? "" : " (" + time + ")");
+            if (ImGui::Button((text + "###" + kQualityNames[i]).c_str(), size)) chosen = steps;
         }
         if (ImGui::Button(kNotNow, size)) chosen = 0;
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the window offers over the picture: a training, once the cameras of photos or of a video are found.
 #pragma once
+#include <array>
 #include <optional>
 #include <string>
 
@@ -8,6 +9,9 @@
 #include "viewer/opening.h"
 
 namespace ewa::viewer {
+
+/// What the window offers, in the order of train::kQualities.
+inline constexpr std::array kQualityNames{"Quick look", "Good", "Best"};
 
 /// The time that a training of the scene's dataset usually takes: "about 5 min". Empty where it is not known. on_cpu: whether the
 /// device is a CPU; empty: not known.
