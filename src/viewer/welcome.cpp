@@ -65,16 +65,24 @@ void draw_open_buttons(Welcome& welcome) {
     if (ImGui::Button(texts::kOpenAFolder)) welcome.wanted = Wanted::folder;
 }
 
+/// "Ctrl + A" for "Ctrl+A".
+std::string spaced_keys(std::string_view keys) {
+    std::string text;
+    for (const char c : keys)
+        text += c == '+' && !text.empty() && text.back() != ' ' ? " + " : std::string(1, c);
+    return text;
+}
+
 void draw_help_group(const char* name, std::span<const texts::HelpRow> rows, float keys) {
     ImGui::TextDisabled("%s", name);
     if (!ImGui::BeginTable(name, 2, ImGuiTableFlags_SizingFixedFit)) return;
     ImGui::TableSetupColumn("keys", ImGuiTableColumnFlags_WidthFixed, keys);
     ImGui::TableSetupColumn("text", ImGuiTableColumnFlags_WidthStretch);
     for (const texts::HelpRow& row : rows) {
-        for (const char* text : {row.keys, row.text}) {
+        for (const std::string& text : {spaced_keys(row.keys), std::string(row.text)}) {
             ImGui::TableNextColumn();
             ImGui::PushTextWrapPos(0);
-            ImGui::TextUnformatted(text);
+            ImGui::TextUnformatted(text.c_str());
             ImGui::PopTextWrapPos();
         }
     }
@@ -113,7 +121,8 @@ void draw_help_groups(int columns) {
     const std::vector<HelpGroup> groups = help_groups();
     float keys = 0;
     for (const HelpGroup& group : groups)
-        for (const texts::HelpRow& row : group.rows) keys = std::max(keys, ImGui::CalcTextSize(row.keys).x);
+        for (const texts::HelpRow& row : group.rows)
+            keys = std::max(keys, ImGui::CalcTextSize(spaced_keys(row.keys).c_str()).x);
     keys = std::min(keys + 1, 0.4f * ImGui::GetContentRegionAvail().x / float(columns));  // longer ones wrap
     if (!ImGui::BeginTable("columns", columns, ImGuiTableFlags_SizingStretchSame)) return;
     for (const bool second : {false, true}) {

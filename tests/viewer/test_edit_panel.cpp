@@ -41,7 +41,7 @@ uint32_t total(const std::vector<uint32_t>& counts) {
 TEST(HelpTexts, NameEachKeyOnce) {
     std::set<std::string> keys;
     const auto add = [&](std::span<const texts::HelpRow> rows) {
-        for (const texts::HelpRow& row : rows) EXPECT_TRUE(keys.insert(row.keys).second) << row.keys;
+        for (const texts::HelpRow& row : rows) EXPECT_TRUE(keys.emplace(row.keys).second) << row.keys;
     };
     add(texts::kViewHelp);
     keys.clear();  // the tools take some of them in the other tab
@@ -53,8 +53,7 @@ TEST(HelpTexts, NameEachKeyOnce) {
         add(rows);
     for (const texts::ToolText& tool : texts::kTools)
         if (tool.tool != Tool::view && *tool.key) add(std::array{texts::HelpRow{tool.key, tool.name}});
-    for (const char* key :
-         {"Del", "Ctrl + Z", "Ctrl + A", "Ctrl + D", "Ctrl + I", "H", "[ ]", "K", "Space", "Tab"})
+    for (const char* key : {"Del", "Ctrl+Z", "Ctrl+A", "Ctrl+D", "Ctrl+I", "H", "[ ]", "K", "Space", "Tab"})
         EXPECT_TRUE(keys.contains(key)) << key;
 }
 
@@ -234,7 +233,7 @@ TEST(HasKey, TakesEachAlternativeWithItsModifiers) {
 }
 
 TEST(HasKey, NoTwoEditsOrToolsShareAKey) {
-    std::vector<std::string> all{texts::kUndo.key, texts::kRedo.key};
+    std::vector<std::string> all{texts::kUndo.keys, texts::kRedo.keys};
     for (const auto& edit : texts::edit_panel::kKeyedEdits) all.emplace_back(edit.keys);
     for (const texts::ToolText& tool : texts::kTools)
         if (*tool.key) all.emplace_back(tool.key);

@@ -72,7 +72,7 @@ std::string selection_title(std::string_view shape) {
         verb = say::kOperations[i + 1].name;
     }
     const std::string_view name = shape.substr(0, shape.find('='));
-    for (const say::Item& item : {say::kInvert, say::kGrow, say::kShrink})
+    for (const texts::Item& item : {say::kInvert, say::kGrow, say::kShrink})
         if (name == item.value) return item.name;
     if (name == shape) return fmt::format("{} {}", verb, name);
     const bool rectangle = name == "polygon" && is_rectangle(shape.substr(name.size() + 1));

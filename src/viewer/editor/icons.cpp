@@ -174,7 +174,7 @@ void draw_icon(Icon icon, const ImVec2& center, float size, unsigned color) {
     Pen(*ImGui::GetWindowDrawList(), center, size, color).draw(kShapes[size_t(icon)]);
 }
 
-bool icon_button(Icon icon, const char* tooltip, bool active, bool enabled, float side) {
+bool icon_button(Icon icon, const char* tooltip, bool active, bool enabled, float side, const char* keys) {
     ImGui::PushID(int(icon));
     ImGui::BeginDisabled(!enabled);
     const bool clicked = ImGui::InvisibleButton("button", ImVec2(side, side));
@@ -189,7 +189,7 @@ bool icon_button(Icon icon, const char* tooltip, bool active, bool enabled, floa
               active ? ImGui::GetColorU32(accent()) : ImGui::GetColorU32(ImGuiCol_Text));
     ImGui::EndDisabled();
     ImGui::PopID();
-    ui::show_hint(tooltip);
+    ui::show_hint(tooltip, keys);
     return clicked && enabled;
 }
 

@@ -30,8 +30,9 @@ void draw_icon(Icon icon, const ImVec2& center, float size, unsigned color);
 
 /// A flat square button in the present line. Returns whether it is clicked. The icon is its ID: two buttons with one icon need
 /// another ImGui::PushID.
-/// tooltip: the first line is the brighter one, as in "Undo (Ctrl+Z)\nTakes the last edit back".
+/// tooltip, keys: as of ui::show_hint().
 /// active: the button stays lit. side: of the square.
-bool icon_button(Icon icon, const char* tooltip, bool active, bool enabled, float side);
+bool icon_button(Icon icon, const char* tooltip, bool active, bool enabled, float side,
+                 const char* keys = "");
 
 }  // namespace ewa::viewer

@@ -13,9 +13,9 @@ namespace say = texts::edit_panel;
 
 namespace ui {
 
-using Text = say::Item;
+using Text = texts::Item;
 
-/// Shows the hint, with the keys, while the pointer is over the last item.
+/// Shows the hint while the pointer is over the last item. The keys follow its first line, which is the brighter one.
 void show_hint(const char* hint, const char* keys = "");
 /// A section's header. Returns whether it is open. open_now: opens it.
 bool section(const Text& text, bool open_at_first, bool open_now = false);

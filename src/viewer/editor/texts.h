@@ -1,25 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 // The English texts of the editor, in one place. A translation replaces this file.
 #pragma once
+#include <string_view>
+
 #include "viewer/editor/edit_settings.h"
 
 namespace ewa::viewer::texts {
 
-// The bars. Each button: its name, its key, and a line about it.
-struct ButtonText {
-    const char *name, *key, *hint;
+/// A control: its name, its tooltip, and its keys, as in "Ctrl+D or Ctrl+Shift+A". An edit without a shape also has its words.
+struct Item {
+    const char* name;
+    const char *hint = "", *keys = "", *edit = "", *value = "";
+    bool of_selection = false;  // it does nothing without one
 };
-inline constexpr ButtonText kOpenFile{"Open", "Ctrl+O",
-                                      "Splats, photos, a video, a dataset or a run; with Shift a folder"};
-inline constexpr ButtonText kSave{"Save", "Ctrl+S", "Shift or a right click: to another file"};
-inline constexpr ButtonText kUndo{"Undo", "Ctrl+Z", "Takes the last edit back"};
-inline constexpr ButtonText kRedo{"Redo", "Ctrl+Shift+Z or Ctrl+Y", "Does again what was undone"};
-inline constexpr ButtonText kClean{"Clean", "", "Finds floaters, far, faint and huge splats"};
-inline constexpr ButtonText kFilm{"Film", "", "A flight through the scene as a video"};
-inline constexpr ButtonText kPublish{"Publish", "", "A web page, a small file, or streamed levels"};
-inline constexpr ButtonText kPicture{"Picture", "F12", "Writes what you see as a PNG; with Shift as an EXR"};
-inline constexpr ButtonText kPanel{"Panel", "F2", "Shows or hides the panel"};
-inline constexpr ButtonText kHelp{"Help", "F1", "All keys"};
+
+// The bars.
+inline constexpr Item kOpenFile{"Open", "Splats, photos, a video, a dataset or a run; with Shift a folder",
+                                "Ctrl+O"},
+    kSave{"Save", "Shift or a right click: to another file", "Ctrl+S"},
+    kUndo{"Undo", "Takes the last edit back", "Ctrl+Z"},
+    kRedo{"Redo", "Does again what was undone", "Ctrl+Shift+Z or Ctrl+Y"},
+    kClean{"Clean", "Finds floaters, far, faint and huge splats"},
+    kFilm{"Film", "A flight through the scene as a video"},
+    kPublish{"Publish", "A web page, a small file, or streamed levels"},
+    kPicture{"Picture", "Writes what you see as a PNG; with Shift as an EXR", "F12"},
+    kPanel{"Panel", "Shows or hides the panel", "F2"}, kHelp{"Help", "All keys", "F1"};
 inline constexpr const char *kSaveAs = "Save as ...", *kMore = "More", *kSaving = "saving ...";
 inline constexpr const char *kUndone = "Undone: ", *kRedone = "Redone: ",
                             *kNothingSelected = "Nothing is selected.";
@@ -41,70 +46,6 @@ inline constexpr const char* kDropTitle = "Drop photos, a video or splats";
 inline constexpr const char* kDropExplanation = "or a dataset, or a training run";
 inline constexpr const char *kOpenAFile = "Open a file", *kOpenAFolder = "Open a folder", *kRecent = "Recent",
                             *kKeysLine = "F1: keys";
-
-// Help (F1). The tools of kTools come first in their groups.
-struct HelpRow {
-    const char *keys, *text;
-};
-inline constexpr HelpRow kLookHelp[] = {
-    {"left drag", "orbit the scene"},
-    {"Ctrl + left drag", "look around"},
-    {"right or middle drag", "move sideways"},
-    {"wheel", "move closer or farther"},
-    {"double click", "look at this point and orbit it"},
-    {"W S  A D  Q E", "fly: forward, back; left, right; down, up"},
-    {"Shift", "fly four times as fast"},
-    {"F", "show the whole scene; in the tab Edit the selection"},
-    {"T", "turntable"},
-    {"U", "change the up axis"},
-    {"- +", "make splats smaller, larger"},
-    {"C", "show cameras; a click goes to one"},
-    {"left right", "go to the previous, next camera"},
-    {"V", "compare with the image: side by side, wipe, difference"},
-    {"Ctrl + 1 to 9", "save this view under a number"},
-    {"Shift + 1 to 9", "go to the saved view"},
-};
-inline constexpr HelpRow kViewHelp[] = {
-    {"R", "return to the first view"},
-    {"P", "parallel rays"},
-    {"G", "go to the nearest camera"},
-    {"M", "measure: click two points"},
-    {"1 to 7", "colour, depth, opacity, splats per pixel, ellipsoids, median depth, normals"},
-};
-inline constexpr HelpRow kSelectHelp[] = {
-    {"[ ]", "make the brush smaller, larger"},
-    {"Enter", "select with the sphere or box; end the polygon"},
-    {"Ctrl + A", "select all"},
-    {"Ctrl + D", "select none"},
-    {"Ctrl + I", "invert the selection"},
-    {"Ctrl + +, Ctrl + -", "grow, shrink the selection"},
-    {"H", "lock the selection; with Shift: unlock all"},
-    {"Ctrl + H", "hide the selection; with Shift: show all"},
-    {"Esc", "end what is being drawn, then the tool"},
-};
-inline constexpr HelpRow kChangeHelp[] = {
-    {"Del", "delete the selection"},
-    {"Ctrl + Z", "undo; Ctrl + Shift + Z: redo"},
-};
-inline constexpr HelpRow kFilmHelp[] = {
-    {"K", "make this view a key of the film"},
-    {"Space", "play or stop the film"},
-    {"Ctrl + K", "save the film"},
-};
-inline constexpr HelpRow kFilesHelp[] = {
-    {"drop a file", "open it; a dataset gives its cameras to splats"},
-    {"Ctrl + O", "open a file; with Shift: a folder"},
-    {"Ctrl + S", "save; with Shift: to another file"},
-    {"F12", "screenshot (PNG); with Shift: EXR"},
-    {"Tab", "go to the other tab of the panel"},
-    {"F1", "show or hide these keys"},
-    {"F2", "show or hide the panel"},
-    {"Ctrl + Q", "quit"},
-};
-inline constexpr const char *kLookGroup = "Look", *kViewGroup = "Look, in the tab View",
-                            *kSelectGroup = "Select, in the tab Edit",
-                            *kChangeGroup = "Change, in the tab Edit", *kFilmGroup = "Film",
-                            *kFilesGroup = "File";
 
 // The tools.
 struct ToolText {
@@ -135,12 +76,6 @@ inline constexpr ToolText kTools[] = {
 // The panel.
 namespace edit_panel {
 
-/// A control: its name, and its tooltip. An edit without a shape also has its keys, as in "Ctrl+D or Ctrl+Shift+A", and its words.
-struct Item {
-    const char* name;
-    const char *hint = "", *keys = "", *edit = "", *value = "";
-    bool of_selection = false;  // it does nothing without one
-};
 inline constexpr Item kSelection{"Selection", "Which splats the edits below change"},
     kMove{"Move", "Numbers for the selection, or for everything if nothing is selected"},
     kColours{"Colours", "Of the selection, or of everything if nothing is selected"},
@@ -240,6 +175,77 @@ inline constexpr Item kCopyCommand{"Copy as command",
                                    "The line of ewa convert that does the same to the file"};
 
 }  // namespace edit_panel
+
+// Help (F1). The tools of kTools come first in their groups.
+struct HelpRow {
+    std::string_view keys;
+    const char* text;
+};
+/// The first of the keys.
+constexpr std::string_view key_of(const Item& item) {
+    const std::string_view keys = item.keys;
+    return keys.substr(0, keys.find(" or "));
+}
+inline constexpr HelpRow kLookHelp[] = {
+    {"left drag", "orbit the scene"},
+    {"Ctrl + left drag", "look around"},
+    {"right or middle drag", "move sideways"},
+    {"wheel", "move closer or farther"},
+    {"double click", "look at this point and orbit it"},
+    {"W S  A D  Q E", "fly: forward, back; left, right; down, up"},
+    {"Shift", "fly four times as fast"},
+    {"F", "show the whole scene; in the tab Edit the selection"},
+    {"T", "turntable"},
+    {"U", "change the up axis"},
+    {"- +", "make splats smaller, larger"},
+    {"C", "show cameras; a click goes to one"},
+    {"left right", "go to the previous, next camera"},
+    {"V", "compare with the image: side by side, wipe, difference"},
+    {"Ctrl + 1 to 9", "save this view under a number"},
+    {"Shift + 1 to 9", "go to the saved view"},
+};
+inline constexpr HelpRow kViewHelp[] = {
+    {"R", "return to the first view"},
+    {"P", "parallel rays"},
+    {"G", "go to the nearest camera"},
+    {"M", "measure: click two points"},
+    {"1 to 7", "colour, depth, opacity, splats per pixel, ellipsoids, median depth, normals"},
+};
+inline constexpr HelpRow kSelectHelp[] = {
+    {"[ ]", "make the brush smaller, larger"},
+    {"Enter", "select with the sphere or box; end the polygon"},
+    {key_of(edit_panel::kAll), "select all"},
+    {key_of(edit_panel::kNone), "select none"},
+    {key_of(edit_panel::kInvert), "invert the selection"},
+    {"Ctrl + +, Ctrl + -", "grow, shrink the selection"},
+    {key_of(edit_panel::kLock), "lock the selection; with Shift: unlock all"},
+    {key_of(edit_panel::kHide), "hide the selection; with Shift: show all"},
+    {"Esc", "end what is being drawn, then the tool"},
+};
+inline constexpr HelpRow kChangeHelp[] = {
+    {key_of(edit_panel::kDelete), "delete the selection"},
+    {key_of(kUndo), "undo; Ctrl + Shift + Z: redo"},
+};
+inline constexpr HelpRow kFilmHelp[] = {
+    {"K", "make this view a key of the film"},
+    {"Space", "play or stop the film"},
+    {"Ctrl + K", "save the film"},
+};
+inline constexpr HelpRow kFilesHelp[] = {
+    {"drop a file", "open it; a dataset gives its cameras to splats"},
+    {key_of(kOpenFile), "open a file; with Shift: a folder"},
+    {key_of(kSave), "save; with Shift: to another file"},
+    {key_of(kPicture), "screenshot (PNG); with Shift: EXR"},
+    {"Tab", "go to the other tab of the panel"},
+    {key_of(kHelp), "show or hide these keys"},
+    {key_of(kPanel), "show or hide the panel"},
+    {"Ctrl + Q", "quit"},
+};
+inline constexpr const char *kLookGroup = "Look", *kViewGroup = "Look, in the tab View",
+                            *kSelectGroup = "Select, in the tab Edit",
+                            *kChangeGroup = "Change, in the tab Edit", *kFilmGroup = "Film",
+                            *kFilesGroup = "File";
+
 // What the tools say over the picture.
 inline constexpr const char *kNeedsPinhole =
                                 "This tool needs a view without distortion. The view has changed to one.",
@@ -318,10 +324,7 @@ inline constexpr const char *kOpenTitle = "Open a file or folder", *kNoSuchFile 
 // The strip of the film, and its dialogs.
 namespace film {
 
-struct Action {
-    const char *name, *hint;
-};
-inline constexpr Action kPlay{"Play", "Space: shows the film in real time"}, kStop{"Stop", "Space: stops"},
+inline constexpr Item kPlay{"Play", "Space: shows the film in real time"}, kStop{"Stop", "Space: stops"},
     kAdd{"Add key", "K: this view becomes a key, at the playhead or after the last key"},
     kReplace{"Replace key", "The key under the playhead gets this view"},
     kDelete{"Delete key", "Deletes the key under the playhead"},

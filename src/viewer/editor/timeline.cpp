@@ -29,10 +29,12 @@ void fit_in_line(float width) {
     if (ImGui::GetItemRectMax().x + ImGui::GetStyle().ItemSpacing.x + width <= right) ImGui::SameLine();
 }
 
-bool placed_button(const texts::film::Action& action) {
-    fit_in_line(ImGui::CalcTextSize(action.name).x + 2 * ImGui::GetStyle().FramePadding.x);
-    const bool clicked = ImGui::Button(action.name);
-    ui::show_hint(action.hint);
+bool placed_button(const texts::Item& item, bool enabled = true) {
+    fit_in_line(ImGui::CalcTextSize(item.name).x + 2 * ImGui::GetStyle().FramePadding.x);
+    ImGui::BeginDisabled(!enabled);
+    const bool clicked = ImGui::Button(item.name);
+    ui::show_hint(item.hint);
+    ImGui::EndDisabled();
     return clicked;
 }
 
@@ -263,24 +265,18 @@ void FilmStrip::draw_track() {
 }
 
 void FilmStrip::draw_buttons() {
-    const auto button = [](const texts::film::Action& action, bool enabled) {
-        ImGui::BeginDisabled(!enabled);
-        const bool clicked = placed_button(action);
-        ImGui::EndDisabled();
-        return clicked;
-    };
     const bool several = views().size() >= 2, on_key = key_at_playhead().has_value();
-    if (button(playing_ ? texts::film::kStop : texts::film::kPlay, several)) play(!playing_);
-    if (button(texts::film::kAdd, true)) add_key();
-    if (button(texts::film::kReplace, on_key)) replace_key();
-    if (button(texts::film::kDelete, on_key)) forget_key();
-    if (button(texts::film::kEven, several)) {
+    if (placed_button(playing_ ? texts::film::kStop : texts::film::kPlay, several)) play(!playing_);
+    if (placed_button(texts::film::kAdd)) add_key();
+    if (placed_button(texts::film::kReplace, on_key)) replace_key();
+    if (placed_button(texts::film::kDelete, on_key)) forget_key();
+    if (placed_button(texts::film::kEven, several)) {
         remember();
         space_evenly(views());
     }
-    if (button(texts::film::kSaveFilm, !views().empty() && !writing())) open_film();
-    if (button(texts::film::kSaveKeys, !views().empty())) navigation_.write_views();
-    if (button(texts::film::kSavePicture, true)) open_picture();
+    if (placed_button(texts::film::kSaveFilm, !views().empty() && !writing())) open_film();
+    if (placed_button(texts::film::kSaveKeys, !views().empty())) navigation_.write_views();
+    if (placed_button(texts::film::kSavePicture)) open_picture();
 }
 
 void FilmStrip::draw_settings() {

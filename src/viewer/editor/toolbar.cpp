@@ -29,7 +29,7 @@ constexpr double kEditShown = 6;  // seconds in which the status line shows the 
 
 struct BarButton {
     Icon icon;
-    texts::ButtonText text;
+    texts::Item text;
     std::function<void()> act;
     bool enabled = true, active = false, apart = false;  // apart: a separator is before it
     std::function<void()> menu = {};                     // of a right click
@@ -90,12 +90,6 @@ BarFit fit_bar(const BarButtons& buttons, float room) {
     return {small, shown, bar_length(buttons, shown, small) + small};
 }
 
-std::string bar_tooltip(const texts::ButtonText& text) {
-    std::string tooltip = text.name;
-    if (*text.key) tooltip += std::string(" (") + text.key + ")";
-    return tooltip + "\n" + text.hint;
-}
-
 /// The buttons that do not fit.
 void draw_more(const BarButtons& buttons, size_t from, float side) {
     const bool active = std::any_of(buttons.begin() + std::ptrdiff_t(from), buttons.end(),
@@ -105,7 +99,7 @@ void draw_more(const BarButtons& buttons, size_t from, float side) {
     for (size_t i = from; i < buttons.size(); ++i) {
         const BarButton& button = buttons[i];
         if (button.apart && i > from) ImGui::Separator();
-        if (ImGui::MenuItem(button.text.name, button.text.key, button.active, button.enabled)) button.act();
+        if (ImGui::MenuItem(button.text.name, button.text.keys, button.active, button.enabled)) button.act();
     }
     ImGui::EndPopup();
 }
@@ -126,7 +120,8 @@ void draw_buttons(const BarButtons& buttons, const BarFit& fit, ImVec2 at, bool 
         }
         ImGui::SetCursorScreenPos(at);
         const BarButton& button = buttons[i];
-        if (icon_button(button.icon, bar_tooltip(button.text).c_str(), button.active, button.enabled, side))
+        const std::string tooltip = std::string(button.text.name) + "\n" + button.text.hint;
+        if (icon_button(button.icon, tooltip.c_str(), button.active, button.enabled, side, button.text.keys))
             button.act();
         if (button.dot)
             ImGui::GetWindowDrawList()->AddCircleFilled({at.x + 0.85f * side, at.y + 0.15f * side},
@@ -146,7 +141,7 @@ std::function<void()> setter(bool& wanted) {
 /// The menu of the button that saves.
 void choose_save(bool can_save, BarActions& actions) {
     if (!can_save || !ImGui::BeginPopupContextItem("save")) return;
-    if (ImGui::MenuItem(texts::kSave.name, texts::kSave.key)) actions.save = true;
+    if (ImGui::MenuItem(texts::kSave.name, texts::kSave.keys)) actions.save = true;
     if (ImGui::MenuItem(texts::kSaveAs)) actions.save_as = true;
     ImGui::EndPopup();
 }
@@ -204,7 +199,7 @@ void draw_strip(Editor& editor, const BarFacts& facts, const BarArea& area) {
                                   : facts.live && moves_splats(tool.tool) ? texts::kLiveRefuses
                                                                           : nullptr;
             tools.push_back({Icon(tool.tool),
-                             {tool.name, tool.key, problem ? problem : tool.hint},
+                             {tool.name, problem ? problem : tool.hint, tool.key},
                              [&editor, chosen = tool.tool] { editor.settings.tool = chosen; },
                              !problem,
                              editor.settings.tool == tool.tool,

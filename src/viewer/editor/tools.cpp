@@ -205,9 +205,9 @@ bool Tools::State::step_key(const KeyPress& press) const {
 }
 
 bool Tools::State::control_key(const KeyPress& press) {
-    if (is_key(press, texts::kUndo.key))
+    if (is_key(press, texts::kUndo.keys))
         room.editor.undo();
-    else if (is_key(press, texts::kRedo.key))
+    else if (is_key(press, texts::kRedo.keys))
         room.editor.redo();
     else
         return step_key(press);
