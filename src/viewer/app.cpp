@@ -168,7 +168,7 @@ void App::handle_key(const KeyPress& press) {
     if (key == GLFW_KEY_ESCAPE) session_.search.cancel();
     if (key == GLFW_KEY_F1) state_.message.hint_until = {};
     if (key == GLFW_KEY_F1) toggle(state_.help);
-    if (key == GLFW_KEY_F2) toggle(state_.panel_fits() ? state_.panel_beside : state_.panel_over);
+    if (key == GLFW_KEY_F2) toggle(state_.panel_wanted());
     if (key == GLFW_KEY_F12 && press.shift) shown_.write_exr();
     if (key == GLFW_KEY_F12 && !press.shift) state_.loop.capture = true;
     if (ImGui::GetIO().WantTextInput) return;
@@ -459,26 +459,7 @@ void App::draw_editor() {
     if (editor_.settings.tool != last_tool_ && editor_.settings.tool != Tool::view)
         state_.settings.tab = PanelTab::edit;
     last_tool_ = editor_.settings.tool;
-    if (!state_.bars_shown()) return;
-    const BarFacts facts{.film_shown = film_.shown,
-                         .panel_shown = state_.panel_shown(),
-                         .can_save = editor_.scenes() > 0,
-                         .live = live(),
-                         .points = state_.scene.points,
-                         .status = state_.device_name};
-    const BarActions actions = draw_bars(editor_, facts, state_.frame_area());
-    if (actions.open) session_.dialog.ask(Wanted::file);
-    if (actions.save) dialogs_.save();
-    if (actions.save_as) dialogs_.save_as();
-    if (actions.publish) dialogs_.publish();
-    if (actions.film) toggle(film_.shown);
-    if (actions.picture) film_.open_picture();
-    if (actions.help) toggle(state_.help);
-    if (actions.panel) toggle(state_.panel_fits() ? state_.panel_beside : state_.panel_over);
-    if (!actions.clean) return;
-    (state_.panel_fits() ? state_.panel_beside : state_.panel_over) = true;
-    state_.settings.tab = PanelTab::edit;
-    edit_panel_.show_cleaning();
+    if (state_.bars_shown()) draw_bars({state_, editor_, dialogs_, film_, session_.dialog, edit_panel_});
 }
 
 bool App::present(ImDrawData* drawn, Image* capture) {

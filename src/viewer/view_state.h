@@ -108,6 +108,7 @@ struct ViewState {
     bool panel_fits() const;  // the window has room for the panel beside the picture
     bool empty() const { return scene.title.empty() && !scene.dataset && scene.gaussians->size() == 0; }
     bool panel_shown() const { return !scripted() && !empty() && (panel_fits() ? panel_beside : panel_over); }
+    bool& panel_wanted() { return panel_fits() ? panel_beside : panel_over; }
     /// The place of the panel: beside the picture and the bars, or over the picture.
     Rectangle panel_area() const;
     /// Whether the bars of the editor frame the picture: not in a small window.

@@ -134,31 +134,35 @@ void draw_buttons(const BarButtons& buttons, const BarFit& fit, ImVec2 at, bool 
     ImGui::PopID();
 }
 
-std::function<void()> setter(bool& wanted) {
-    return [&wanted] { wanted = true; };
-}
-
 /// The menu of the button that saves.
-void choose_save(bool can_save, BarActions& actions) {
-    if (!can_save || !ImGui::BeginPopupContextItem("save")) return;
-    if (ImGui::MenuItem(texts::kSave.name, texts::kSave.keys)) actions.save = true;
-    if (ImGui::MenuItem(texts::kSaveAs)) actions.save_as = true;
+void choose_save(Dialogs& dialogs) {
+    if (!ImGui::BeginPopupContextItem("save")) return;
+    if (ImGui::MenuItem(texts::kSave.name, texts::kSave.keys)) dialogs.save();
+    if (ImGui::MenuItem(texts::kSaveAs)) dialogs.save_as();
     ImGui::EndPopup();
 }
 
-BarButtons top_buttons(Editor& editor, const BarFacts& facts, BarActions& actions) {
+BarButtons top_buttons(const BarParts& parts) {
+    const Editor& editor = parts.editor;
     const EditSnapshot& now = editor.snapshot();
-    const bool splats = now.left > 0, can_save = facts.can_save && !editor.saving();
-    const auto save = [&actions] { (ImGui::GetIO().KeyShift ? actions.save_as : actions.save) = true; };
-    return {{Icon::open, texts::kOpenFile, setter(actions.open)},
-            {Icon::save, texts::kSave, save, can_save, false, false,
-             [&actions, can_save] { choose_save(can_save, actions); }, editor.unsaved()},
-            {Icon::undo, texts::kUndo, [&editor] { editor.undo(); }, now.done > 0, false, true},
-            {Icon::redo, texts::kRedo, [&editor] { editor.redo(); }, now.done < now.steps.size()},
-            {Icon::clean, texts::kClean, setter(actions.clean), splats, false, true},
-            {Icon::film, texts::kFilm, setter(actions.film), splats || facts.film_shown, facts.film_shown},
-            {Icon::publish, texts::kPublish, setter(actions.publish), splats},
-            {Icon::picture, texts::kPicture, setter(actions.picture)}};
+    const bool splats = now.left > 0, can_save = editor.scenes() > 0 && !editor.saving();
+    std::function<void()> menu;
+    if (can_save) menu = [&parts] { choose_save(parts.dialogs); };
+    const auto save = [&parts] { ImGui::GetIO().KeyShift ? parts.dialogs.save_as() : parts.dialogs.save(); };
+    const auto clean = [&parts] {
+        parts.state.panel_wanted() = true;
+        parts.state.settings.tab = PanelTab::edit;
+        parts.panel.show_cleaning();
+    };
+    return {{Icon::open, texts::kOpenFile, [&parts] { parts.files.ask(Wanted::file); }},
+            {Icon::save, texts::kSave, save, can_save, false, false, menu, editor.unsaved()},
+            {Icon::undo, texts::kUndo, [&parts] { parts.editor.undo(); }, now.done > 0, false, true},
+            {Icon::redo, texts::kRedo, [&parts] { parts.editor.redo(); }, now.done < now.steps.size()},
+            {Icon::clean, texts::kClean, clean, splats, false, true},
+            {Icon::film, texts::kFilm, [&parts] { parts.film.shown = !parts.film.shown; },
+             splats || parts.film.shown, parts.film.shown},
+            {Icon::publish, texts::kPublish, [&parts] { parts.dialogs.publish(); }, splats},
+            {Icon::picture, texts::kPicture, [&parts] { parts.film.open_picture(); }}};
 }
 
 /// A line that moves while edits are being done.
@@ -169,24 +173,27 @@ void draw_busy(const ImVec2& low, const ImVec2& high) {
                                               {std::min(high.x, from + 0.3f * width), high.y}, accent());
 }
 
-void draw_top(Editor& editor, const BarFacts& facts, const BarArea& area, BarActions& actions) {
+void draw_top(const BarParts& parts, const BarArea& area) {
     const ImVec2 high(area.high.x, area.low.y + area.top);
     if (begin_bar("top bar", area.low, high)) {
-        const BarButtons right{{Icon::panel, texts::kPanel, setter(actions.panel), true, facts.panel_shown},
-                               {Icon::help, texts::kHelp, setter(actions.help)}};
-        const BarButtons left = top_buttons(editor, facts, actions);
+        ViewState& state = parts.state;
+        const BarButtons right{
+            {Icon::panel, texts::kPanel, [&state] { state.panel_wanted() = !state.panel_wanted(); }, true,
+             state.panel_shown()},
+            {Icon::help, texts::kHelp, [&state] { state.help = !state.help; }}};
+        const BarButtons left = top_buttons(parts);
         const float margin = (area.left - kButtonSide * ImGui::GetTextLineHeight()) / 2;
         const float room = high.x - area.low.x - 2 * margin;
         const BarFit right_fit = fit_bar(right, 0.4f * room),
                      left_fit = fit_bar(left, room - right_fit.length);
         draw_buttons(left, left_fit, {area.low.x + margin, area.low.y}, false, area.top);
         draw_buttons(right, right_fit, {high.x - margin - right_fit.length, area.low.y}, false, area.top);
-        if (editor.busy() || editor.saving()) draw_busy(area.low, high);
+        if (parts.editor.busy() || parts.editor.saving()) draw_busy(area.low, high);
     }
     ImGui::End();
 }
 
-void draw_strip(Editor& editor, const BarFacts& facts, const BarArea& area) {
+void draw_strip(Editor& editor, bool points, const BarArea& area) {
     const ImVec2 low(area.low.x, area.low.y + area.top),
         high(area.low.x + area.left, area.high.y - area.bottom);
     if (high.y - low.y < area.left) return;
@@ -195,9 +202,9 @@ void draw_strip(Editor& editor, const BarFacts& facts, const BarArea& area) {
         for (const texts::ToolText& tool : texts::kTools) {
             const bool first =
                 tool.tool == Tool::rectangle || tool.tool == Tool::move || tool.tool == Tool::measure;
-            const char* problem = facts.points && tool.tool != Tool::view ? texts::kPointsEdited
-                                  : facts.live && moves_splats(tool.tool) ? texts::kLiveRefuses
-                                                                          : nullptr;
+            const char* problem = points && tool.tool != Tool::view                 ? texts::kPointsEdited
+                                  : editor.settings.live && moves_splats(tool.tool) ? texts::kLiveRefuses
+                                                                                    : nullptr;
             tools.push_back({Icon(tool.tool),
                              {tool.name, problem ? problem : tool.hint, tool.key},
                              [&editor, chosen = tool.tool] { editor.settings.tool = chosen; },
@@ -249,27 +256,27 @@ std::string shortened(std::string text, float width) {
     return text.empty() ? text : text + "...";
 }
 
-std::string selection_text(const Editor& editor, const BarFacts& facts) {
+std::string selection_text(const Editor& editor) {
     if (editor.saving()) return texts::kSaving;
     if (const auto count = editor.preview_count())
         return core::grouped(*count, "splat") + " " + texts::kWouldBeRemoved;
     if (const size_t selected = editor.snapshot().selected; selected > 0)
         return core::grouped(selected) + " " + texts::kSelected;
-    return facts.live ? texts::kEditsTraining : "";
+    return editor.settings.live ? texts::kEditsTraining : "";
 }
 
-void draw_status(const Editor& editor, const BarFacts& facts, const BarArea& area) {
+void draw_status(const Editor& editor, const std::string& device, const BarArea& area) {
     const ImVec2 low(area.low.x, area.high.y - area.bottom);
     if (begin_bar("status", low, area.high)) {
         ImDrawList& list = *ImGui::GetWindowDrawList();
         const float line = ImGui::GetTextLineHeight(), y = low.y + (area.bottom - line) / 2;
         float from = low.x + 0.6f * line, to = area.high.x - 0.6f * line;
         const auto width = [](const std::string& text) { return ImGui::CalcTextSize(text.c_str()).x; };
-        const std::string middle = selection_text(editor, facts);
+        const std::string middle = selection_text(editor);
         const float half = width(middle) / 2, center = (from + to) / 2;
         const ImU32 quiet = ImGui::GetColorU32(ImGuiCol_TextDisabled);
-        if (const float right = width(facts.status); to - right > center + half + line) {
-            list.AddText({to - right, y}, quiet, facts.status.c_str());
+        if (const float right = width(device); to - right > center + half + line) {
+            list.AddText({to - right, y}, quiet, device.c_str());
             to -= right + line;
         }
         if (!middle.empty()) {
@@ -289,13 +296,11 @@ BarSizes bar_sizes(double text_height) {
     return {pixels(kTopBar), pixels(kStrip), pixels(kStatusLine)};
 }
 
-BarActions draw_bars(Editor& editor, const BarFacts& facts, const Rectangle& rectangle) {
-    BarActions actions;
-    const BarArea area = bar_area(rectangle);
-    draw_top(editor, facts, area, actions);
-    draw_strip(editor, facts, area);
-    draw_status(editor, facts, area);
-    return actions;
+void draw_bars(const BarParts& parts) {
+    const BarArea area = bar_area(parts.state.frame_area());
+    draw_top(parts, area);
+    draw_strip(parts.editor, parts.state.scene.points, area);
+    draw_status(parts.editor, parts.state.device_name, area);
 }
 
 }  // namespace ewa::viewer
