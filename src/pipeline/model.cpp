@@ -83,16 +83,6 @@ void replace_generation(
     model.splats = model.capacity = splats;
 }
 
-Gaussians slice_of(const Gaussians& all, size_t first, size_t count) {
-    Gaussians part;
-    part.sh_degree = all.sh_degree;
-    part.origin = all.origin;
-    part.density = all.density;
-    part.resize(count);
-    scene::copy_splats(all, first, count, part, 0);
-    return part;
-}
-
 Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments, bool statistics) {
     if (!scene::is_computable(gaussians))
         return upload_model(device, scene::computable(gaussians), moments, statistics);

@@ -58,9 +58,6 @@ void replace_generation(
     gpu::Device& device, Model& model, uint32_t splats,
     const std::function<void(const gpu::Buffer& target, const gpu::Buffer& source, bool is_moments)>& write);
 
-/// A scene with `count` splats of `all`, from splat `first` on.
-Gaussians slice_of(const Gaussians& all, size_t first, size_t count);
-
 /// Uploads a scene. moments: number of buffers of moments, 0 to 2. Moments and statistics are zeroed.
 Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments, bool statistics);
 

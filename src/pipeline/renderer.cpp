@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <ranges>
 
 #include "ewa/error.h"
 #include "ewa/gpu_interop.h"
@@ -15,6 +16,7 @@
 #include "pipeline/views.h"
 #include "scene/looks.h"
 #include "scene/readout.h"
+#include "scene/splat_arrays.h"
 
 namespace ewa {
 namespace {
@@ -121,9 +123,9 @@ void Renderer::State::divide(const Gaussians& gaussians, uint64_t part_bytes) {
     const uint64_t block = parameter_bytes(1, gaussians.sh_degree);
     const size_t most = size_t(std::max<uint64_t>(part_bytes / block, 1)) * shared::PARAM_BLOCK;
     for (size_t first = 0; first < gaussians.size(); first += most) {
-        const size_t splats = std::min(most, gaussians.size() - first);
+        const auto rows = std::views::iota(first, std::min(first + most, gaussians.size()));
         ScenePart& part = parts.emplace_back();
-        part.model = upload_model(*device, slice_of(gaussians, first, splats), 0, false);
+        part.model = upload_model(*device, scene::rows_of(gaussians, rows), 0, false);
         part.params = part.model.params.download<std::byte>(part.model.params.bytes());
         part.model.params = {};
     }

@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cstring>
+#include <ranges>
 #include <string>
 #include <utility>
 
 #include "ewa/error.h"
 #include "portions/collect.h"
+#include "scene/splat_arrays.h"
 
 namespace ewa::portions {
 
@@ -42,7 +44,8 @@ Portions::Portions(gpu::Device& device, std::shared_ptr<Ranks> group, const Gaus
         const auto upload = [&](const Gaussians& part) {
             return upload_model(device, part, setup.moments, setup.statistics);
         };
-        Model made = whole ? upload(start) : upload(slice_of(start, model.first, model.splats));
+        const auto rows = std::views::iota(model.first, model.first + model.splats);
+        Model made = whole ? upload(start) : upload(scene::rows_of(start, rows));
         made.first = model.first;
         made.all = model.all;
         model = std::move(made);

@@ -53,16 +53,6 @@ std::string undrawable_text(const Gaussians& gaussians) {
     return text;
 }
 
-Gaussians rows_of(const Gaussians& gaussians, std::span<const uint32_t> rows) {
-    Gaussians some;
-    some.sh_degree = gaussians.sh_degree;
-    some.origin = gaussians.origin;
-    some.density = gaussians.density;
-    some.resize(rows.size());
-    for (size_t k = 0; k < rows.size(); ++k) copy_splats(gaussians, rows[k], 1, some, k);
-    return some;
-}
-
 }  // namespace scene
 
 }  // namespace ewa

@@ -44,8 +44,18 @@ inline void copy_splats(const Gaussians& from, size_t i, size_t count, Gaussians
     }
 }
 
-/// Some splats of a scene, in this order. rows: below size().
-Gaussians rows_of(const Gaussians& gaussians, std::span<const uint32_t> rows);
+/// Some splats of a scene, in this order. rows: a range of indices below size().
+template <class Rows>
+Gaussians rows_of(const Gaussians& gaussians, const Rows& rows) {
+    Gaussians some;
+    some.sh_degree = gaussians.sh_degree;
+    some.origin = gaussians.origin;
+    some.density = gaussians.density;
+    some.resize(rows.size());
+    size_t k = 0;
+    for (const size_t row : rows) copy_splats(gaussians, row, 1, some, k++);
+    return some;
+}
 
 /// How many splats are not drawable by which values, such as "means of 2, zero quaternions of 1". Empty if all are drawable.
 std::string undrawable_text(const Gaussians& gaussians);
