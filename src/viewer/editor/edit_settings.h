@@ -34,8 +34,14 @@ constexpr bool moves_splats(Tool tool) {
            tool == Tool::origin;
 }
 
+/// The shapes that select, in the world.
+struct SelectionShapes {
+    glm::dvec3 box_low{-1}, box_high{1}, sphere_center{0};
+    double sphere_radius = 1;
+};
+
 /// What the tools and the panel share: settings of selecting and of gizmos. The keys of docs/editor.md change them too.
-struct EditSettings {
+struct EditSettings : SelectionShapes {
     Tool tool = Tool::view;
     std::string progress;   // of the tool, for the status line; empty: its hint
     bool live = false;      // edits go to a training, which takes selections, deletes and locks alone
@@ -43,11 +49,9 @@ struct EditSettings {
     bool unfreeze = false;  // the user wants the training to change all splats again
     edit::Operation operation = edit::Operation::set;  // Shift: add, Ctrl: remove, both: intersect
     bool front = false, extent = false;
-    float brush = 40;                                       // radius, px of the window
-    float tolerance = 0.15f;                                // of flood and eyedropper, 0 to 1
-    bool local = false;                                     // axes of gizmos
-    glm::dvec3 box_low{-1}, box_high{1}, sphere_center{0};  // world
-    double sphere_radius = 1;
+    float brush = 40;         // radius, px of the window
+    float tolerance = 0.15f;  // of flood and eyedropper, 0 to 1
+    bool local = false;       // axes of gizmos
 };
 
 }  // namespace ewa::viewer

@@ -82,13 +82,9 @@ bool ShapeHandles::mouse(const ToolPicture& picture) {
         const auto handle = handle_at(picture);
         const auto ray = picture.ray();
         if (!handle || !ray) return false;
-        const EditSettings& s = room_.settings();
-        dragged_sphere_ = sphere();
         const glm::dvec3 at = handles(picture.camera)[*handle];
-        drag_ = Drag{*handle,        on_plane(*ray, at, towards_viewer(picture.camera, at)).value_or(at),
-                     s.box_low,      s.box_high,
-                     middle(),       0,
-                     s.sphere_radius};
+        drag_ = Drag{*handle, room_.settings(),
+                     on_plane(*ray, at, towards_viewer(picture.camera, at)).value_or(at), middle()};
         if (*handle > 0 && !sphere()) {
             glm::dvec3 axis(0);
             axis[int(*handle - 1) / 2] = 1;
@@ -113,10 +109,10 @@ void ShapeHandles::move(const ToolPicture& picture) {
         if (!along) return;
         if (drag.handle % 2 == 1)
             settings.box_low[axis] =
-                std::min(drag.low[axis] + *along - drag.along, settings.box_high[axis] - least);
+                std::min(drag.before.box_low[axis] + *along - drag.along, settings.box_high[axis] - least);
         else
             settings.box_high[axis] =
-                std::max(drag.high[axis] + *along - drag.along, settings.box_low[axis] + least);
+                std::max(drag.before.box_high[axis] + *along - drag.along, settings.box_low[axis] + least);
         return;
     }
     const auto point = on_plane(*ray, drag.grabbed, towards_viewer(picture.camera, drag.center));
@@ -129,8 +125,8 @@ void ShapeHandles::move(const ToolPicture& picture) {
     if (sphere()) {
         settings.sphere_center = drag.center + moved;
     } else {
-        settings.box_low = drag.low + moved;
-        settings.box_high = drag.high + moved;
+        settings.box_low = drag.before.box_low + moved;
+        settings.box_high = drag.before.box_high + moved;
     }
 }
 
@@ -142,14 +138,7 @@ bool ShapeHandles::release() {
 
 bool ShapeHandles::cancel() {
     if (!drag_) return false;
-    EditSettings& settings = room_.settings();
-    if (dragged_sphere_) {
-        settings.sphere_center = drag_->center;
-        settings.sphere_radius = drag_->radius;
-    } else {
-        settings.box_low = drag_->low;
-        settings.box_high = drag_->high;
-    }
+    static_cast<SelectionShapes&>(room_.settings()) = drag_->before;
     return release();
 }
 

@@ -24,8 +24,9 @@ class ShapeHandles {
   private:
     struct Drag {
         size_t handle;
-        glm::dvec3 grabbed, low, high, center;  // when the drag began
-        double along, radius;
+        SelectionShapes before;      // when the drag began, as the next ones
+        glm::dvec3 grabbed, center;  // the point under the pointer; the middle
+        double along = 0;            // of the point on the axis of a face
     };
     bool sphere() const { return room_.settings().tool == Tool::sphere; }
     glm::dvec3 middle() const;
@@ -38,7 +39,6 @@ class ShapeHandles {
 
     const ToolRoom& room_;
     std::optional<Drag> drag_;
-    bool dragged_sphere_ = false;                              // else the box; a key may change the tool
     std::optional<std::filesystem::path> sphere_of_, box_of_;  // the scenes in which they have places
 };
 
