@@ -67,11 +67,8 @@ App::App(const Startup& startup)
 }
 
 KeptSettings App::kept() const {
-    KeptSettings kept{.window = {},
-                      .text_scale = state_.settings.text_scale,
-                      .gain = state_.settings.gain,
-                      .film_seconds = state_.settings.film_seconds,
-                      .light = state_.settings.light};
+    KeptSettings kept = state_.settings;
+    if (state_.startup.size) return kept;
     const double scale = double(state_.window.scale()) / double(state_.window.density());
     const Size size = state_.window.size();
     if (size.width > 0 && size.height > 0)

@@ -8,7 +8,6 @@
 #include "viewer/editor/editor.h"
 #include "viewer/editor/timeline.h"
 #include "viewer/editor/tools.h"
-#include "viewer/kept_settings.h"
 #include "viewer/navigation.h"
 #include "viewer/screen.h"
 #include "viewer/shown.h"

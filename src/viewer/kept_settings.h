@@ -11,11 +11,11 @@ namespace ewa::viewer {
 inline constexpr float kLeastText = 0.5f, kMostText = 3;  // limits of text_scale
 
 struct KeptSettings {
-    std::optional<Size> window;  // logical px: of a screen with a content scale of 1
+    std::optional<Size> window;  // of the last session, logical px: of a screen with a content scale of 1
     float text_scale = 1;        // times the size that the monitor asks for
-    float gain = 4;              // of the difference image
-    float film_seconds = 2;
-    bool light = false;  // the light theme
+    float gain = 4;              // factor of the difference image
+    float film_seconds = 2;      // from one key of a film to the next
+    bool light = false;          // the light theme
     bool operator==(const KeptSettings&) const = default;
 };
 

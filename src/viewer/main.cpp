@@ -229,12 +229,9 @@ void take_settings(const CLI::App& app, Arguments& arguments) {
     startup.settings.train_steps = RunOptions().train.steps;
     arguments.evenly = app.count("--film-seconds") > 0;
     if (!arguments.picture.empty() || !arguments.film.empty()) return;
-    const KeptSettings kept = read_settings(settings_file());
-    startup.last_size = kept.window;
-    startup.settings.text_scale = kept.text_scale;
-    startup.settings.gain = kept.gain;
-    startup.settings.light = kept.light;
-    if (!arguments.evenly) startup.settings.film_seconds = kept.film_seconds;
+    KeptSettings kept = read_settings(settings_file());
+    if (arguments.evenly) kept.film_seconds = startup.settings.film_seconds;
+    static_cast<KeptSettings&>(startup.settings) = kept;
 }
 
 /// --help and --version: what CLI11 prints.
@@ -276,9 +273,7 @@ void show(Startup& startup) {
     if (startup.picture) return App(startup).run();
     App app(startup);
     app.run();
-    KeptSettings kept = app.kept();
-    if (startup.size) kept.window = startup.last_size;
-    write_settings(settings_file(), kept);
+    write_settings(settings_file(), app.kept());
 }
 
 int run(const CLI::App& app, const Arguments& arguments) {

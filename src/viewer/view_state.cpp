@@ -15,13 +15,13 @@ Size initial_size(const Startup& startup, const WindowSystem& system) {
     if (startup.picture) return picture;
     const Size desktop = system.work_area();
     const double scale = double(system.scale());
-    if (startup.last_size) {
+    if (startup.settings.window) {
         const auto side = [&](int last, int most) {
             const int length = std::max(1, int(std::lround(last * scale)));
             return most > 0 ? std::min(length, most) : length;
         };
-        return {side(startup.last_size->width, desktop.width),
-                side(startup.last_size->height, desktop.height)};
+        return {side(startup.settings.window->width, desktop.width),
+                side(startup.settings.window->height, desktop.height)};
     }
     const bool beside = startup.settings.comparison == Comparison::beside;
     const double text = kTextHeight * scale * double(startup.settings.text_scale);

@@ -14,7 +14,7 @@
 
 #include "ewa/capture.h"
 #include "io/datasets/view_list.h"
-#include "viewer/layout.h"
+#include "viewer/kept_settings.h"
 #include "viewer/message.h"
 #include "viewer/opening.h"
 #include "viewer/renders.h"
@@ -35,17 +35,13 @@ struct LaterTraining {
 enum class PanelTab { view, edit };
 
 /// What the panel and keys change.
-struct PanelSettings {
+struct PanelSettings : KeptSettings {
     Look look;
     Comparison comparison = Comparison::none;
     float wipe = 0.5f;  // share of the width that shows the image
-    float gain = 4;     // factor of the difference image
     bool cameras = false, turntable = false;
-    bool parallel = false;   // orthographic projection
-    bool measure = false;    // clicks choose points, whose distance is shown
-    float film_seconds = 2;  // from one key of a film to the next
-    float text_scale = 1;    // times the size that the monitor asks for
-    bool light = false;      // the light theme
+    bool parallel = false;  // orthographic projection
+    bool measure = false;   // clicks choose points, whose distance is shown
     PanelTab tab = PanelTab::view;
     /// Steps of a training that the window starts: those of a row of train::kQualities, or another number.
     int train_steps = 0;
@@ -56,7 +52,6 @@ struct Startup {
     OpenedScene scene;
     std::optional<int> frame;                      // of the dataset
     std::optional<Size> size;                      // of the window, px
-    std::optional<Size> last_size;                 // of the last session's window, as KeptSettings::window
     std::optional<std::filesystem::path> picture;  // write this screenshot, then exit
     std::optional<std::filesystem::path>
         film;  // write a film through `views` into this folder, without a window
