@@ -136,9 +136,7 @@ double App::patience() const {
 void App::change_text() {
     const double text = state_.text_height();
     const bool light = state_.settings.light;
-    if (screen_ && screen_text_ == text && screen_light_ == light) return;
-    screen_text_ = text;
-    screen_light_ = light;
+    if (screen_ && screen_->text == text && screen_->light == light) return;
     screen_.reset();
     screen_ = std::make_unique<Screen>(state_.system, state_.window, state_.device_name, text, light);
     shown_.fill(screen_->presenter);

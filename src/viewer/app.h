@@ -55,8 +55,6 @@ class App {
 
     ViewState state_;
     std::unique_ptr<Screen> screen_;
-    double screen_text_ = 0;  // ViewState::text_height() when screen_ was created
-    bool screen_light_ = false;
     bool dragging_wipe_ = false;
     Navigation navigation_;
     Shown shown_;

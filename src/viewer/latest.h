@@ -13,11 +13,6 @@
 
 namespace ewa::viewer {
 
-template <class Result>
-bool finished(const std::future<Result>& future) {
-    return future.valid() && future.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
-}
-
 /// Work on a thread of its own. The destructor waits until it ends.
 template <class Result>
 class Task {
@@ -34,7 +29,9 @@ class Task {
     }
     /// From start() to take().
     bool running() const { return result_.valid(); }
-    bool ready() const { return finished(result_); }
+    bool ready() const {
+        return running() && result_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+    }
     /// The result of the work, once. Throws what the work has thrown.
     Result take() { return result_.get(); }
 

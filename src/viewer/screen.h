@@ -91,11 +91,15 @@ class Gui {
 
 /// The objects that depend on the device, the text size and the theme. They are created again if the device is lost or one changes.
 struct Screen {
-    Screen(const WindowSystem& system, Window& window, const std::string& device_name, double text,
-           bool light)
-        : device(system, window, device_name),
+    Screen(const WindowSystem& system, Window& window, const std::string& device_name, double text_height,
+           bool light_theme)
+        : text(text_height),
+          light(light_theme),
+          device(system, window, device_name),
           presenter(device),
           gui(window, device, presenter, text, light) {}
+    double text;
+    bool light;
     PresentDevice device;
     Presenter presenter;
     Gui gui;

@@ -99,10 +99,14 @@ bool EditedScene::as_opened() const {
     return edit::same_version(head, edit::head_of(file, head.splats));
 }
 
-void Editor::insert(std::unique_ptr<EditedScene> scene, std::shared_ptr<const Gaussians> splats,
-                    edit::Cameras cameras) {
+void Editor::insert(const std::string& name, const fs::path& file, std::shared_ptr<const Gaussians> splats,
+                    edit::Cameras cameras, bool journaled) {
+    auto scene = std::make_unique<EditedScene>();
+    scene->name = name;
+    scene->file = file;
+    scene->journaled = journaled;
     scene->id = ++ids_;
-    scene->head = edit::head_of(scene->file, splats->size());
+    scene->head = edit::head_of(file, splats->size());
     worker_.add(scene->id, std::move(splats), std::move(cameras), place_of(*scene));
     scenes_.push_back(std::move(scene));
     active_ = scenes_.size() - 1;
@@ -119,19 +123,7 @@ void Editor::clear() {
 void Editor::enter(const std::string& name, const fs::path& file, std::shared_ptr<const Gaussians> splats,
                    edit::Cameras cameras, bool journaled) {
     clear();
-    auto scene = std::make_unique<EditedScene>();
-    scene->name = name;
-    scene->file = file;
-    scene->journaled = journaled;
-    insert(std::move(scene), std::move(splats), std::move(cameras));
-}
-
-void Editor::add(const std::string& name, const fs::path& file, std::shared_ptr<const Gaussians> splats) {
-    auto scene = std::make_unique<EditedScene>();
-    scene->name = name;
-    scene->file = file;
-    scene->journaled = !file.empty();
-    insert(std::move(scene), std::move(splats), {});
+    insert(name, file, std::move(splats), std::move(cameras), journaled);
 }
 
 void Editor::activate(size_t scene) {

@@ -47,7 +47,9 @@ class Editor {
                std::shared_ptr<const Gaussians> splats, edit::Cameras cameras, bool journaled);
     /// Adds a scene of another file, which becomes the active one. file: empty: the splats are in none.
     void add(const std::string& name, const std::filesystem::path& file,
-             std::shared_ptr<const Gaussians> splats);
+             std::shared_ptr<const Gaussians> splats) {
+        insert(name, file, std::move(splats), {}, !file.empty());
+    }
     bool wants_scene = false;  // the user asks for a file to add
     void clear();              // there is nothing to edit
     size_t scenes() const { return scenes_.size(); }
@@ -115,8 +117,8 @@ class Editor {
         std::vector<std::pair<uint64_t, std::vector<edit::Step>>> scenes;  // that are saved, with their edits
     };
     EditedScene& now() { return *scenes_[active_]; }
-    void insert(std::unique_ptr<EditedScene> scene, std::shared_ptr<const Gaussians> splats,
-                edit::Cameras cameras);
+    void insert(const std::string& name, const std::filesystem::path& file,
+                std::shared_ptr<const Gaussians> splats, edit::Cameras cameras, bool journaled);
     EditedScene& add_part(size_t part);
     void move(uint64_t id, bool opens);
 
