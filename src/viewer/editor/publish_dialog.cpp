@@ -59,35 +59,22 @@ void PublishDialog::choose(int kind) {
 
 bool PublishDialog::draw() {
     if (!begin_modal(texts::files::kPublish)) return true;
-    const bool works = running(), done = done_;
-    if (works)
+    Choice choice = Choice::none;
+    if (running()) {
         draw_work();
-    else if (done)
+        if (draw_choices(nullptr, nullptr, texts::files::kStop) == Choice::cancel) publisher_.stop();
+    } else if (done_) {
         draw_done();
-    else
+        choice = draw_choices(texts::files::kOpen, nullptr, texts::files::kClose);
+        if (choice == Choice::confirm) open(format() == SplatFormat::page ? out_ : out_.parent_path());
+    } else {
         draw_form();
-    bool stays = true;
-    switch (draw_buttons()) {
-        case Choice::confirm:
-            done ? open(format() == SplatFormat::page ? out_ : out_.parent_path()) : start();
-            break;
-        case Choice::cancel:
-            stays = works;
-            publisher_.stop();
-            break;
-        case Choice::other:
-        case Choice::none:
-            break;
+        choice = draw_choices(path_.replaces() ? texts::files::kReplace : texts::files::kPublish, nullptr,
+                              texts::files::kCancel, !path_.path().empty() && !editor_.busy());
+        if (choice == Choice::confirm) start();
     }
-    end_modal(stays);
-    return stays;
-}
-
-Choice PublishDialog::draw_buttons() {
-    if (running()) return draw_choices(nullptr, nullptr, texts::files::kStop);
-    if (done_) return draw_choices(texts::files::kOpen, nullptr, texts::files::kClose);
-    return draw_choices(path_.replaces() ? texts::files::kReplace : texts::files::kPublish, nullptr,
-                        texts::files::kCancel, !path_.path().empty() && !editor_.busy());
+    end_modal(choice != Choice::cancel);
+    return choice != Choice::cancel;
 }
 
 SplatFormat PublishDialog::format() const {

@@ -29,7 +29,6 @@ class PublishDialog {
     void draw_form();
     void draw_work();
     void draw_done();
-    Choice draw_buttons();
     SplatFormat format() const;  // the chosen one
     void start();
     void open(const std::filesystem::path& path);
