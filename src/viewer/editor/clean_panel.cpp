@@ -79,14 +79,9 @@ void CleanSection::draw_rule(Editor& editor, const ui::Text& text, std::initiali
                       : fmt::format("{} {}", say::kRemove.name, part_text(*count, editor.snapshot().left));
     const bool found = count.value_or(0) > 0 && !editor.busy();
     const auto look = found ? ui::ButtonLook::danger : ui::ButtonLook::plain;
-    switch (ui::button_line({{{remove_text.c_str()}, found, look}, {say::kCancel}})) {
-        case 0:
-            remove(editor, title, shapes);
-            break;
-        case 1:
-            end(editor);
-            break;
-    }
+    const int clicked = ui::button_line({{{remove_text.c_str()}, found, look}, {say::kCancel}});
+    if (clicked == 0) remove(editor, title, shapes);
+    if (clicked == 1) end(editor);
     ImGui::PopID();
 }
 

@@ -44,14 +44,9 @@ void change_states(Editor& editor, bool live) {
     edit_line(editor, {{say::kLock, any}, {say::kUnlock, now.locked > 0}});
     edit_line(editor, {{say::kHide, any}, {say::kShow, now.hidden > 0}});
     edit_line(editor, {{say::kDelete, any, ui::ButtonLook::danger}, {say::kDuplicate, any}});
-    switch (ui::button_line({{say::kSeparate, any}, {say::kReset, any}})) {
-        case 0:
-            editor.separate();
-            break;
-        case 1:
-            editor.perform({say::kReset.name, {{say::kReset.edit, ""}}});
-            break;
-    }
+    const int clicked = ui::button_line({{say::kSeparate, any}, {say::kReset, any}});
+    if (clicked == 0) editor.separate();
+    if (clicked == 1) editor.perform({say::kReset.name, {{say::kReset.edit, ""}}});
 }
 
 }  // namespace
@@ -105,21 +100,14 @@ void SelectionSection::draw_shape(Editor& editor) {
     const int around = ui::button_line(
         {{say::kWholeScene, now.bounds_of_all.has_value()}, {say::kAroundSelection, now.bounds.has_value()}});
     if (around >= 0) enclose(settings, around == 0 ? *now.bounds_of_all : *now.bounds);
-    switch (ui::button_line(
-        {{say::kCopy}, {say::kPaste}, {say::kSelect}, {say::kCrop, true, ui::ButtonLook::danger}})) {
-        case 0:
-            ImGui::SetClipboardText(shape().c_str());
-            break;
-        case 1:
-            if (const char* text = ImGui::GetClipboardText()) paste_shape(text, settings);
-            break;
-        case 2:
-            editor.select(shape(), held_operation(settings));
-            break;
-        case 3:
-            editor.perform({say::kCrop.name, {{"select", shape()}, {"select", "invert"}, {"delete", ""}}});
-            break;
-    }
+    const int clicked = ui::button_line(
+        {{say::kCopy}, {say::kPaste}, {say::kSelect}, {say::kCrop, true, ui::ButtonLook::danger}});
+    const char* pasted = clicked == 1 ? ImGui::GetClipboardText() : nullptr;
+    if (clicked == 0) ImGui::SetClipboardText(shape().c_str());
+    if (pasted) paste_shape(pasted, settings);
+    if (clicked == 2) editor.select(shape(), held_operation(settings));
+    if (clicked == 3)
+        editor.perform({say::kCrop.name, {{"select", shape()}, {"select", "invert"}, {"delete", ""}}});
     ImGui::PopID();
 }
 
