@@ -92,7 +92,6 @@ class RenderThread::Scene {
     void close();
 
     std::shared_ptr<const RenderedFrame> draw(const RenderRequest& request, uint64_t scene);
-    Image color(const Full& full);
     /// Returns why the render could not be written or taken, or null.
     std::exception_ptr draw_extra(const ExtraRequest& request);
     SurfacePoint point_at(const Probe& probe);
@@ -223,22 +222,17 @@ SurfacePoint RenderThread::Scene::point_at(const Probe& probe) {
     return point;
 }
 
-Image RenderThread::Scene::color(const Full& full) {
-    fit_to(full.look);
-    DrawOptions options{options_of(full.look), Drawing::color, double(full.look.splat_scale)};
-    options.plain_colors = true;
-    return renderer_->render(full.camera, options).color;
-}
-
 std::exception_ptr RenderThread::Scene::draw_extra(const ExtraRequest& request) {
     fit_to(request.look);
-    const bool bytes = request.file.empty();
+    const bool bytes = bool(request.take);
     Rendering values;
     const ByteImage picture =
         drawn(*renderer_, request.camera, request.look, true, bytes ? nullptr : &values);
     try {
         if (bytes)
             request.take(picture.rgba);
+        else if (request.take_color)
+            request.take_color(values.color);
         else
             save(request.file, values, picture, request.look.mode);
     } catch (const std::exception&) {
@@ -295,13 +289,6 @@ void RenderThread::forget_points() {
     probes_waiting_.clear();
 }
 
-uint64_t RenderThread::ask_full(const Camera& camera, const Look& look) {
-    const std::lock_guard lock(mutex_);
-    next_.full = Full{camera, look, ++fulls_};
-    wake_.notify_one();
-    return fulls_;
-}
-
 uint64_t RenderThread::ask_extra(ExtraRequest request) {
     const std::lock_guard lock(mutex_);
     request.number = ++extras_;
@@ -329,14 +316,12 @@ void RenderThread::report(const std::function<void(News&)>& change) {
 bool RenderThread::next(const std::stop_token& stop, Work& work) {
     std::unique_lock lock(mutex_);
     wake_.wait(lock, stop, [this] {
-        return !probes_waiting_.empty() || next_.full || next_.request || !extras_waiting_.empty() ||
-               next_.scene || next_.draft || next_.marks;
+        return !probes_waiting_.empty() || next_.request || !extras_waiting_.empty() || next_.scene ||
+               next_.draft || next_.marks;
     });
     if (stop.stop_requested()) return false;
     work = std::exchange(next_, {});
     next_.scene_number = work.scene_number;
-    // What the window shows comes first.
-    if (work.request) next_.full = std::exchange(work.full, std::nullopt);
     if (!probes_waiting_.empty()) {
         work.probe = probes_waiting_.front();
         probes_waiting_.erase(probes_waiting_.begin());
@@ -361,11 +346,6 @@ void RenderThread::carry_out(Work& work) {
     if (work.probe) {
         answer(scene_->point_at(*work.probe));
         work.probe.reset();  // it is not answered again if what follows fails
-    }
-    if (work.full) {
-        const auto full =
-            std::make_shared<const FullRender>(FullRender{work.full->number, scene_->color(*work.full)});
-        report([&](News& news) { news.full = full; });
     }
     if (work.request) {
         const auto finished = scene_->draw(*work.request, work.scene_number);

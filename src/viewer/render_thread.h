@@ -68,13 +68,7 @@ struct RenderedFrame {
     uint64_t scene = 0;  // the number that set_scene() returned
 };
 
-/// A render of a camera at its own size, in floating point.
-struct FullRender {
-    uint64_t number = 0;  // that ask_full() returned
-    Image color;
-};
-
-/// A render beside those that are shown: a frame of a film, or a picture of any size.
+/// A render beside those that are shown: a frame of a film, a picture of any size, or one that is compared.
 struct ExtraRequest {
     Camera camera;  // of the size of the render
     Look look = {};
@@ -82,6 +76,7 @@ struct ExtraRequest {
         {};  // written as by `ewa render` with this extension; empty: `take` gets the render
     /// Gets RGBA on the render thread, and may throw.
     std::function<void(const std::vector<uint8_t>&)> take = {};
+    std::function<void(const Image&)> take_color = {};  // in place of `take`: gets colours in floating point
     uint64_t number = 0;
 };
 struct ExtraDone {
@@ -114,10 +109,6 @@ class RenderThread {
     /// Drops waiting requests for points. The one in progress is still answered.
     void forget_points();
 
-    /// Requests the colours of a camera at its own size. News::full has them once its number is the returned one. A new
-    /// request replaces one that waits.
-    uint64_t ask_full(const Camera& camera, const Look& look);
-
     /// Requests a render that leaves News::picture alone. News::extras has its end. Such renders are made in order. While both wait,
     /// each takes its turn with the frames that are shown.
     uint64_t ask_extra(ExtraRequest request);
@@ -127,7 +118,6 @@ class RenderThread {
         std::exception_ptr failure;                    // why the last request failed, if it did
         std::optional<DeviceInfo> device;              // once it is open
         std::vector<SurfacePoint> points;              // in order, since the last take_news()
-        std::shared_ptr<const FullRender> full;        // the last one, or null
         std::vector<ExtraDone> extras;                 // in order, since the last take_news()
     };
     News take_news();
@@ -140,17 +130,11 @@ class RenderThread {
         PointUse use = PointUse::look_at;
         uint64_t number = 0;
     };
-    struct Full {
-        Camera camera;
-        Look look;
-        uint64_t number = 0;
-    };
     struct Work {
         std::shared_ptr<const Gaussians> scene;  // null: as before
         std::optional<Draft> draft;              // empty: as before
         std::optional<RenderRequest> request;
         std::optional<Probe> probe;
-        std::optional<Full> full;
         std::optional<ExtraRequest> extra;
         std::optional<std::shared_ptr<const std::vector<uint8_t>>> marks;  // empty: as before
         uint64_t scene_number = 0;                                         // of the last set_scene()
@@ -170,7 +154,7 @@ class RenderThread {
     std::vector<Probe> probes_waiting_;        // in order
     std::deque<ExtraRequest> extras_waiting_;  // in order
     Work next_;                                // but for `probe` and `extra`
-    uint64_t probes_ = 0, fulls_ = 0, extras_ = 0;
+    uint64_t probes_ = 0, extras_ = 0;
     News news_;
     std::jthread thread_;
 };

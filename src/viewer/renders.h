@@ -93,8 +93,6 @@ class Renders {
     /// News has no answers to what was asked before.
     void forget_points();
 
-    /// Asks for the colours of a camera at its own size, as RenderThread::ask_full().
-    uint64_t ask_full(const Camera& camera, const Look& look) { return thread_.ask_full(camera, look); }
     /// Asks for a render beside those that are shown, as RenderThread::ask_extra(); News::extras has its end.
     uint64_t ask_extra(ExtraRequest request) { return thread_.ask_extra(std::move(request)); }
     /// The number of the present scene.

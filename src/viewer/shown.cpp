@@ -21,11 +21,11 @@ std::string reason(const std::exception_ptr& failure) {
 }  // namespace
 
 Shown::Shown(ViewState& state, Navigation& navigation)
-    : renders(state.startup.open_device, state.wake),
+    : quality_(state.wake),
+      renders(state.startup.open_device, state.wake),
       state_(state),
       navigation_(navigation),
-      images_(state.wake),
-      quality_(state.wake) {}
+      images_(state.wake) {}
 
 void Shown::enter_scene() {
     renders.set_scene(state_.scene.gaussians, {state_.scene.coarse, nullptr});
@@ -53,7 +53,6 @@ void Shown::take_renders() {
             state_.say(one.failure ? reason(one.failure)
                                    : "wrote " + std::filesystem::absolute(file.mapped()).string());
     }
-    quality_.take(news.full);
 }
 
 void Shown::forget_points() {

@@ -65,9 +65,13 @@ class Shown {
     std::string image_failure() const;   // why the camera has no image; else empty
     std::optional<double> psnr() const;  // dB
 
+  private:
+    ViewQuality quality_;  // it ends after the renders, whose thread calls it
+
+  public:
     Renders renders;
-    std::vector<ExtraDone>
-        extras;  // of others, that take_renders() has brought; who has asked for them takes them out
+    /// Extra renders of others that take_renders() has brought. Who has asked for them takes them out.
+    std::vector<ExtraDone> extras;
     Measurement measurement;
     std::function<void(const SurfacePoint&)> take_edit_point;  // gets the answers to PointUse::edit and color
 
@@ -86,7 +90,6 @@ class Shown {
     bool measuring_ = false;
     std::map<uint64_t, std::filesystem::path> files_;  // of write(), by the numbers of their renders
     ImageComparison images_;
-    ViewQuality quality_;
 };
 
 }  // namespace ewa::viewer

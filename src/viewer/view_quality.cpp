@@ -8,10 +8,10 @@
 namespace ewa::viewer {
 
 Quality quality_of(const QualityRequest& request) {
-    Quality quality{request.rendering->number, std::numeric_limits<double>::quiet_NaN()};
+    Quality quality{request.number, std::numeric_limits<double>::quiet_NaN()};
     try {
         const auto [photo, weights] = load_training_image(request.frame, request.background);
-        const Image color = with_appearance(request.rendering->color, request.appearance);
+        const Image color = with_appearance(request.rendering, request.appearance);
         if (photo.width == color.width && photo.height == color.height)
             quality.psnr = psnr(color, photo, weights);
     } catch (const std::exception&) {
@@ -23,19 +23,17 @@ Quality quality_of(const QualityRequest& request) {
 void ViewQuality::measure(Renders& renders, int index, const Frame& frame, const Look& look,
                           const Appearance& appearance) {
     if (index == index_ && renders.scene() == scene_ && look == look_) return;
-    asked_ = renders.ask_full(frame.camera, look);
+    ++asked_;
     if (index != index_) first_ = asked_;
     index_ = index;
     scene_ = renders.scene();
-    frame_ = frame;
     look_ = look;
-    appearance_ = appearance;
-}
-
-void ViewQuality::take(const std::shared_ptr<const FullRender>& rendering) {
-    if (index_ < 0 || !rendering || rendering->number != asked_ || taken_ == asked_) return;
-    taken_ = asked_;
-    measurements_.ask({rendering, frame_, look_.background, appearance_});
+    QualityRequest request{{}, frame, look.background, appearance, asked_};
+    const auto take = [this, request](const Image& color) mutable {
+        request.rendering = color;
+        measurements_.ask(request);
+    };
+    renders.ask_extra({.camera = frame.camera, .look = look, .take_color = take});
 }
 
 std::optional<double> ViewQuality::psnr(int index) const {

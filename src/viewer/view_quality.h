@@ -11,14 +11,15 @@
 namespace ewa::viewer {
 
 struct QualityRequest {
-    std::shared_ptr<const FullRender> rendering;  // of the frame's camera
+    Image rendering;  // of the frame's camera
     Frame frame;
     std::array<float, 3> background{};
     Appearance appearance = kIdentityExposure;  // of the image
+    uint64_t number = 0;
 };
 
 struct Quality {
-    uint64_t number = 0;  // of the render
+    uint64_t number = 0;  // of the request
     double psnr = 0;      // dB; NaN if no pixel counts, or without an image
 };
 
@@ -30,11 +31,10 @@ class ViewQuality {
     /// wake: called on a thread when psnr() may have changed.
     explicit ViewQuality(std::function<void()> wake) : measurements_(quality_of, std::move(wake)) {}
 
-    /// Starts to measure the PSNR of the dataset's frame `index`, unless this measurement has begun already.
+    /// Starts to measure the PSNR of the dataset's frame `index`, unless this measurement has begun already. renders: its
+    /// thread calls back, so it ends before this.
     void measure(Renders& renders, int index, const Frame& frame, const Look& look,
                  const Appearance& appearance = kIdentityExposure);
-    /// Compares a render with its image, if measure() requested it. rendering: the last full render, or null.
-    void take(const std::shared_ptr<const FullRender>& rendering);
     /// Forgets the frame: indices of another dataset mean other images.
     void forget() { index_ = -1; }
 
@@ -44,11 +44,8 @@ class ViewQuality {
   private:
     int index_ = -1;
     uint64_t scene_ = 0;  // number of the splats
-    Frame frame_;
     Look look_;
-    Appearance appearance_ = kIdentityExposure;
-    uint64_t asked_ = 0, taken_ = 0;  // numbers of renders: the last one, and the last one that is measured
-    uint64_t first_ = 0;              // number of the first render of this frame
+    uint64_t asked_ = 0, first_ = 0;  // numbers of the last request, and of the first one for this frame
     Latest<QualityRequest, Quality> measurements_;
 };
 
