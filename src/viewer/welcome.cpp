@@ -3,8 +3,6 @@
 #include <imgui.h>
 
 #include <algorithm>
-#include <array>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -73,62 +71,43 @@ std::string spaced_keys(std::string_view keys) {
     return text;
 }
 
-void draw_help_group(const char* name, std::span<const texts::HelpRow> rows, float keys) {
-    ImGui::TextDisabled("%s", name);
-    if (!ImGui::BeginTable(name, 2, ImGuiTableFlags_SizingFixedFit)) return;
+/// Calls visit(keys, text) for the tools of the group that have keys, and for its rows.
+template <class Visit>
+void for_each_row(const texts::HelpGroup& group, Visit visit) {
+    for (const texts::ToolText& tool : texts::kTools)
+        if (tool.tool >= group.first && tool.tool < group.end && *tool.key) visit(tool.key, tool.name);
+    for (const texts::HelpRow& row : group.rows) visit(spaced_keys(row.keys), row.text);
+}
+
+void draw_help_group(const texts::HelpGroup& group, float keys) {
+    ImGui::TextDisabled("%s", group.name);
+    if (!ImGui::BeginTable(group.name, 2, ImGuiTableFlags_SizingFixedFit)) return;
     ImGui::TableSetupColumn("keys", ImGuiTableColumnFlags_WidthFixed, keys);
     ImGui::TableSetupColumn("text", ImGuiTableColumnFlags_WidthStretch);
-    for (const texts::HelpRow& row : rows) {
-        for (const std::string& text : {spaced_keys(row.keys), std::string(row.text)}) {
+    for_each_row(group, [](const std::string& row_keys, const char* row_text) {
+        for (const char* text : {row_keys.c_str(), row_text}) {
             ImGui::TableNextColumn();
             ImGui::PushTextWrapPos(0);
-            ImGui::TextUnformatted(text.c_str());
+            ImGui::TextUnformatted(text);
             ImGui::PopTextWrapPos();
         }
-    }
+    });
     ImGui::EndTable();
     ImGui::Spacing();
 }
 
-struct HelpGroup {
-    const char* name;
-    std::vector<texts::HelpRow> rows;
-    bool second;  // in the second column, where there are two
-};
-
-/// The tools from `first` to the one before `end` that have keys, and then these rows.
-std::vector<texts::HelpRow> with_tools(Tool first, Tool end, std::span<const texts::HelpRow> rows) {
-    std::vector<texts::HelpRow> all;
-    for (const texts::ToolText& tool : texts::kTools)
-        if (tool.tool >= first && tool.tool < end && *tool.key) all.push_back({tool.key, tool.name});
-    all.insert(all.end(), rows.begin(), rows.end());
-    return all;
-}
-
-std::vector<HelpGroup> help_groups() {
-    const auto plain = [](std::span<const texts::HelpRow> rows) {
-        return std::vector<texts::HelpRow>(rows.begin(), rows.end());
-    };
-    return {{texts::kLookGroup, plain(texts::kLookHelp), false},
-            {texts::kViewGroup, plain(texts::kViewHelp), false},
-            {texts::kFilmGroup, plain(texts::kFilmHelp), false},
-            {texts::kSelectGroup, with_tools(Tool::rectangle, Tool::move, texts::kSelectHelp), true},
-            {texts::kChangeGroup, with_tools(Tool::move, Tool::origin, texts::kChangeHelp), true},
-            {texts::kFilesGroup, plain(texts::kFilesHelp), true}};
-}
-
 void draw_help_groups(int columns) {
-    const std::vector<HelpGroup> groups = help_groups();
     float keys = 0;
-    for (const HelpGroup& group : groups)
-        for (const texts::HelpRow& row : group.rows)
-            keys = std::max(keys, ImGui::CalcTextSize(spaced_keys(row.keys).c_str()).x);
+    for (const texts::HelpGroup& group : texts::kHelpGroups)
+        for_each_row(group, [&](const std::string& row_keys, const char* /*text*/) {
+            keys = std::max(keys, ImGui::CalcTextSize(row_keys.c_str()).x);
+        });
     keys = std::min(keys + 1, 0.4f * ImGui::GetContentRegionAvail().x / float(columns));  // longer ones wrap
     if (!ImGui::BeginTable("columns", columns, ImGuiTableFlags_SizingStretchSame)) return;
     for (const bool second : {false, true}) {
         ImGui::TableNextColumn();
-        for (const HelpGroup& group : groups)
-            if (group.second == second) draw_help_group(group.name, group.rows, keys);
+        for (const texts::HelpGroup& group : texts::kHelpGroups)
+            if (group.second == second) draw_help_group(group, keys);
     }
     ImGui::EndTable();
 }

@@ -45,12 +45,8 @@ TEST(HelpTexts, NameEachKeyOnce) {
     };
     add(texts::kViewHelp);
     keys.clear();  // the tools take some of them in the other tab
-    for (const std::span<const texts::HelpRow> rows : {std::span<const texts::HelpRow>(texts::kLookHelp),
-                                                       std::span<const texts::HelpRow>(texts::kSelectHelp),
-                                                       std::span<const texts::HelpRow>(texts::kChangeHelp),
-                                                       std::span<const texts::HelpRow>(texts::kFilmHelp),
-                                                       std::span<const texts::HelpRow>(texts::kFilesHelp)})
-        add(rows);
+    for (const texts::HelpGroup& group : texts::kHelpGroups)
+        if (group.rows.data() != texts::kViewHelp) add(group.rows);
     for (const texts::ToolText& tool : texts::kTools)
         if (tool.tool != Tool::view && *tool.key) add(std::array{texts::HelpRow{tool.key, tool.name}});
     for (const char* key : {"Del", "Ctrl+Z", "Ctrl+A", "Ctrl+D", "Ctrl+I", "H", "[ ]", "K", "Space", "Tab"})

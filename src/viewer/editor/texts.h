@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The English texts of the editor, in one place. A translation replaces this file.
 #pragma once
+#include <span>
 #include <string_view>
 
 #include "viewer/editor/edit_settings.h"
@@ -176,7 +177,7 @@ inline constexpr Item kCopyCommand{"Copy as command",
 
 }  // namespace edit_panel
 
-// Help (F1). The tools of kTools come first in their groups.
+// Help (F1).
 struct HelpRow {
     std::string_view keys;
     const char* text;
@@ -241,10 +242,21 @@ inline constexpr HelpRow kFilesHelp[] = {
     {key_of(kPanel), "show or hide the panel"},
     {"Ctrl + Q", "quit"},
 };
-inline constexpr const char *kLookGroup = "Look", *kViewGroup = "Look, in the tab View",
-                            *kSelectGroup = "Select, in the tab Edit",
-                            *kChangeGroup = "Change, in the tab Edit", *kFilmGroup = "Film",
-                            *kFilesGroup = "File";
+struct HelpGroup {
+    const char* name;
+    std::span<const HelpRow> rows;
+    bool second = false;  // in the second column, where there are two
+    Tool first = Tool::view,
+         end = Tool::view;  // the tools before the rows: from the first to the one before the end
+};
+inline constexpr HelpGroup kHelpGroups[] = {
+    {"Look", kLookHelp},
+    {"Look, in the tab View", kViewHelp},
+    {"Film", kFilmHelp},
+    {"Select, in the tab Edit", kSelectHelp, true, Tool::rectangle, Tool::move},
+    {"Change, in the tab Edit", kChangeHelp, true, Tool::move, Tool::origin},
+    {"File", kFilesHelp, true},
+};
 
 // What the tools say over the picture.
 inline constexpr const char *kNeedsPinhole =
