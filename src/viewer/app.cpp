@@ -222,11 +222,7 @@ void App::handle_mouse() {
 }
 
 void App::panel() {
-    std::function<void()> rows = [this] {
-        edit_panel_.draw(editor_, live());
-        state_.settings.look.plain = edit_panel_.shows_colours();
-        if (edit_panel_.take_redraw()) state_.redraw();
-    };
+    std::function<void()> rows = [this] { edit_panel_.draw(editor_, state_); };
     if (editor_.scenes() == 0) rows = nullptr;
     const float text = state_.settings.text_scale;
     const EditSnapshot& edited = editor_.snapshot();

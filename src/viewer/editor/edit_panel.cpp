@@ -3,25 +3,28 @@
 
 #include <imgui.h>
 
+#include <utility>
+
 #include "viewer/editor/panel_controls.h"
+#include "viewer/view_state.h"
 
 namespace ewa::viewer {
 
-void EditPanel::draw(Editor& editor, bool live) {
+void EditPanel::draw(Editor& editor, ViewState& state) {
     // Asks for another frame if it waits for something.
     const auto draw = [&](auto& part) {
         part.draw(editor);
-        redraw_ = part.waiting() || redraw_;
+        if (part.waiting()) state.redraw();
     };
-    redraw_ = shows_colours_ = false;
+    const bool live = editor.settings.live;
     if (!editor.snapshot().splats) return ImGui::TextDisabled("%s", say::kNoScene);
     if (live) ImGui::TextWrapped("%s", say::kLive);
-    if (ui::section(say::kSelection, true)) selection_.draw(editor, live);
+    if (ui::section(say::kSelection, true)) selection_.draw(editor);
     if (live) return clean_.end(editor);
     if (ui::section(say::kMove, false)) move_.draw(editor);
     if (ui::section(say::kColours, false)) {
         draw(colours_);
-        shows_colours_ = editor.snapshot().selected > 0 && !editor.preview_count();
+        state.settings.look.plain = editor.snapshot().selected > 0 && !editor.preview_count();
     }
     const bool jump = std::exchange(show_cleaning_, false);
     const bool clean = ui::section(say::kClean, false, jump);

@@ -24,7 +24,7 @@ void perform_on_selection(Editor& editor, const char* title, std::vector<edit::W
 
 class SelectionSection {
   public:
-    void draw(Editor& editor, bool live);
+    void draw(Editor& editor);
 
   private:
     void draw_shape(Editor& editor);

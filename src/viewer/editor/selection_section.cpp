@@ -33,10 +33,10 @@ void edit_line(Editor& editor, std::initializer_list<ui::Button> buttons) {
     editor.perform({*text.value ? "" : text.name, {{text.edit, text.value}}});
 }
 
-void change_states(Editor& editor, bool live) {
+void change_states(Editor& editor) {
     const EditSnapshot& now = editor.snapshot();
     const bool any = now.selected > 0;
-    if (live) {
+    if (editor.settings.live) {
         edit_line(editor, {{say::kDelete, any, ui::ButtonLook::danger}, {say::kFreeze, any}});
         if (ui::button_line({{say::kUnfreeze}}) == 0) editor.settings.unfreeze = true;
         return;
@@ -51,7 +51,7 @@ void change_states(Editor& editor, bool live) {
 
 }  // namespace
 
-void SelectionSection::draw(Editor& editor, bool live) {
+void SelectionSection::draw(Editor& editor) {
     EditSettings& settings = editor.settings;
     ImGui::PushID("selection");
     const EditSnapshot& now = editor.snapshot();
@@ -70,7 +70,7 @@ void SelectionSection::draw(Editor& editor, bool live) {
     ui::slider(say::kTolerance, settings.tolerance, 0, 1, "%.2f");
     draw_shape(editor);
     draw_growth(editor);
-    change_states(editor, live);
+    change_states(editor);
     ImGui::PopID();
 }
 
