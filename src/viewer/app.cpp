@@ -120,7 +120,7 @@ void App::run() {
     const Startup& startup = state_.startup;
     if (startup.verbose) loop.times.print(shown_.renders.shown().get());
     if (state_.scripted() && !loop.done)
-        throw RunError("the window was closed before " + startup.picture->string() + " was written");
+        throw RunError("the window was closed before " + startup.picture.string() + " was written");
 }
 
 /// How long to wait for input, in seconds.

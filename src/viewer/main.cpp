@@ -42,8 +42,7 @@ enum ExitStatus { kDone = 0, kFailed = 1, kWrongUse = 2 };
 constexpr int kLargestSide = 16384;  // px
 
 struct Arguments {
-    std::filesystem::path path, cameras, picture, views, film, output;
-    std::optional<size_t> budget;
+    std::filesystem::path path, cameras, views, output;
     struct {
         std::string address, token;
         std::filesystem::path token_file;
@@ -126,19 +125,18 @@ OpenedScene open_what(const Arguments& arguments, Startup& startup) {
                               live::find_token(arguments.connect.token, arguments.connect.token_file)};
         const std::filesystem::path& what = arguments.path.empty() ? arguments.cameras : arguments.path;
         OpenedScene scene =
-            what.empty() ? OpenedScene() : open_scene(what, {}, arguments.budget.value_or(kUsualBudget));
+            what.empty() ? OpenedScene() : open_scene(what, {}, startup.budget.value_or(kUsualBudget));
         scene.title = arguments.connect.address;
         return scene;
     }
     if (arguments.path.empty()) {
-        if (arguments.train || !arguments.cameras.empty() || !arguments.picture.empty() ||
-            !arguments.film.empty())
+        if (arguments.train || !arguments.cameras.empty() || !startup.picture.empty() ||
+            !startup.film.empty())
             throw InputError("PATH is required: splats, a dataset, or a run's folder (see ewa-view --help)");
         return {};  // files are dropped on the window
     }
-    OpenedScene scene =
-        open_scene(arguments.path, arguments.cameras, arguments.budget.value_or(kUsualBudget));
-    if (!scene.photos.empty() && (!arguments.picture.empty() || !arguments.film.empty()))
+    OpenedScene scene = open_scene(arguments.path, arguments.cameras, startup.budget.value_or(kUsualBudget));
+    if (!scene.photos.empty() && (!startup.picture.empty() || !startup.film.empty()))
         throw InputError(arguments.path.string() +
                          " has no cameras yet; ewa cameras finds them, and so does the window");
     if (arguments.train) {
@@ -160,7 +158,7 @@ OpenedScene open_what(const Arguments& arguments, Startup& startup) {
         }
         const auto now = std::filesystem::file_time_type::clock::now();
         startup.watch = live::WhatToWatch{output_of(arguments), {}, {}, now, now};
-    } else if (!scene.run.empty() && arguments.picture.empty() && arguments.film.empty()) {
+    } else if (!scene.run.empty() && startup.picture.empty() && startup.film.empty()) {
         startup.watch = live::WhatToWatch{scene.run, {}, {}, scene.splats_time};
     }
     return scene;
@@ -169,10 +167,10 @@ OpenedScene open_what(const Arguments& arguments, Startup& startup) {
 /// Checks the files of a screenshot or a film against the inputs, and creates their folder.
 void prepare_outputs(const CLI::App& command, const Startup& startup) {
     auto [written, read] = options::typed_files(command);
-    if (startup.film) {
+    if (!startup.film.empty()) {
         const FilmPath film(startup.views, double(startup.settings.film_seconds));
         for (int i = 0; i < film.frames(image::kFilmRate); ++i)
-            written.push_back({"--film", frame_file(*startup.film, i)});
+            written.push_back({"--film", frame_file(startup.film, i)});
     }
     if (written.empty()) return;
     if (startup.scene.dataset) {
@@ -182,29 +180,22 @@ void prepare_outputs(const CLI::App& command, const Startup& startup) {
     for (const char* name : folders::kRunFiles)
         if (!startup.scene.run.empty()) read.push_back({"a file of the run", startup.scene.run / name});
     core::check_outputs(written, read);
-    core::make_folder(startup.film ? *startup.film : startup.picture->parent_path());
+    core::make_folder(startup.film.empty() ? startup.picture.parent_path() : startup.film);
 }
 
 Startup open(const Arguments& arguments) {
     Startup startup = arguments.startup;
-    startup.budget = arguments.budget;
     startup.settings.look.mode = core::find_value(kModes, arguments.mode).value_or(Mode::color);
     startup.settings.comparison =
         core::find_value(kComparisons, arguments.comparison).value_or(Comparison::none);
     if (!arguments.size.empty()) startup.size = parse_size(arguments.size);
-    if (!arguments.picture.empty()) {
-        if (core::lower(arguments.picture.extension().string()) != ".png")
-            throw InputError("--screenshot " + arguments.picture.string() + ": the name must end in .png");
-        startup.picture = arguments.picture;
-    }
+    if (!startup.picture.empty() && core::lower(startup.picture.extension().string()) != ".png")
+        throw InputError("--screenshot " + startup.picture.string() + ": the name must end in .png");
     if (!arguments.views.empty()) startup.views = io::read_views(arguments.views);
     for (io::NamedView& view : startup.views)
         if (arguments.evenly) view.time.reset();
-    if (!arguments.film.empty()) {
-        if (startup.views.empty())
-            throw InputError("--film needs --views FILE with the views to pass through");
-        startup.film = arguments.film;
-    }
+    if (!startup.film.empty() && startup.views.empty())
+        throw InputError("--film needs --views FILE with the views to pass through");
     startup.scene = open_what(arguments, startup);
     startup.device.selector = arguments.device.selector;
     startup.frame = frame_of(arguments.frame, startup.scene.dataset.get());
@@ -228,7 +219,7 @@ void take_settings(const CLI::App& app, Arguments& arguments) {
     Startup& startup = arguments.startup;
     startup.settings.train_steps = RunOptions().train.steps;
     arguments.evenly = app.count("--film-seconds") > 0;
-    if (!arguments.picture.empty() || !arguments.film.empty()) return;
+    if (!startup.picture.empty() || !startup.film.empty()) return;
     KeptSettings kept = read_settings(settings_file());
     if (arguments.evenly) kept.film_seconds = startup.settings.film_seconds;
     static_cast<KeptSettings&>(startup.settings) = kept;
@@ -256,11 +247,11 @@ void add_options(CLI::App& app, Arguments& arguments) {
     options::add(app, "compare", arguments.comparison);
     options::add(app, "background", arguments.background);
     options::add(app, "kernel", arguments.kernel);
-    options::add(app, "budget", arguments.budget);
+    options::add(app, "budget", startup.budget.value_or(kUsualBudget));
     options::add(app, "size", arguments.size);
-    options::add(app, "screenshot", arguments.picture);
+    options::add(app, "screenshot", startup.picture);
     options::add(app, "views", arguments.views);
-    options::add(app, "film", arguments.film);
+    options::add(app, "film", startup.film);
     options::add(app, "film-seconds", startup.settings.film_seconds);
     if (const char* named = std::getenv("EWA_DEVICE")) arguments.device.selector = named;
     options::add(app, "device", arguments.device.selector);
@@ -270,7 +261,7 @@ void add_options(CLI::App& app, Arguments& arguments) {
 
 /// Shows the window, and remembers its settings for the next session.
 void show(Startup& startup) {
-    if (startup.picture) return App(startup).run();
+    if (!startup.picture.empty()) return App(startup).run();
     App app(startup);
     app.run();
     write_settings(settings_file(), app.kept());
@@ -297,7 +288,7 @@ int run(const CLI::App& app, const Arguments& arguments) {
         startup.open_device = [options = arguments.device, first] {
             return *first ? std::exchange(*first, nullptr) : open_device(options);
         };
-        if (startup.film || (startup.picture && !has_desktop()))
+        if (!startup.film.empty() || (!startup.picture.empty() && !has_desktop()))
             write_without_window(startup);
         else
             show(startup);

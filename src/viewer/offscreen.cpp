@@ -18,7 +18,7 @@ bool has_desktop() {
 }
 
 void write_without_window(const Startup& startup) {
-    if (startup.picture && startup.settings.comparison != Comparison::none)
+    if (!startup.picture.empty() && startup.settings.comparison != Comparison::none)
         throw InputError("--compare needs a desktop session; ewa render and ewa compare do not");
     const Size size = startup.size.value_or(camera_size_or_usual(startup));
     std::atomic<uint64_t> news = 0;
@@ -31,17 +31,16 @@ void write_without_window(const Startup& startup) {
     const auto write = [&](const Camera& camera, const std::filesystem::path& file) {
         asked = thread.ask_extra({.camera = camera, .look = startup.settings.look, .file = file});
     };
-    if (startup.picture) {
+    if (!startup.picture.empty()) {
         const ViewCamera view(start_view(startup.scene, startup.frame, startup.size.value_or(kUsualSize)));
-        write(view.camera(size.width, size.height), *startup.picture);
+        write(view.camera(size.width, size.height), startup.picture);
     }
-    if (startup.film) {
+    if (!startup.film.empty()) {
         const FilmPath film(startup.views, double(startup.settings.film_seconds));
         const int frames = film.frames(image::kFilmRate);
-        core::make_folder(*startup.film);
+        core::make_folder(startup.film);
         for (int i = 0; i < frames; ++i)
-            write(scene::fitted(film.frame(i, frames), size.width, size.height),
-                  frame_file(*startup.film, i));
+            write(scene::fitted(film.frame(i, frames), size.width, size.height), frame_file(startup.film, i));
     }
     for (uint64_t seen = 0, done = 0; done < asked;) {
         news.wait(seen);

@@ -201,8 +201,8 @@ void ViewSession::start_training(const std::vector<std::string>& options,
 
 void ViewSession::save(Image&& image) {
     state_.loop.capture = false;
-    if (const auto& picture = state_.startup.picture) {
-        save_image(*picture, image);
+    if (state_.scripted()) {
+        save_image(state_.startup.picture, image);
         state_.loop.done = true;
         return;
     }

@@ -12,7 +12,7 @@ namespace {
 Size initial_size(const Startup& startup, const WindowSystem& system) {
     if (startup.size) return *startup.size;
     const Size picture = camera_size_or_usual(startup);
-    if (startup.picture) return picture;
+    if (!startup.picture.empty()) return picture;
     const Size desktop = system.work_area();
     const double scale = double(system.scale());
     if (startup.settings.window) {
@@ -55,11 +55,11 @@ std::filesystem::path free_name(const std::string& stem, const std::string& exte
 
 ViewState::ViewState(const Startup& asked)
     : startup(asked),
-      window(system, window_title(asked.scene), initial_size(asked, system), !asked.picture),
+      window(system, window_title(asked.scene), initial_size(asked, system), asked.picture.empty()),
       scene(asked.scene),
       settings(asked.settings),
       device_name(asked.device.name),
-      loop{.capture = asked.picture.has_value(), .times = asked.times} {}
+      loop{.capture = !asked.picture.empty(), .times = asked.times} {}
 
 void ViewState::say(const std::string& note, bool until_edit) {
     message.say(note, until_edit);

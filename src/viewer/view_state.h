@@ -50,11 +50,11 @@ struct PanelSettings : KeptSettings {
 /// The options of the command line.
 struct Startup {
     OpenedScene scene;
-    std::optional<int> frame;                      // of the dataset
-    std::optional<Size> size;                      // of the window, px
-    std::optional<std::filesystem::path> picture;  // write this screenshot, then exit
-    std::optional<std::filesystem::path>
-        film;  // write a film through `views` into this folder, without a window
+    std::optional<int> frame;       // of the dataset
+    std::optional<Size> size;       // of the window, px
+    std::filesystem::path picture;  // write this screenshot, then exit; empty: none
+    std::filesystem::path
+        film;  // write a film through `views` into this folder, without a window; empty: none
     std::vector<io::NamedView> views;
     std::optional<size_t> budget;  // most splats to draw while the view changes
     PanelSettings settings;
@@ -95,7 +95,7 @@ struct ViewState {
     ViewState(const ViewState&) = delete;
     ViewState& operator=(const ViewState&) = delete;
 
-    bool scripted() const { return startup.picture.has_value(); }
+    bool scripted() const { return !startup.picture.empty(); }
     void redraw(int frames = 1) { loop.redraws = std::max(loop.redraws, frames); }
     void say(const std::string& note, bool until_edit = false);  // as Message::say
     double text_height() const;                                  // px of the framebuffer

@@ -92,7 +92,7 @@ Editor::Editor(fs::path program, std::function<void()> wake, size_t budget)
     : program_(std::move(program)), wake_(std::move(wake)), worker_(wake_, budget) {}
 
 void Editor::set_budget(size_t budget) {
-    worker_->set_budget(budget);
+    worker_.set_budget(budget);
 }
 
 bool EditedScene::as_opened() const {
