@@ -55,7 +55,6 @@ App::App(const Startup& startup)
       tools_(state_, navigation_, shown_, editor_),
       dialogs_(state_, editor_, session_.dialog),
       film_(state_, navigation_, shown_, dialogs_, session_.dialog) {
-    dialogs_.views_file = [this] { return film_.views_file(); };
     change_text();
     state_.loop.last_frame = Clock::now();
     state_.message.hint();

@@ -272,15 +272,15 @@ Dialogs::Dialogs(ViewState& state, Editor& editor, FileDialog& files)
     : state_(state), editor_(editor), files_(files), publish_(editor, files, state.wake) {}
 
 void Dialogs::save() {
-    if (editor_.scenes() == 0) return state_.say(texts::files::kNothingToSave);
-    if (editor_.saving()) return state_.say(texts::files::kStillSaving);
-    if (last_.file.empty() || last_.original != scene().file || last_.name != scene().name) return save_as();
+    if (editor_.scenes() == 0 || editor_.saving() || last_.file.empty() || last_.original != scene().file ||
+        last_.name != scene().name)
+        return save_as();
     write(last_.file, last_.all);
 }
 
-void Dialogs::publish() {
+void Dialogs::publish(const fs::path& views) {
     if (editor_.scenes() == 0) return state_.say(texts::files::kNothingToSave);
-    publish_.begin(views_file ? views_file() : fs::path());
+    publish_.begin(views);
     shown_ = &Dialogs::draw_publish;
 }
 

@@ -20,9 +20,8 @@ class Dialogs {
 
     void save();     // to the file that was saved last; the first time as save_as()
     void save_as();  // format, what it loses, file
-    void publish();  // page, SOG, streamed levels
-    /// The views file of the film's keys, for a page; empty: there are none. May be null. publish() calls it.
-    std::function<std::filesystem::path()> views_file;
+    /// Page, SOG, streamed levels. views: the file of the film's keys, for a page; empty: there are none.
+    void publish(const std::filesystem::path& views);
     /// Asks whether to save unsaved work, in place of another dialog, then calls `go_on`, unless the user cancels. Waits for edits
     /// and a save that are on their way. Calls it at once if there are none, and no unsaved work.
     void leave(std::function<void()> go_on);

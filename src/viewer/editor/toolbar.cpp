@@ -161,7 +161,8 @@ BarButtons top_buttons(const BarParts& parts) {
             {Icon::clean, texts::kClean, clean, splats, false, true},
             {Icon::film, texts::kFilm, [&parts] { parts.film.shown = !parts.film.shown; },
              splats || parts.film.shown, parts.film.shown},
-            {Icon::publish, texts::kPublish, [&parts] { parts.dialogs.publish(); }, splats},
+            {Icon::publish, texts::kPublish, [&parts] { parts.dialogs.publish(parts.film.views_file()); },
+             splats},
             {Icon::picture, texts::kPicture, [&parts] { parts.film.open_picture(); }}};
 }
 
