@@ -247,7 +247,7 @@ void add_options(CLI::App& app, Arguments& arguments) {
     options::add(app, "compare", arguments.comparison);
     options::add(app, "background", arguments.background);
     options::add(app, "kernel", arguments.kernel);
-    options::add(app, "budget", startup.budget.value_or(kUsualBudget));
+    options::add(app, "budget", startup.budget);
     options::add(app, "size", arguments.size);
     options::add(app, "screenshot", startup.picture);
     options::add(app, "views", arguments.views);
