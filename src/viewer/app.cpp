@@ -238,9 +238,8 @@ void App::draw_overlays() {
     const OpenedScene& scene = state_.scene;
     navigation_.pointed_camera.reset();
     if (settings.cameras && scene.dataset)
-        navigation_.pointed_camera =
-            draw_cameras({*scene.dataset, scene.supports, shown_.camera(), places.rendering,
-                          navigation_.camera_size, navigation_.at_camera});
+        navigation_.pointed_camera = draw_cameras(scene, shown_.camera(), places.rendering,
+                                                  navigation_.camera_size, navigation_.at_camera);
     shown_.set_measuring(settings.measure);
     if (editor_.scenes() > 0) tools_.draw();
     draw_measurement(shown_.measurement, shown_.camera(), places.rendering);

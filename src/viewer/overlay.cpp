@@ -38,16 +38,18 @@ void grip(ImDrawList& list, const ImVec2& at, float radius) {
     }
 }
 
-std::optional<int> pointed_at(const CamerasShown& cameras) {
+/// The frame whose camera is under the pointer.
+std::optional<int> pointed_at(const std::vector<Frame>& frames, const Camera& view, const Rectangle& place,
+                              std::optional<int> at_camera) {
     if (ImGui::GetIO().WantCaptureMouse) return std::nullopt;
     const ImVec2 mouse = ImGui::GetIO().MousePos;
     std::optional<int> nearest;
     float least = kGrab;
-    for (size_t i = 0; i < cameras.dataset.frames.size(); ++i) {
-        if (int(i) == cameras.at_camera) continue;
-        const auto pixel = projected(cameras.dataset.frames[i].camera.position(), cameras.view);
+    for (size_t i = 0; i < frames.size(); ++i) {
+        if (int(i) == at_camera) continue;
+        const auto pixel = projected(frames[i].camera.position(), view);
         if (!pixel) continue;
-        const ImVec2 at = gui_point(pixel->x + cameras.place.x, pixel->y + cameras.place.y);
+        const ImVec2 at = gui_point(pixel->x + place.x, pixel->y + place.y);
         const float distance = std::hypot(at.x - mouse.x, at.y - mouse.y);
         if (!(distance < least)) continue;
         least = distance;
@@ -107,16 +109,17 @@ bool begin_card(const char* name, const Rectangle& area, float at) {
                             ImGuiWindowFlags_NoFocusOnAppearing);
 }
 
-std::optional<int> draw_cameras(const CamerasShown& cameras) {
+std::optional<int> draw_cameras(const OpenedScene& scene, const Camera& view, const Rectangle& place,
+                                double size, std::optional<int> at_camera) {
     ImDrawList& list = *ImGui::GetBackgroundDrawList();
-    const Rectangle& place = cameras.place;
     list.PushClipRect(gui_point(place.x, place.y), gui_point(place.x + place.width, place.y + place.height));
-    const std::optional<int> pointed = pointed_at(cameras);
-    for (size_t i = 0; i < cameras.dataset.frames.size(); ++i) {
-        if (int(i) == cameras.at_camera) continue;
+    const std::vector<Frame>& frames = scene.dataset->frames;
+    const std::optional<int> pointed = pointed_at(frames, view, place, at_camera);
+    for (size_t i = 0; i < frames.size(); ++i) {
+        if (int(i) == at_camera) continue;
         const bool here = int(i) == pointed;
-        for (const Segment& segment : frustum_segments(cameras.dataset.frames[i].camera, cameras.size)) {
-            const auto line = projected(segment, cameras.view);
+        for (const Segment& segment : frustum_segments(frames[i].camera, size)) {
+            const auto line = projected(segment, view);
             if (!line) continue;
             list.AddLine(gui_point((*line)[0].x + place.x, (*line)[0].y + place.y),
                          gui_point((*line)[1].x + place.x, (*line)[1].y + place.y),
@@ -126,9 +129,9 @@ std::optional<int> draw_cameras(const CamerasShown& cameras) {
     list.PopClipRect();
     if (pointed) {
         const ImVec2 mouse = ImGui::GetIO().MousePos;
-        std::string text = cameras.dataset.frames[size_t(*pointed)].name;
-        if (!cameras.supports.empty())
-            text += "\n" + support_text(cameras.dataset, cameras.supports[size_t(*pointed)]);
+        std::string text = frames[size_t(*pointed)].name;
+        if (!scene.supports.empty())
+            text += "\n" + support_text(*scene.dataset, scene.supports[size_t(*pointed)]);
         label(*ImGui::GetForegroundDrawList(), {mouse.x + 14, mouse.y + 10}, text.c_str());
     }
     return pointed;

@@ -7,10 +7,10 @@
 #include <string>
 
 #include "ewa/capture.h"
-#include "ewa/dataset.h"
 #include "viewer/file_dialog.h"
 #include "viewer/layout.h"
 #include "viewer/measurement.h"
+#include "viewer/opening.h"
 
 struct ImVec2;
 
@@ -25,17 +25,11 @@ bool begin_card(const char* name, const Rectangle& area, float at);
 /// The list of keys. A click outside closes it.
 void draw_help(bool& open);
 
-struct CamerasShown {
-    const Dataset& dataset;
-    const std::vector<CameraSupport>& supports;  // of its frames; empty: unknown
-    const Camera& view;                          // of the size of `place`
-    Rectangle place;                             // of the render in the window, px
-    double size = 1;                             // of a frustum, world units
-    std::optional<int> at_camera;  // not drawn: the frustum of the view's own camera would frame the image
-};
-
-/// Draws the frustum of each camera. Returns the frame whose camera is under the pointer, and shows its name and support.
-std::optional<int> draw_cameras(const CamerasShown& cameras);
+/// Draws the frustum of each camera of the scene's dataset but that of `at_camera`, whose own would frame the image. size: of a
+/// frustum, world units. view: of the size of `place` (px of the window). Returns the frame whose camera is under the pointer, and shows its
+/// name and support.
+std::optional<int> draw_cameras(const OpenedScene& scene, const Camera& view, const Rectangle& place,
+                                double size, std::optional<int> at_camera);
 
 /// Marks the points that are measured, with their distance. view: of the size of `place`.
 void draw_measurement(const Measurement& measurement, const Camera& view, const Rectangle& place);
