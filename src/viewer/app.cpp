@@ -22,7 +22,6 @@
 #include "viewer/editor/texts.h"
 #include "viewer/editor/toolbar.h"
 #include "viewer/latest.h"
-#include "viewer/panel.h"
 
 namespace ewa::viewer {
 namespace {
@@ -221,13 +220,8 @@ void App::handle_mouse() {
 }
 
 void App::panel() {
-    std::function<void()> rows = [this] { edit_panel_.draw(editor_, state_); };
-    if (editor_.scenes() == 0) rows = nullptr;
     const float text = state_.settings.text_scale;
-    const EditSnapshot& edited = editor_.snapshot();
-    const size_t splats =
-        editor_.scenes() > 0 && edited.splats ? edited.left : state_.scene.gaussians->size();
-    draw_panel({state_, navigation_, shown_, session_, film_.shown, splats}, rows);
+    draw_panel(parts_);
     // The row that changes it stays in view.
     if (state_.settings.text_scale != text) state_.panel_beside = state_.panel_over = true;
 }
@@ -448,7 +442,7 @@ void App::draw_editor() {
     if (editor_.settings.tool != last_tool_ && editor_.settings.tool != Tool::view)
         state_.settings.tab = PanelTab::edit;
     last_tool_ = editor_.settings.tool;
-    if (state_.bars_shown()) draw_bars({state_, editor_, dialogs_, film_, session_.dialog, edit_panel_});
+    if (state_.bars_shown()) draw_bars(parts_);
 }
 
 bool App::present(ImDrawData* drawn, Image* capture) {

@@ -3,16 +3,9 @@
 #pragma once
 #include <memory>
 
-#include "viewer/editor/dialogs.h"
-#include "viewer/editor/edit_panel.h"
-#include "viewer/editor/editor.h"
-#include "viewer/editor/timeline.h"
 #include "viewer/editor/tools.h"
-#include "viewer/navigation.h"
+#include "viewer/panel.h"
 #include "viewer/screen.h"
-#include "viewer/shown.h"
-#include "viewer/view_session.h"
-#include "viewer/view_state.h"
 
 namespace ewa::viewer {
 
@@ -64,6 +57,7 @@ class App {
     EditPanel edit_panel_;
     Dialogs dialogs_;
     FilmStrip film_;
+    const WindowParts parts_{state_, navigation_, shown_, session_, editor_, edit_panel_, dialogs_, film_};
     std::shared_ptr<const Gaussians> entered_,
         drawn_;                     // the scene that is edited, and what of it the render thread has
     std::filesystem::path opened_;  // the last file that was remembered

@@ -8,7 +8,6 @@
 #include <cfloat>
 #include <cmath>
 #include <cstdio>
-#include <functional>
 #include <string>
 
 #include "core/text.h"
@@ -30,11 +29,13 @@ const std::array kAxes{Axis{"-y", {0, -1, 0}}, Axis{"+y", {0, 1, 0}}, Axis{"+z",
                        Axis{"-z", {0, 0, -1}}, Axis{"+x", {1, 0, 0}}, Axis{"-x", {-1, 0, 0}}};
 
 /// What is open, in two lines.
-void show_title(const PanelParts& parts) {
+void show_title(const WindowParts& parts) {
     const OpenedScene& scene = parts.state.scene;
     ImGui::TextUnformatted(scene.title.c_str());
     const char* what = scene.points ? "point" : "splat";
-    std::string text = core::grouped(parts.splats, what);
+    const EditSnapshot& edited = parts.editor.snapshot();
+    const bool edits = parts.editor.scenes() > 0 && edited.splats;
+    std::string text = core::grouped(edits ? edited.left : scene.gaussians->size(), what);
     if (const RenderedFrame* picture = parts.picture(); picture && picture->skipped_nonfinite > 0)
         text += ", " + core::grouped(picture->skipped_nonfinite) + " not finite";
     ImGui::TextDisabled("%s", text.c_str());
@@ -59,7 +60,7 @@ void edit_background(const RenderedFrame* picture, Look& look) {
         ImGui::Text("red to white: %.0f", double(picture->picture.white));
 }
 
-void edit_look(const PanelParts& parts) {
+void edit_look(const WindowParts& parts) {
     PanelSettings& settings = parts.state.settings;
     Look& look = settings.look;
     int mode = int(look.mode);
@@ -102,7 +103,7 @@ void choose_up(ViewCamera& view) {
     ImGui::EndCombo();
 }
 
-std::string comparison_text(const PanelParts& parts) {
+std::string comparison_text(const WindowParts& parts) {
     if (std::string failure = parts.shown.image_failure(); !failure.empty()) return failure;
     if (!parts.navigation.at_camera) return "G: go to the nearest camera";
     const std::optional<double> psnr = parts.shown.psnr();
@@ -114,7 +115,7 @@ std::string comparison_text(const PanelParts& parts) {
     return text.data();
 }
 
-void edit_cameras(const PanelParts& parts) {
+void edit_cameras(const WindowParts& parts) {
     PanelSettings& settings = parts.state.settings;
     Navigation& navigation = parts.navigation;
     const int last = int(parts.state.scene.dataset->frames.size()) - 1;
@@ -141,7 +142,7 @@ void edit_cameras(const PanelParts& parts) {
     draw_text_box("comparison", comparison_text(parts), 2, 2);
 }
 
-void edit_views(const PanelParts& parts) {
+void edit_views(const WindowParts& parts) {
     Navigation& navigation = parts.navigation;
     std::vector<io::NamedView>& views = navigation.views;
     if (ImGui::Button("Save this view")) navigation.add_view({});
@@ -157,7 +158,7 @@ void edit_views(const PanelParts& parts) {
     if (views.empty()) return;
     if (ImGui::Button("Write to a file")) navigation.write_views();
     ImGui::SameLine();
-    if (ImGui::Button("Film")) parts.film = !parts.film;
+    if (ImGui::Button("Film")) parts.film.shown = !parts.film.shown;
 }
 
 void cells(const char* name, const char* format, double value) {
@@ -177,7 +178,7 @@ void show_times(const RenderedFrame& picture, const SessionTimes& times) {
     ImGui::EndTable();
 }
 
-void show_details(const PanelParts& parts) {
+void show_details(const WindowParts& parts) {
     const OpenedScene& scene = parts.state.scene;
     const RenderedFrame* picture = parts.picture();
     if (picture) {
@@ -219,7 +220,7 @@ void choose_window(PanelSettings& settings) {
     if (ImGui::Combo("##theme", &theme, texts::kThemes)) settings.light = theme == 1;
 }
 
-void draw_rows(const PanelParts& parts) {
+void draw_rows(const WindowParts& parts) {
     const OpenedScene& scene = parts.state.scene;
     show_title(parts);
     ImGui::PushItemWidth(ImGui::GetTextLineHeight() * 9.5f);
@@ -262,7 +263,7 @@ bool footer_button(const char* name, const char* explanation) {
     return clicked;
 }
 
-void draw_footer(const PanelParts& parts, const std::string& note) {
+void draw_footer(const WindowParts& parts, const std::string& note) {
     draw_text_box("note", note, 0, kNoteLines);
     if (footer_button("Whole scene", "From the front (F, if nothing is selected)"))
         parts.navigation.show_whole_scene();
@@ -345,7 +346,7 @@ glm::dvec3 next_up(const glm::dvec3& up) {
     return kAxes[0].axis;
 }
 
-void draw_panel(const PanelParts& parts, const std::function<void()>& edit_rows) {
+void draw_panel(const WindowParts& parts) {
     ViewState& state = parts.state;
     const Rectangle place = state.panel_area();
     // The last message, after the picture no longer shows it.
@@ -363,15 +364,16 @@ void draw_panel(const PanelParts& parts, const std::function<void()>& edit_rows)
     const bool open = ImGui::Begin("panel", nullptr, kFlags);
     ImGui::PopStyleVar(2);
     if (open) {
-        if (edit_rows) draw_tabs(state.settings.tab);
-        const bool editing = edit_rows && state.settings.tab == PanelTab::edit;
+        const bool tabs = parts.editor.scenes() > 0;
+        if (tabs) draw_tabs(state.settings.tab);
+        const bool editing = tabs && state.settings.tab == PanelTab::edit;
         // In a low window the footer scrolls with the rows.
         const float footer = footer_height(note);
         const bool low = height < 3 * footer;
         ImGui::BeginChild(editing ? "edits" : "rows", ImVec2(0, low ? 0 : -footer));
         keep_rows(editing ? PanelTab::edit : PanelTab::view);
         if (editing)
-            edit_rows();
+            parts.edits.draw(parts.editor, state);
         else
             draw_rows(parts);
         if (low) draw_footer(parts, note);

@@ -1,30 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
 // The panel at the left of the window.
 #pragma once
-#include <functional>
 #include <string>
 
+#include "viewer/editor/edit_panel.h"
+#include "viewer/editor/timeline.h"
 #include "viewer/view_session.h"
 
 namespace ewa::viewer {
 
-/// What the panel shows and changes.
-struct PanelParts {
+/// What the panel and the bars show and change.
+struct WindowParts {
     ViewState& state;
     Navigation& navigation;
     Shown& shown;
     ViewSession& session;
-    bool& film;     // the strip of the film is shown
-    size_t splats;  // or points, after edits
+    Editor& editor;
+    EditPanel& edits;
+    Dialogs& dialogs;
+    FilmStrip& film;
 
     const RenderedFrame* picture() const { return shown.renders.shown().get(); }  // null: none yet
 };
 
-/// edit_rows: draws the tab "Edit"; empty: there are no tabs.
-void draw_panel(const PanelParts& parts, const std::function<void()>& edit_rows);
+void draw_panel(const WindowParts& parts);
 
 /// The section of a training run, or of a dataset that one can be started on. Part of draw_panel().
-void draw_training(const PanelParts& parts);
+void draw_training(const WindowParts& parts);
 
 /// Draws a label. The next item gets the rest of the line.
 void label_field(const char* label);

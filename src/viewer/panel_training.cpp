@@ -96,7 +96,7 @@ void show_curves(const live::Status& status) {
     plot("held-out PSNR", psnr, "held-out PSNR %.2f dB");
 }
 
-void choose_training(const PanelParts& parts) {
+void choose_training(const WindowParts& parts) {
     int& chosen = parts.state.settings.train_steps;
     std::vector<std::string> texts;
     std::string present = core::grouped(uint64_t(chosen), "step");
@@ -128,7 +128,7 @@ void draw_commands(const live::Update& run, LiveRun& live_run) {
     ImGui::EndDisabled();
 }
 
-std::string remark_of(const PanelParts& parts, const live::Update& run) {
+std::string remark_of(const WindowParts& parts, const live::Update& run) {
     if (!run.problem.empty()) return run.problem;
     if (has_trained(run)) return how_to_share(parts.session.live_run.folder());
     if (run.status.state == live::State::done) return "";
@@ -140,7 +140,7 @@ std::string remark_of(const PanelParts& parts, const live::Update& run) {
 
 }  // namespace
 
-void draw_training(const PanelParts& parts) {
+void draw_training(const WindowParts& parts) {
     LiveRun& live_run = parts.session.live_run;
     if (!live_run.update()) return choose_training(parts);
     const live::Update& run = *live_run.update();

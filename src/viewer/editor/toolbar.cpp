@@ -142,7 +142,7 @@ void choose_save(Dialogs& dialogs) {
     ImGui::EndPopup();
 }
 
-BarButtons top_buttons(const BarParts& parts) {
+BarButtons top_buttons(const WindowParts& parts) {
     const Editor& editor = parts.editor;
     const EditSnapshot& now = editor.snapshot();
     const bool splats = now.left > 0, can_save = editor.scenes() > 0 && !editor.saving();
@@ -152,9 +152,9 @@ BarButtons top_buttons(const BarParts& parts) {
     const auto clean = [&parts] {
         parts.state.panel_wanted() = true;
         parts.state.settings.tab = PanelTab::edit;
-        parts.panel.show_cleaning();
+        parts.edits.show_cleaning();
     };
-    return {{Icon::open, texts::kOpenFile, [&parts] { parts.files.ask(Wanted::file); }},
+    return {{Icon::open, texts::kOpenFile, [&parts] { parts.session.dialog.ask(Wanted::file); }},
             {Icon::save, texts::kSave, save, can_save, false, false, menu, editor.unsaved()},
             {Icon::undo, texts::kUndo, [&parts] { parts.editor.undo(); }, now.done > 0, false, true},
             {Icon::redo, texts::kRedo, [&parts] { parts.editor.redo(); }, now.done < now.steps.size()},
@@ -174,7 +174,7 @@ void draw_busy(const ImVec2& low, const ImVec2& high) {
                                               {std::min(high.x, from + 0.3f * width), high.y}, accent());
 }
 
-void draw_top(const BarParts& parts, const BarArea& area) {
+void draw_top(const WindowParts& parts, const BarArea& area) {
     const ImVec2 high(area.high.x, area.low.y + area.top);
     if (begin_bar("top bar", area.low, high)) {
         ViewState& state = parts.state;
@@ -297,7 +297,7 @@ BarSizes bar_sizes(double text_height) {
     return {pixels(kTopBar), pixels(kStrip), pixels(kStatusLine)};
 }
 
-void draw_bars(const BarParts& parts) {
+void draw_bars(const WindowParts& parts) {
     const BarArea area = bar_area(parts.state.frame_area());
     draw_top(parts, area);
     draw_strip(parts.editor, parts.state.scene.points, area);

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The bar at the upper border, the strip of tools at the left border of the picture, and the status line at the lower border.
 #pragma once
-#include "viewer/editor/edit_panel.h"
-#include "viewer/editor/timeline.h"
+#include "viewer/panel.h"
 
 namespace ewa::viewer {
 
@@ -12,15 +11,6 @@ struct BarSizes {
 };
 BarSizes bar_sizes(double text_height);
 
-/// What the bars show and change.
-struct BarParts {
-    ViewState& state;
-    Editor& editor;
-    Dialogs& dialogs;
-    FilmStrip& film;
-    FileDialog& files;
-    EditPanel& panel;
-};
-void draw_bars(const BarParts& parts);
+void draw_bars(const WindowParts& parts);
 
 }  // namespace ewa::viewer
