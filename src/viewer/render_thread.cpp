@@ -15,15 +15,6 @@ namespace {
 
 constexpr int kProbeSide = 256;  // px of the depth image that a point is read from
 
-RenderOptions options_of(const Look& look) {
-    RenderOptions options{look.background, look.kernel, look.sh_degree};
-    // Spheres have no surfaces of splats.
-    options.points = look.points && look.mode != Mode::median_depth && look.mode != Mode::normal;
-    options.nearest = look.nearest;
-    options.sky = look.sky;
-    return options;
-}
-
 /// The values that the renderer computes for a mode.
 Drawing drawing_for(Mode mode) {
     if (mode == Mode::depth) return Drawing::depth;
@@ -63,6 +54,15 @@ void save(const std::filesystem::path& file, const Rendering& rendering, const B
 }
 
 }  // namespace
+
+RenderOptions options_of(const Look& look) {
+    RenderOptions options{look.background, look.kernel, look.sh_degree};
+    // Spheres have no surfaces of splats.
+    options.points = look.points && look.mode != Mode::median_depth && look.mode != Mode::normal;
+    options.nearest = look.nearest;
+    options.sky = look.sky;
+    return options;
+}
 
 /// The splats that are shown, and their renderers.
 class RenderThread::Scene {

@@ -38,6 +38,9 @@ struct Look {
     bool operator==(const Look&) const = default;
 };
 
+/// How splats are rendered for the look.
+RenderOptions options_of(const Look& look);
+
 struct RenderRequest {
     Camera camera;  // of the size at which the frame is shown
     Look look;

@@ -53,12 +53,7 @@ decltype(edit::Cameras::contradicted) contradicted_by_photos(const OpenedScene& 
         // The run names frames that its dataset lacks.
     }
     if (photos.frames.empty()) return {};
-    const Look& look = scene.look;
-    photos.options.background = look.background;
-    photos.options.kernel = look.kernel;
-    photos.options.points = look.points;
-    photos.options.nearest = look.nearest;
-    photos.options.sky = look.sky;
+    photos.options = options_of(scene.look);
     photos.fit_colors = !scene.appearances.empty();
     return [photos = std::move(photos), open, comparing, last = std::make_shared<LastComparison>()](
                const Gaussians& splats, const std::vector<uint32_t>& left) {
