@@ -48,7 +48,7 @@ inline constexpr const char* kDropExplanation = "or a dataset, or a training run
 inline constexpr const char *kOpenAFile = "Open a file", *kOpenAFolder = "Open a folder", *kRecent = "Recent",
                             *kKeysLine = "F1: keys";
 
-// The tools.
+// The tools, in the order of Tool.
 struct ToolText {
     Tool tool;
     const char *name, *key, *hint;  // hint: the tooltip, and the status line while the tool is active

@@ -239,9 +239,7 @@ std::string status_text(const Editor& editor) {
     }
     if (!editor.settings.progress.empty()) return editor.settings.progress;
     if (!last.text.empty() && ImGui::GetTime() < last.until) return last.text;
-    for (const texts::ToolText& tool : texts::kTools)
-        if (tool.tool == editor.settings.tool) return tool.hint;
-    return "";
+    return texts::kTools[size_t(editor.settings.tool)].hint;
 }
 
 /// The text without its end, if it is wider than this.
