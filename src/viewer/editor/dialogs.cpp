@@ -166,11 +166,7 @@ void Dialogs::draw_save() {
         ImGui::SameLine();
         if (modal_radio(texts::files::kScopeAll, all_)) all_ = true;
     }
-    if (begin_form()) {
-        form_row(texts::files::kFile);
-        path_.draw(&files_);
-        end_form();
-    }
+    if (begin_form(path_, &files_)) end_form();
     const char* save = path_.replaces() ? texts::files::kReplace : texts::files::kSave;
     const Choice choice = draw_choices(save, nullptr, texts::files::kCancel, !path_.path().empty());
     if (choice == Choice::confirm) confirm_save();
@@ -183,11 +179,7 @@ void Dialogs::draw_save() {
 
 bool Dialogs::draw_open(const std::function<void(const fs::path&)>& open) {
     if (!begin_modal(texts::files::kOpenTitle)) return true;
-    if (begin_form()) {
-        form_row(texts::files::kFile);
-        path_.draw(nullptr);
-        end_form();
-    }
+    if (begin_form(path_, nullptr)) end_form();
     std::optional<fs::path> chosen = draw_recent();
     if (chosen) path_.set(*chosen);
     const Choice choice =

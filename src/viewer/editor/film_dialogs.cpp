@@ -94,9 +94,7 @@ bool FilmStrip::end_dialog(const char* names, bool (FilmStrip::*start)()) {
 bool FilmStrip::draw_film_dialog() {
     if (views().empty() || writing()) return false;
     if (!begin_modal(texts::film::kFilmTitle)) return true;
-    if (begin_form()) {
-        form_row(texts::files::kFile);
-        file_.draw(&files_);
+    if (begin_form(file_, &files_)) {
         edit_size(output_.size, state_.picture_area().size());
         int rate = place_of(kFilmRates, output_.rate), codec = place_of(kCodecs, output_.codec);
         if (form_list(texts::film::kRate, kRateNames, rate)) output_.rate = kFilmRates[rate];
@@ -113,9 +111,7 @@ bool FilmStrip::draw_film_dialog() {
 
 bool FilmStrip::draw_picture_dialog() {
     if (!begin_modal(texts::film::kPictureTitle)) return true;
-    if (begin_form()) {
-        form_row(texts::files::kFile);
-        file_.draw(&files_);
+    if (begin_form(file_, &files_)) {
         edit_size(picture_size_, state_.picture_area().size());
         end_form();
     }

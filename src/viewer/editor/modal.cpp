@@ -98,10 +98,12 @@ void reserve(float top, float height) {
     if (rest > 0) ImGui::Dummy(ImVec2(0, rest));
 }
 
-bool begin_form() {
+bool begin_form(PathField& file, FileDialog* files) {
     if (!ImGui::BeginTable("form", 2, ImGuiTableFlags_None, ImVec2(modal_width(), 0))) return false;
     ImGui::TableSetupColumn("label", ImGuiTableColumnFlags_WidthFixed);
     ImGui::TableSetupColumn("field", ImGuiTableColumnFlags_WidthStretch);
+    form_row(texts::files::kFile);
+    file.draw(files);
     return true;
 }
 

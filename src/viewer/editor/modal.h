@@ -36,8 +36,10 @@ bool accent_button(const char* text, float width = 0);
 /// Fills the space down to `height` below `top`, a vertical position of the cursor. What follows stays where it is.
 void reserve(float top, float height);
 
-/// Begins a table of fields with their labels. end_form() follows if it returns true.
-bool begin_form();
+class PathField;
+/// Begins a table of fields with their labels, of which the first is the file. files: as of PathField::draw(). end_form() follows if it
+/// returns true.
+bool begin_form(PathField& file, FileDialog* files);
 /// A row. The next item is its field.
 void form_row(const char* label);
 /// A row with a list of names. chosen: an index, or -1 for a value that has no name. Returns whether it has changed.

@@ -85,9 +85,7 @@ void PublishDialog::draw_form() {
     for (int i = 0; i < int(std::size(kPublishKinds)); ++i)
         if (modal_radio(kPublishKinds[i].name, kind_ == i)) choose(i);
     ImGui::TextDisabled("%s", kPublishKinds[kind_].hint);
-    if (begin_form()) {
-        form_row(texts::files::kFile);
-        path_.draw(&files_);
+    if (begin_form(path_, &files_)) {
         if (format() == SplatFormat::page) {
             form_row(texts::files::kTitle);
             ImGui::InputText("##title", title_.data(), title_.size());
