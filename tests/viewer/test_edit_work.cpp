@@ -275,7 +275,7 @@ TEST_F(EditWork, EditsAnotherFileBesideTheFirst) {
     editor_->add("b.ply", other, std::make_shared<const Gaussians>(load_splats(other)));
     settle(*editor_);
     EXPECT_EQ(left(), 50u);
-    EXPECT_EQ(editor_->splats()->size(), 450u);
+    EXPECT_EQ(editor_->snapshot().drawn->size(), 450u);
     delete_right();
     EXPECT_TRUE(fs::exists(other + ".edits"));
     EXPECT_FALSE(fs::exists(scene_ + ".edits"));
