@@ -70,6 +70,8 @@ class Trainer {
     /// for an index that is too large, or if too few splats would be left.
     EditCounts edit(const SplatEdit& edit);
     uint32_t frozen_splats() const;
+    /// Whether each splat of gaussians() is frozen. Empty if none is.
+    std::vector<bool> frozen() const;
 
     /// The splats, read back from the device, in the dataset's world frame. Their order is the trainer's own.
     Gaussians gaussians() const;

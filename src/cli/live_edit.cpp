@@ -60,25 +60,24 @@ void remove_others(edit::EditedSplats& splats, const edit::Filter& filter) {
 
 }  // namespace
 
-SplatEdit live_edit(const Gaussians& gaussians, const std::string& body) {
+SplatEdit live_edit(const Gaussians& gaussians, const std::vector<bool>& frozen, const std::string& body) {
     edit::EditedSplats splats(std::make_shared<const Gaussians>(gaussians));
-    bool unlocks = false;
+    std::vector<uint8_t> before(splats.size());
+    for (size_t i = 0; i < frozen.size(); ++i) before[i] = frozen[i] ? edit::kLocked : 0;
+    splats.set_states(before);
     for (const auto& [name, edit] : parsed_edits(body)) {
         if (edit.filter)
             remove_others(splats, edit.filter);
         else
             edit::perform_on(splats, edit);
-        unlocks = unlocks || name == "unlock";
     }
     SplatEdit result;
     for (uint32_t i = 0; i < splats.size(); ++i) {
         const uint8_t state = splats.states()[i];
         if ((state & edit::kDeleted) != 0)
             result.remove.push_back(i);
-        else if ((state & edit::kLocked) != 0)
-            result.freeze.push_back(i);
-        else if (unlocks)
-            result.unfreeze.push_back(i);
+        else if (((state ^ before[i]) & edit::kLocked) != 0)
+            (before[i] == 0 ? result.freeze : result.unfreeze).push_back(i);
     }
     return result;
 }

@@ -86,7 +86,8 @@ class TrainObserver::Served {
         report(step, live::State::running);
         for (;;) {
             const auto perform = [&](const std::string& body) {
-                const EditCounts counts = commands.edit(live_edit(trainer.gaussians(), body));
+                const EditCounts counts =
+                    commands.edit(live_edit(trainer.gaussians(), trainer.frozen(), body));
                 return live::EditReply{step.step, step.splats, counts};
             };
             if (server_->perform_edits(perform)) report(step, live::State::running);

@@ -151,6 +151,19 @@ uint32_t agreed(Ranks& ranks, uint32_t own) {
     return uint32_t(ranks.gather(std::span(&word, 1)).front());
 }
 
+/// Keeps the first moments of a state alone.
+struct FirstMoments : train::StateWriter {
+    std::vector<std::byte> bytes;
+    bool taken = false;
+    void begin(const train::StateHead&, size_t) override {}
+    void begin_array(const std::string& name, uint64_t, uint32_t) override {
+        taken = name == portions::name_of(portions::moments1);
+    }
+    void write(std::span<const std::byte> piece) override {
+        if (taken) bytes.insert(bytes.end(), piece.begin(), piece.end());
+    }
+};
+
 /// What rank 0 asks the others to take part in.
 enum class Call : uint64_t { end, wait, step, state, restore, gaussians, render, figures };
 
@@ -266,6 +279,15 @@ EditCounts Trainer::edit(const SplatEdit& edit) {
 }
 uint32_t Trainer::frozen_splats() const {
     return training_->parts.frozen;
+}
+std::vector<bool> Trainer::frozen() const {
+    std::vector<bool> flags(frozen_splats() == 0 ? 0 : splats());
+    if (flags.empty()) return flags;
+    FirstMoments moments;
+    save(moments);
+    const uint32_t planes = pipeline::parameter_planes(training_->portions().sh_degree());
+    for (size_t i = 0; i < flags.size(); ++i) flags[i] = train::is_frozen(moments.bytes, planes, i);
+    return flags;
 }
 Gaussians Trainer::gaussians() const {
     return train::gaussians_of(call(*training_, Call::gaussians).finished());

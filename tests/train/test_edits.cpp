@@ -141,6 +141,10 @@ TEST_P(Edits, FrozenSplatsKeepTheirBytes) {
     EXPECT_EQ(counts.removed, 1u);
     EXPECT_EQ(counts.frozen, every_nth(3, 1).size());
     EXPECT_EQ(trainer->frozen_splats(), counts.frozen);
+    const std::vector<bool> frozen = trainer->frozen();
+    ASSERT_EQ(frozen.size(), trainer->splats());
+    for (size_t i = 0; i < frozen.size(); ++i)
+        EXPECT_EQ(frozen[i], i < 199 && i % 3 == 0) << "a splat before it was removed: " << i;
     const TrainerState begin = trainer->state();
     const uint32_t planes = pipeline::parameter_planes(begin.sh_degree);
     ASSERT_EQ(params_of(begin, true).size(), counts.frozen * planes * portions::kTexelBytes);
@@ -169,6 +173,7 @@ TEST(EditedTrainer, UnfrozenSplatsLearnAgain) {
     const auto trainer = edited_trainer(busy(Strategy::none, 1));
     train_until(*trainer, 5);
     const std::vector<uint32_t> some = every_nth(2, 0);
+    EXPECT_TRUE(trainer->frozen().empty());
     EXPECT_EQ(trainer->edit({.freeze = some}).frozen, some.size());
     EXPECT_EQ(trainer->edit({.freeze = some}).frozen, 0u) << "they are already";
     train_until(*trainer, 10);

@@ -112,7 +112,7 @@ TEST(HostileSelection, IsRefusedWithWhatIsExpected) {
         EXPECT_FALSE(selects(shape));
         expect_error<InputError>([&] { edit::parse("select", shape); }, {part});
         const std::string body = R"({"edits": [["select", ")" + shape + R"("], ["delete"]]})";
-        expect_error<InputError>([&] { cli::live_edit(odd_splats(), body); }, {part});
+        expect_error<InputError>([&] { cli::live_edit(odd_splats(), {}, body); }, {part});
     }
 }
 

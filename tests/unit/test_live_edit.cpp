@@ -27,7 +27,7 @@ Gaussians splats_in_a_row() {
 
 TEST(LiveEdit, RemovesWhatItsFiltersRemove) {
     const auto removed = [](const std::string& edits) {
-        const SplatEdit edit = cli::live_edit(splats_in_a_row(), "{\"edits\": " + edits + "}");
+        const SplatEdit edit = cli::live_edit(splats_in_a_row(), {}, "{\"edits\": " + edits + "}");
         EXPECT_TRUE(edit.freeze.empty() && edit.unfreeze.empty());
         return edit.remove;
     };
@@ -37,16 +37,34 @@ TEST(LiveEdit, RemovesWhatItsFiltersRemove) {
 }
 
 TEST(LiveEdit, DeletesAndLocksSelections) {
-    const auto edit = [](const std::string& edits) {
-        return cli::live_edit(splats_in_a_row(), "{\"edits\": " + edits + "}");
+    const auto edit = [](const std::string& edits, const std::vector<bool>& frozen = {}) {
+        return cli::live_edit(splats_in_a_row(), frozen, "{\"edits\": " + edits + "}");
     };
     const SplatEdit deleted = edit(R"([["select", "x=2.."], ["select", "remove:x=4.."], ["delete"]])");
     EXPECT_EQ(deleted.remove, (std::vector<uint32_t>{2, 3}));
     const SplatEdit locked = edit(R"([["select", "x=..1"], ["lock"], ["select", "invert"], ["delete", ""]])");
     EXPECT_EQ(locked.freeze, (std::vector<uint32_t>{0, 1}));
     EXPECT_EQ(locked.remove, (std::vector<uint32_t>{2, 3, 4}));
-    EXPECT_EQ(edit(R"([["unlock"], ["select", "x=..0"], ["lock"]])").unfreeze,
+    const std::vector<bool> all(5, true);
+    EXPECT_EQ(edit(R"([["unlock"], ["select", "x=..0"], ["lock"]])", all).unfreeze,
               (std::vector<uint32_t>{1, 2, 3, 4}));
+}
+
+/// An edit begins with the splats that earlier ones have frozen.
+TEST(LiveEdit, LeavesFrozenSplats) {
+    const auto edit = [](const std::string& edits) {
+        return cli::live_edit(splats_in_a_row(), {false, true, false, true, false},
+                              "{\"edits\": " + edits + "}");
+    };
+    const SplatEdit deleted = edit(R"([["select", "x=1.."], ["delete"]])");
+    EXPECT_EQ(deleted.remove, (std::vector<uint32_t>{2, 4}));
+    EXPECT_TRUE(deleted.freeze.empty() && deleted.unfreeze.empty());
+    const SplatEdit more = edit(R"([["select", "x=..1"], ["lock"]])");
+    EXPECT_EQ(more.freeze, std::vector<uint32_t>{0}) << "the others are frozen, or not selected";
+    const SplatEdit freed = edit(R"([["unlock"], ["select", "x=3.."], ["delete"]])");
+    EXPECT_EQ(freed.unfreeze, std::vector<uint32_t>{1}) << "no other was frozen";
+    EXPECT_EQ(freed.remove, (std::vector<uint32_t>{3, 4}));
+    EXPECT_EQ(edit(R"([["where", "x=..2"]])").remove, (std::vector<uint32_t>{3, 4})) << "filters take all";
 }
 
 TEST(LiveEdit, RefusesOtherTexts) {
@@ -62,7 +80,7 @@ TEST(LiveEdit, RefusesOtherTexts) {
              {R"({"edits": [["where", "views=2.."]]})", "views"},
              {R"({"edits": [["decimate", "50%"]]})", "--decimate"},
              {R"({"edits": [["transform", "move=1,0,0"]]})", "--transform"}})
-        expect_error<InputError>([&] { cli::live_edit(splats_in_a_row(), body); }, {part});
+        expect_error<InputError>([&] { cli::live_edit(splats_in_a_row(), {}, body); }, {part});
 }
 
 TEST(EditQueue, AnswersWhateverAnEditThrows) {
