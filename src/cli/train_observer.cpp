@@ -93,7 +93,7 @@ class TrainObserver::Served {
             if (server_->perform_edits(perform)) report(step, live::State::running);
             if (server_->wants_splats(step.step)) {
                 const auto start = std::chrono::steady_clock::now();
-                live::Snapshot snapshot{step.step, trainer.gaussians()};
+                live::Snapshot snapshot{step.step, trainer.gaussians(), trainer.frozen()};
                 const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
                 server_->offer(std::move(snapshot), taken.count());
             }

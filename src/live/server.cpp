@@ -99,19 +99,25 @@ void give_text(Response& response, std::string text, const char* type, std::shar
 
 /// As PLY, a few rows at a time: there is no second copy of the splats.
 void give_ply(Response& response, std::shared_ptr<const Snapshot> splats, std::shared_ptr<void> guest) {
-    const std::string header = io::ply_header(splats->gaussians, {});
-    const size_t row = io::ply_row_bytes(splats->gaussians);
+    std::string header = io::ply_header(splats->gaussians, {});
+    const bool frozen = !splats->frozen.empty();
+    if (frozen)
+        header.insert(header.rfind("end_header"), std::string("property float ") + kFrozenProperty + "\n");
+    const size_t row = io::ply_row_bytes(splats->gaussians) + (frozen ? sizeof(float) : 0);
     const size_t size = header.size() + row * splats->gaussians.size();
     response.set_content_provider(
         size, "application/octet-stream",
-        [header, row, splats = std::move(splats), guest = std::move(guest)](size_t from, size_t,
-                                                                            httplib::DataSink& sink) {
+        [header, row, frozen, splats = std::move(splats), guest = std::move(guest)](size_t from, size_t,
+                                                                                    httplib::DataSink& sink) {
             if (from < header.size()) return sink.write(header.data() + from, header.size() - from);
             const size_t first = (from - header.size()) / row;
             const size_t end = std::min(first + kRowsAtOnce, splats->gaussians.size());
             std::vector<float> rows;
             rows.reserve(row / sizeof(float) * (end - first));
-            for (size_t i = first; i < end; ++i) io::append_ply_row(splats->gaussians, i, rows);
+            for (size_t i = first; i < end; ++i) {
+                io::append_ply_row(splats->gaussians, i, rows);
+                if (frozen) rows.push_back(splats->frozen[i] ? 1.0f : 0.0f);
+            }
             return sink.write(reinterpret_cast<const char*>(rows.data()), rows.size() * sizeof(float));
         });
 }
@@ -380,8 +386,6 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
         return given;
     }
 
-    static std::string known_tag(const Request& request) { return request.get_header_value("If-None-Match"); }
-
     /// Names the splats of an answer, or completes one without splats, and then returns false. step: -1 for no splats.
     bool name_splats(const std::string& known, Response& response, int step, uint64_t edits) const {
         std::string tag = "\"" + server_.run_ + "-" + std::to_string(step);
@@ -402,7 +406,7 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
     }
 
     void give_splats(const Request& request, Response& response, bool trusted, std::shared_ptr<void> guest) {
-        const std::string known = known_tag(request);
+        const std::string known = request.get_header_value("If-None-Match");
         const auto splats = splats_for(trusted, known.empty());
         if (name_splats(known, response, splats ? splats->step : -1, splats ? splats->edits : 0))
             give_ply(response, splats, std::move(guest));
@@ -410,7 +414,7 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
 
     /// As the page reads them. They are made on this thread, so the training does not wait.
     void give_scene(const Request& request, Response& response, bool trusted, std::shared_ptr<void> guest) {
-        const std::string known = known_tag(request);
+        const std::string known = request.get_header_value("If-None-Match");
         const auto [options, busy] = page_options();
         auto scene = server_.scenes_.kept(trusted, busy);
         if (!scene)

@@ -3,7 +3,8 @@
 //
 //   GET /status[?metrics=N]  JSON: see status.h. "metrics" are at most kMostLines lines of metrics.jsonl, from
 //                            the N-th on. There are none without ?metrics.
-//   GET /splats              The splats as PLY (io/splats/ply.h). ETag names them, and Ewa-Step is their step.
+//   GET /splats              The splats as PLY (io/splats/ply.cpp). ETag names them, and Ewa-Step is their step. Where splats are
+//                            frozen, the rows end in the property kFrozenProperty, 1 for these and 0 for others.
 //                            A request makes the trainer take newer ones. The status is 304 if If-None-Match
 //                            names the newest. Without If-None-Match the answer waits up to 5 seconds for
 //                            splats of the present step. It is 503 if none have ever been taken.
@@ -53,7 +54,8 @@ inline constexpr size_t kMostEdit = 256u << 10;  // bytes
 struct Snapshot {
     int step = 0;
     Gaussians gaussians;
-    uint64_t edits = 0;  // before them in this run; Server::offer sets it
+    std::vector<bool> frozen = {};  // of each splat: whether no step changes it; empty: none is frozen
+    uint64_t edits = 0;             // before them in this run; Server::offer sets it
 };
 
 /// 128 bits from the system's random source, in hexadecimal. Throws RunError.

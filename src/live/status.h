@@ -9,7 +9,8 @@
 
 namespace ewa::live {
 
-inline constexpr size_t kMostLines = 2000;  // of metrics in one answer
+inline constexpr size_t kMostLines = 2000;                // of metrics in one answer
+inline constexpr const char* kFrozenProperty = "frozen";  // of the PLY of GET /splats
 
 enum class State { running, paused, done };
 

@@ -20,6 +20,7 @@
 #include "ewa/splat_files.h"
 #include "folders/run_folder.h"
 #include "io/splats/formats.h"
+#include "io/splats/ply_table.h"
 #include "live/wire.h"
 
 namespace ewa::live {
@@ -52,6 +53,17 @@ std::string start_of(const fs::path& path, size_t most) {
     file.read(text.data(), std::streamsize(most));
     text.resize(size_t(std::max<std::streamsize>(0, file.gcount())));
     return text;
+}
+
+/// Which splats of a trainer's PLY are frozen. Empty: none is.
+std::vector<bool> frozen_in(const std::string& path) {
+    io::PlyTable table(path);
+    const io::PlyElement& vertex = table.go_to("vertex");
+    std::vector<bool> frozen;
+    if (const auto column = vertex.find_number(kFrozenProperty))
+        table.read({*column}, [&](size_t, const double* row) { frozen.push_back(row[0] != 0); });
+    if (std::ranges::find(frozen, true) == frozen.end()) frozen.clear();
+    return frozen;
 }
 
 /// How many steps the run's settings ask for. 0 if they cannot be read.
@@ -172,6 +184,7 @@ std::optional<TaggedSplats> Client::splats(const std::string& tag) {
     splats.tag = answer.get_header_value("ETag");
     try {
         splats.gaussians = io::read_ply(memory.path()).gaussians;
+        splats.frozen = frozen_in(memory.path());
     } catch (const InputError& error) {
         throw InputError("the trainer's splats cannot be read: " + std::string(error.what()));
     }
@@ -369,6 +382,7 @@ void Watcher::look_by_connection() {
         update.connected = true;
         if (!splats) return;
         update.splats = std::make_shared<const Gaussians>(std::move(splats->gaussians));
+        update.frozen = std::move(splats->frozen);
         update.splats_step = splats->step;
     });
 }
@@ -412,6 +426,7 @@ void Watcher::look_at_files() {
     splats_time_ = time;
     change([&](Update& update) {
         update.splats = std::move(splats);
+        update.frozen.clear();
         update.splats_step = update.status.step;
     });
 }

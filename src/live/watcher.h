@@ -31,6 +31,7 @@ struct TaggedSplats {
     int step = 0;
     std::string tag;
     Gaussians gaussians;
+    std::vector<bool> frozen;  // of each splat; empty: none is
 };
 
 /// Each request has its own connection. Anybody may answer: sizes are limited, and only bytes that have come take
@@ -87,6 +88,7 @@ struct WhatToWatch {
 struct Update {
     Status status;                            // with all metrics
     std::shared_ptr<const Gaussians> splats;  // the newest; null if there are none yet
+    std::vector<bool> frozen;  // of each of the splats: whether no step changes it; empty: none is
     int splats_step = -1;
     uint64_t number = 0;                 // grows with every change
     bool connected = false;              // to the trainer, not only to its files

@@ -97,6 +97,30 @@ TEST(LiveServer, SplatsComeBackExactly) {
     EXPECT_EQ(client.splats("")->gaussians.size(), 0u);
 }
 
+/// Which splats are frozen comes with them, so both are of one step.
+TEST(LiveServer, FrozenSplatsComeWithTheOthers) {
+    Server server("127.0.0.1", 0, "");
+    Client client = client_of(server);
+    std::vector<bool> frozen(5000);
+    for (size_t i = 3; i < frozen.size(); i += 7) frozen[i] = true;
+    const Gaussians sent = some_splats(5000);
+    server.offer({3, sent, frozen}, 0);
+    const auto back = client.splats("");
+    ASSERT_TRUE(back);
+    EXPECT_TRUE(back->frozen == frozen);
+    EXPECT_TRUE(back->gaussians.means == sent.means && back->gaussians.sh == sent.sh &&
+                back->gaussians.quaternions == sent.quaternions);
+    const test::TempFolder folder;
+    const std::string answer = ask(server, "GET /splats");
+    const auto file = folder.write("splats.ply", answer.substr(answer.find("\r\n\r\n") + 4));
+    EXPECT_TRUE(load_splats(file).sh == sent.sh) << "it is no PLY of splats";
+    server.offer({4, sent}, 0);
+    EXPECT_TRUE(client.splats("")->frozen.empty());
+    EXPECT_EQ(ask(server, "GET /splats").find("frozen"), std::string::npos);
+    server.offer({5, sent, std::vector<bool>(5000)}, 0);
+    EXPECT_TRUE(client.splats("")->frozen.empty()) << "none is frozen";
+}
+
 /// What is saved to a file without ewa is what ewa writes.
 TEST(LiveServer, GivesAPlyFileOfThePresentStep) {
     Server server("127.0.0.1", 0, "");

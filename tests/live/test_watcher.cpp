@@ -100,6 +100,11 @@ TEST(LiveWatcher, FollowsARunByItsConnection) {
     server.add_metrics(line_of(2));
     ASSERT_TRUE(soon([&] { return watcher.update().splats && watcher.update().status.metrics.size() == 2; }));
     EXPECT_EQ(watcher.update().splats_step, 3);
+    EXPECT_TRUE(watcher.update().frozen.empty());
+    ASSERT_TRUE(soon([&] { return server.wants_splats(4); }));
+    server.offer({4, some_splats(2), {false, true}}, 0);
+    ASSERT_TRUE(soon([&] { return watcher.update().splats_step == 4; }));
+    EXPECT_EQ(watcher.update().frozen, (std::vector<bool>{false, true}));
     watcher.command("pause");
     EXPECT_TRUE(soon([&] { return server.paused(); }));
     watcher.command("resume");
