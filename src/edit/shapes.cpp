@@ -193,19 +193,6 @@ Shape listed(const std::string& text, const std::string& what) {
     };
 }
 
-std::string list_of(const std::vector<bool>& flags) {
-    std::string text;
-    for (size_t i = 0; i < flags.size(); ++i) {
-        if (!flags[i]) continue;
-        size_t last = i;
-        while (last + 1 < flags.size() && flags[last + 1]) ++last;
-        text += (text.empty() ? "splats=" : ",") + std::to_string(i);
-        if (last > i) text += "-" + std::to_string(last);
-        i = last;
-    }
-    return text.empty() ? "none" : text;
-}
-
 double radius_of(const std::string& what, const std::string& text, const std::string& value) {
     constexpr const char* kForm = "grow=R or shrink=R with a distance above 0";
     const double radius = numbers_of(what, text, value, 1, kForm).front();
@@ -275,8 +262,22 @@ void select(EditedSplats& splats, const Selection& selection) {
 bool write_contradicted(std::string& selection, const EditedSplats& splats) {
     const size_t at = selection.find(':') + 1;  // behind an operation; 0 without one
     if (std::string_view(selection).substr(at) != kContradicted) return false;
-    selection.replace(at, kContradicted.size(), list_of(parse_selection(selection.substr(at)).shape(splats)));
+    selection.replace(at, kContradicted.size(),
+                      splats_shape(parse_selection(selection.substr(at)).shape(splats)));
     return true;
+}
+
+std::string splats_shape(const std::vector<bool>& flags) {
+    std::string text;
+    for (size_t i = 0; i < flags.size(); ++i) {
+        if (!flags[i]) continue;
+        size_t last = i;
+        while (last + 1 < flags.size() && flags[last + 1]) ++last;
+        text += (text.empty() ? "splats=" : ",") + std::to_string(i);
+        if (last > i) text += "-" + std::to_string(last);
+        i = last;
+    }
+    return text.empty() ? "none" : text;
 }
 
 std::string box_shape(const glm::dvec3& low, const glm::dvec3& high) {

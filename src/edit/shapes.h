@@ -45,6 +45,7 @@ bool write_contradicted(std::string& selection, const EditedSplats& splats);
 // What tools write; edit/view_shapes.h has the others.
 std::string box_shape(const glm::dvec3& low, const glm::dvec3& high);
 std::string sphere_shape(const glm::dvec3& center, double radius);
+std::string splats_shape(const std::vector<bool>& flags);  // `none` if no flag is set
 
 /// Selects. The states that do not change stay.
 void select(EditedSplats& splats, const Selection& selection);

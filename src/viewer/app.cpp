@@ -19,7 +19,6 @@
 #include "viewer/editor/modal.h"
 #include "viewer/editor/offers.h"
 #include "viewer/editor/photo_check.h"
-#include "viewer/editor/texts.h"
 #include "viewer/editor/toolbar.h"
 #include "viewer/latest.h"
 
@@ -352,9 +351,11 @@ void App::enter_scene() {
     }
     const Tool tool = live() ? editor_.settings.tool : Tool::view;
     const std::vector<edit::Step> unsent = unsent_steps();
-    editor_.enter(scene.title, file, entered_, cameras, journaled);
+    std::vector<bool> frozen;
+    if (live() && session_.live_run.update()->splats == entered_) frozen = session_.live_run.update()->frozen;
+    editor_.settings.sent = sent_before_ = frozen.empty() ? 0 : 1;  // the step that locks them
+    editor_.enter(scene.title, file, entered_, cameras, journaled, std::move(frozen));
     editor_.settings.tool = tool;
-    editor_.settings.sent = sent_before_ = 0;
     for (const edit::Step& step : unsent) editor_.perform(step);
     if (journaled) dialogs_.offer_journals();
 }
@@ -423,10 +424,7 @@ void App::send_edits() {
         return;
     }
     nlohmann::json edits = nlohmann::json::array();
-    bool changes = std::exchange(editor_.settings.unfreeze, false);
-    if (changes && snapshot.locked > 0)
-        return editor_.perform({texts::edit_panel::kUnfreeze.name, {{"unlock", ""}}});
-    if (changes) edits.push_back({"unlock", ""});
+    bool changes = false;
     for (size_t i = sent; i < snapshot.done; ++i)
         for (const edit::Words& words : snapshot.steps[i].edits) {
             edits.push_back({words.name, words.value});

@@ -96,6 +96,29 @@ TEST_F(EditWork, IsUnsavedWhereItDiffersFromTheLastSave) {
     EXPECT_TRUE(editor_->left_journals().empty()) << "all was saved";
 }
 
+/// Splats that a training has frozen are locked, by a step that is no edit of the user's.
+TEST_F(EditWork, LocksWhatATrainingHasFrozen) {
+    const auto splats = std::make_shared<const Gaussians>(load_splats(scene_));
+    std::vector<bool> frozen(splats->size());
+    for (size_t i = 0; i < frozen.size(); i += 4) frozen[i] = true;
+    editor_->enter("a.ply", "", splats, {}, false, frozen);
+    settle(*editor_);
+    EXPECT_EQ(editor_->snapshot().locked, 100u);
+    ASSERT_TRUE(editor_->marks());
+    EXPECT_EQ((*editor_->marks())[4], kMarkLocked);
+    EXPECT_EQ((*editor_->marks())[5], 0);
+    EXPECT_FALSE(editor_->unsaved());
+    undo();
+    EXPECT_EQ(editor_->snapshot().locked, 100u) << "it was undone";
+    perform("select", "all");
+    EXPECT_EQ(editor_->snapshot().selected, 300u);
+    perform("delete");
+    EXPECT_TRUE(editor_->unsaved());
+    EXPECT_EQ(saved(), 100u) << "what is saved has other splats";
+    perform("unlock");
+    EXPECT_EQ(editor_->snapshot().locked, 0u);
+}
+
 TEST_F(EditWork, IsUnsavedAfterASaveThatFails) {
     delete_right();
     write_file(folder_ / "folder", "");

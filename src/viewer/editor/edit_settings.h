@@ -43,10 +43,9 @@ struct SelectionShapes {
 /// What the tools and the panel share: settings of selecting and of gizmos. The keys of docs/editor.md change them too.
 struct EditSettings : SelectionShapes {
     Tool tool = Tool::view;
-    std::string progress;   // of the tool, for the status line; empty: its hint
-    bool live = false;      // edits go to a training, which takes selections, deletes and locks alone
-    size_t sent = 0;        // steps that the training has
-    bool unfreeze = false;  // the user wants the training to change all splats again
+    std::string progress;  // of the tool, for the status line; empty: its hint
+    bool live = false;     // edits go to a training, which takes selections, deletes and locks alone
+    size_t sent = 0;       // steps that the training has
     edit::Operation operation = edit::Operation::set;  // Shift: add, Ctrl: remove, both: intersect
     bool front = false, extent = false;
     float brush = 40;         // radius, px of the window

@@ -21,7 +21,7 @@ static_assert(int(edit::kSelected) == kMarkSelected && int(edit::kLocked) == kMa
               int(edit::kHidden) == kMarkHidden && int(edit::kDeleted) == kMarkDeleted);
 
 constexpr auto kPublishPeriod = std::chrono::milliseconds(250);  // while tasks wait
-constexpr const char* kSeparate = "Separate";
+constexpr const char *kSeparate = "Separate", *kFrozen = "Frozen by the training";
 
 /// The `budget` splats that cover most, in order. Null if there are no more than that.
 std::shared_ptr<const std::vector<uint32_t>> draft_rows(const Gaussians& g, size_t budget) {
@@ -243,10 +243,16 @@ void EditWorker::find_preview() {
     }
 }
 
-void EditWorker::add(uint64_t id, std::shared_ptr<const Gaussians> splats, edit::Cameras cameras,
-                     Place place) {
-    post([this, id, splats = std::move(splats), cameras = std::move(cameras), place = std::move(place)] {
-        scenes_[id] = {std::make_shared<edit::History>(splats, cameras), cameras, place};
+void EditWorker::add(uint64_t id, std::shared_ptr<const Gaussians> splats, edit::Cameras cameras, Place place,
+                     std::vector<bool> frozen) {
+    post([this, id, splats = std::move(splats), cameras = std::move(cameras), place = std::move(place),
+          frozen = std::move(frozen)] {
+        Scene& scene = scenes_[id] = {std::make_shared<edit::History>(splats, cameras), cameras, place};
+        if (!frozen.empty()) {
+            scene.history->perform({kFrozen, {{"select", edit::splats_shape(frozen)}, {"lock", ""}}});
+            scene.least = scene.history->done();
+            scene.saved = scene.lasting();
+        }
         active_ = id;
         preview_.clear();
         previewed_.clear();

@@ -36,8 +36,10 @@ class EditWorker {
     };
 
     // Tasks. scene: EditedScene::id.
-    /// Adds a scene and makes it the active one.
-    void add(uint64_t scene, std::shared_ptr<const Gaussians> splats, edit::Cameras cameras, Place place);
+    /// Adds a scene and makes it the active one. frozen: splats that are locked by its first step, which cannot be undone and needs no
+    /// save; empty: none.
+    void add(uint64_t scene, std::shared_ptr<const Gaussians> splats, edit::Cameras cameras, Place place,
+             std::vector<bool> frozen = {});
     /// The selection of `of` becomes a scene with the same history, and leaves `of`.
     void separate(uint64_t scene, uint64_t of, Place place);
     /// Performs the steps of a journal, and continues it. A scene that is not there yet has the first splats of `of`.

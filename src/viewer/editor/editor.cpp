@@ -100,14 +100,15 @@ bool EditedScene::as_opened() const {
 }
 
 void Editor::insert(const std::string& name, const fs::path& file, std::shared_ptr<const Gaussians> splats,
-                    edit::Cameras cameras, bool journaled) {
+                    edit::Cameras cameras, bool journaled, std::vector<bool> frozen) {
     auto scene = std::make_unique<EditedScene>();
     scene->name = name;
     scene->file = file;
     scene->journaled = journaled;
     scene->id = ++ids_;
     scene->head = edit::head_of(file, splats->size());
-    worker_.add(scene->id, std::move(splats), std::move(cameras), place_of(*scene));
+    worker_.add(scene->id, std::move(splats), std::move(cameras), place_of(*scene),
+                std::move(frozen));
     scenes_.push_back(std::move(scene));
     active_ = scenes_.size() - 1;
 }
@@ -121,9 +122,9 @@ void Editor::clear() {
 }
 
 void Editor::enter(const std::string& name, const fs::path& file, std::shared_ptr<const Gaussians> splats,
-                   edit::Cameras cameras, bool journaled) {
+                   edit::Cameras cameras, bool journaled, std::vector<bool> frozen) {
     clear();
-    insert(name, file, std::move(splats), std::move(cameras), journaled);
+    insert(name, file, std::move(splats), std::move(cameras), journaled, std::move(frozen));
 }
 
 void Editor::activate(size_t scene) {

@@ -42,13 +42,14 @@ class Editor {
     void set_budget(size_t budget);
 
     // Scenes.
-    /// Replaces all scenes by this one. journaled: it is a file of its own, and gets a journal.
+    /// Replaces all scenes by this one. journaled: it is a file of its own, and gets a journal. frozen: as EditWorker::add.
     void enter(const std::string& name, const std::filesystem::path& file,
-               std::shared_ptr<const Gaussians> splats, edit::Cameras cameras, bool journaled);
+               std::shared_ptr<const Gaussians> splats, edit::Cameras cameras, bool journaled,
+               std::vector<bool> frozen = {});
     /// Adds a scene of another file, which becomes the active one. file: empty: the splats are in none.
     void add(const std::string& name, const std::filesystem::path& file,
              std::shared_ptr<const Gaussians> splats) {
-        insert(name, file, std::move(splats), {}, !file.empty());
+        insert(name, file, std::move(splats), {}, !file.empty(), {});
     }
     bool wants_scene = false;  // the user asks for a file to add
     void clear();              // there is nothing to edit
@@ -118,7 +119,8 @@ class Editor {
     };
     EditedScene& now() { return *scenes_[active_]; }
     void insert(const std::string& name, const std::filesystem::path& file,
-                std::shared_ptr<const Gaussians> splats, edit::Cameras cameras, bool journaled);
+                std::shared_ptr<const Gaussians> splats, edit::Cameras cameras, bool journaled,
+                std::vector<bool> frozen);
     EditedScene& add_part(size_t part);
     void move(uint64_t id, bool opens);
 

@@ -38,7 +38,7 @@ void change_states(Editor& editor) {
     const bool any = now.selected > 0;
     if (editor.settings.live) {
         edit_line(editor, {{say::kDelete, any, ui::ButtonLook::danger}, {say::kFreeze, any}});
-        if (ui::button_line({{say::kUnfreeze}}) == 0) editor.settings.unfreeze = true;
+        edit_line(editor, {{say::kUnfreeze, now.locked > 0}});
         return;
     }
     edit_line(editor, {{say::kLock, any}, {say::kUnlock, now.locked > 0}});

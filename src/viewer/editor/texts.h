@@ -109,7 +109,7 @@ inline constexpr Item kLock{"Lock", "The selection is drawn, and no edit changes
     kSeparate{"Separate", "Make the selection a scene of its own"},
     kReset{"Reset", "Give the selection the values of the file back", "", "reset", "", true},
     kFreeze{"Freeze", "The training changes the selection no more", "", "lock", "", true},
-    kUnfreeze{"Unfreeze all", "The training changes all splats again"};
+    kUnfreeze{"Unfreeze all", "The training changes all splats again", "", "unlock"};
 /// The edits that a key does.
 inline constexpr Item kKeyedEdits[] = {kAll,  kNone,   kInvert, kGrow, kShrink,
                                        kLock, kUnlock, kHide,   kShow, kDelete};

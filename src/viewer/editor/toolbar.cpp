@@ -222,19 +222,17 @@ void draw_strip(Editor& editor, bool points, const BarArea& area) {
 std::string status_text(const Editor& editor) {
     static struct {
         EditSnapshot snapshot;
-        size_t scene = 0;
         double until = 0;
         std::string text;
     } last;  // seen in the frame before
     const EditSnapshot& now = editor.snapshot();
-    if (now.version != last.snapshot.version || editor.active() != last.scene) {
-        last.text = editor.active() == last.scene ? edit_news(last.snapshot, now) : "";
+    if (now.version != last.snapshot.version || now.scene != last.snapshot.scene) {
+        last.text = now.scene == last.snapshot.scene ? edit_news(last.snapshot, now) : "";
         last.snapshot = now;
         last.snapshot.splats = last.snapshot.drawn = nullptr;
         last.snapshot.states = last.snapshot.marks = nullptr;
         last.snapshot.draft = {};
         last.snapshot.cameras = {};
-        last.scene = editor.active();
         last.until = ImGui::GetTime() + kEditShown;
     }
     if (!editor.settings.progress.empty()) return editor.settings.progress;
