@@ -243,7 +243,8 @@ constexpr std::array kRows{
     Row{"select", "SHAPE",
         "Select splats; --transform and the options from here on then change these alone. SHAPE: a FILTER of "
         "--where, "
-        "all, none, invert, color=r,g,b,T, flood=x,y,z,T, cluster=x,y,z, floaters, far, contradicted, "
+        "all, none, invert, color=r,g,b,T, flood=x,y,z,T[,opacity], cluster=x,y,z, floaters, far, "
+        "contradicted, "
         "grow=R, "
         "shrink=R, splats=0,3,7-9, or "
         "a polygon or "

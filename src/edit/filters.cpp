@@ -22,22 +22,12 @@ namespace {
 /// A group of fewer splats that touches nothing else floats. Small things of a trained scene have more.
 constexpr uint32_t kLeastGroup = 10;
 
-double scale_of(const Gaussians& g, size_t i, bool largest) {
-    const auto [low, high] =
-        std::minmax({g.log_scales[3 * i], g.log_scales[3 * i + 1], g.log_scales[3 * i + 2]});
-    return std::exp(double(largest ? high : low));
-}
-
-double opacity_of(const Gaussians& g, size_t i) {
-    return 1 / (1 + std::exp(-double(g.opacity_logits[i])));
-}
-
 constexpr Column kColumns[] = {
     {"x", [](const Gaussians& g, size_t i) { return g.world_mean(i).x; }},
     {"y", [](const Gaussians& g, size_t i) { return g.world_mean(i).y; }},
     {"z", [](const Gaussians& g, size_t i) { return g.world_mean(i).z; }},
     {"opacity", opacity_of},
-    {"scale", [](const Gaussians& g, size_t i) { return scale_of(g, i, true); }, true},
+    {"scale", [](const Gaussians& g, size_t i) { return scale_of(g, i); }, true},
     {"thickness", [](const Gaussians& g, size_t i) { return scale_of(g, i, false); }, true},
     {"red", [](const Gaussians& g, size_t i) { return color_of(g, i).r; }},
     {"green", [](const Gaussians& g, size_t i) { return color_of(g, i).g; }},
@@ -121,6 +111,16 @@ Filter filter_of_views(const Range& range, const std::string& what) {
 }
 
 }  // namespace
+
+double scale_of(const Gaussians& g, size_t i, bool largest) {
+    const auto [low, high] =
+        std::minmax({g.log_scales[3 * i], g.log_scales[3 * i + 1], g.log_scales[3 * i + 2]});
+    return std::exp(double(largest ? high : low));
+}
+
+double opacity_of(const Gaussians& g, size_t i) {
+    return 1 / (1 + std::exp(-double(g.opacity_logits[i])));
+}
 
 glm::dvec3 color_of(const Gaussians& gaussians, size_t i) {
     const float* sh = &gaussians.sh[gaussians.sh_stride() * i];

@@ -31,6 +31,8 @@ struct Column {
 };
 /// The colour of a splat without what depends on the view.
 glm::dvec3 color_of(const Gaussians& gaussians, size_t i);
+double opacity_of(const Gaussians& gaussians, size_t i);
+double scale_of(const Gaussians& gaussians, size_t i, bool largest = true);  // else the smallest
 /// All columns but kViews.
 std::span<const Column> columns();
 /// The column whose values depend on cameras: scene::views_of_splats.

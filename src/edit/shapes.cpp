@@ -17,10 +17,12 @@
 namespace ewa::edit {
 namespace {
 
+constexpr double kFloodedSizes = 4;  // of the first splat: the largest ones of a flood
+
 std::vector<double> numbers_of(const std::string& what, const std::string& text, const std::string& value,
-                               size_t count, const std::string& form) {
+                               size_t least, const std::string& form, size_t more = 0) {
     const auto n = core::parse_list(value);
-    if (!n || n->size() != count) refuse_shape(what, text, form);
+    if (!n || n->size() < least || n->size() > least + more) refuse_shape(what, text, form);
     return *n;
 }
 
@@ -98,14 +100,21 @@ Shape cluster(const glm::dvec3& point) {
     };
 }
 
-Shape flood(const glm::dvec3& point, double tolerance) {
+/// opacity: the least of a splat that is taken; with it, none is much larger than the first one.
+Shape flood(const glm::dvec3& point, double tolerance, const std::optional<double>& opacity) {
     return [=](const EditedSplats& all) {
-        const Part everything = whole(all);
+        const Gaussians& g = *all.splats();
+        const auto solid = [&](size_t i) { return !opacity || opacity_of(g, i) >= *opacity; };
+        const Part everything = part_of(all, solid);
         const auto nearest = nearest_to(everything, point);
         if (!nearest) return std::vector<bool>(all.size());
-        const glm::dvec3 color = color_of(everything.splats, *nearest);
-        const Part part =
-            part_of(all, [&](size_t i) { return like(color_of(*all.splats(), i), color, tolerance); });
+        const size_t first = everything.indices[*nearest];
+        const glm::dvec3 color = color_of(g, first);
+        const double largest = kFloodedSizes * scale_of(g, first);
+        const Part part = part_of(all, [&](size_t i) {
+            return solid(i) && !(opacity && scale_of(g, i) > largest) &&
+                   like(color_of(g, i), color, tolerance);
+        });
         const auto seed = nearest_to(part, point);  // none if its colour is not finite
         return taken(all, part, seed ? group_at(part, *seed) : std::vector<bool>());
     };
@@ -211,12 +220,15 @@ Shape parse_shape(const std::string& text, const std::string& what) {
                       value = equals < text.size() ? text.substr(equals + 1) : "";
     if (name == "polygon" || name == "brush") return parse_view_shape(text, what);
     if (name == "color" || name == "flood") {
-        const std::string form =
-            name + (name == "color" ? "=r,g,b,T" : "=x,y,z,T") + " with a tolerance T of 0 or more";
-        const auto n = numbers_of(what, text, value, 4, form);
-        if (n[3] < 0) refuse_shape(what, text, form);
+        const bool floods = name == "flood";
+        const std::string form = name + (floods ? "=x,y,z,T" : "=r,g,b,T") +
+                                 " with a tolerance T of 0 or more" +
+                                 (floods ? ", or flood=x,y,z,T,o with a least opacity o from 0 to 1" : "");
+        const auto n = numbers_of(what, text, value, 4, form, floods);
+        const auto opacity = n.size() > 4 ? std::optional(n[4]) : std::nullopt;
+        if (n[3] < 0 || opacity < 0.0 || opacity > 1.0) refuse_shape(what, text, form);
         const glm::dvec3 at(n[0], n[1], n[2]);
-        return name == "color" ? shape_of_color(at, n[3]) : flood(at, n[3]);
+        return floods ? flood(at, n[3], opacity) : shape_of_color(at, n[3]);
     }
     if (name == "splats") return listed(value, what);
     if (name == "cluster") {

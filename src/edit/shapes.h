@@ -28,6 +28,8 @@ struct Selection {
 ///     Their numbers are up to 1e9.
 ///   color=r,g,b,T                     colours within T >= 0 of this one in each channel, 0 to 1
 ///   flood=x,y,z,T                     the splats that touch the nearest one to this point, and so on, with colours within T of its
+///   flood=x,y,z,T,o                   the same among splats with an opacity of o or more, 0 to 1, of which none is more than 4 times
+///                                     as large as the first one
 ///   cluster=x,y,z                     the group of touching splats that the nearest one to this point is in
 ///   floaters                          groups of fewer than 10 touching splats
 ///   far                               all but the largest group

@@ -201,8 +201,7 @@ class Cover {
             const auto seen = seen_splat(g, i, view, true);
             if (!seen) continue;
             const double reach = kReach * std::sqrt(std::max(seen->covariance[0][0], seen->covariance[1][1]));
-            if (bounds_.has(seen->at, reach))
-                drawn.push_back({*seen, 1 / (1 + std::exp(-double(g.opacity_logits[i])))});
+            if (bounds_.has(seen->at, reach)) drawn.push_back({*seen, opacity_of(g, i)});
         }
         std::ranges::stable_sort(drawn, {}, [](const Drawn& d) { return d.seen.depth; });
         std::vector<double> transmittance(depths_.size(), 1);

@@ -69,6 +69,7 @@ TEST(HostileSelection, OfAnyNumberSelectsOrIsRefused) {
                       rays = ";view=parallel:9,9,5,5,1,0,0,0,0,0,5";
     const std::string shapes[] = {"flood=0,0,0,1",
                                   "flood=0.6,0,0,1",
+                                  "flood=0.6,0,0,1,0.5",
                                   "color=0.5,0.5,0.5,1",
                                   "cluster=0,0,0",
                                   "grow=1",
@@ -96,6 +97,10 @@ TEST(HostileSelection, IsRefusedWithWhatIsExpected) {
     const std::string longest = "polygon=" + std::string(200'000, '7') + view;
     for (const auto& [shape, part] : std::vector<std::pair<std::string, std::string>>{
              {"flood=0,0,0,-1", "flood=x,y,z,T with a tolerance T of 0 or more"},
+             {"flood=0,0,0,1,2", "flood=x,y,z,T,o with a least opacity o from 0 to 1"},
+             {"flood=0,0,0,1,-0.1", "flood=x,y,z,T,o with a least opacity o from 0 to 1"},
+             {"flood=0,0,0,1,0.1,3", "flood=x,y,z,T,o with a least opacity o from 0 to 1"},
+             {"color=0,0,0,1,0.1", "color=r,g,b,T with a tolerance T of 0 or more"},
              {"color=0,0,0,-1", "color=r,g,b,T with a tolerance T of 0 or more"},
              {"polygon=-1e308,-1e308,1e308,0,0,1e308" + view + ";front", "in px up to 1e9"},
              {"polygon=0,0,1,1" + view, "three points or more"},

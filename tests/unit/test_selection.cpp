@@ -185,6 +185,38 @@ TEST(Selection, FollowsGroupsAndColours) {
     EXPECT_EQ(count("color=0.782,0.5,0.5,0.01"), 10);
 }
 
+TEST(Selection, FloodsNeitherFaintNorLargeSplats) {
+    const auto sized = [](Gaussians& g, size_t i, double deviation) {
+        std::fill_n(&g.log_scales[3 * i], 3, float(std::log(deviation)));
+    };
+    const auto count = [](const Gaussians& g, const std::string& shape) {
+        const auto flags = taken(g, shape);
+        return std::count(flags.begin(), flags.end(), true);
+    };
+    // Two rows of like colours, and a faint splat that bridges them.
+    std::vector<glm::dvec3> means;
+    for (int i = 0; i < 20; ++i) means.emplace_back(0.1 * i + (i < 10 ? 0 : 1.1), 0, 0);
+    means.emplace_back(1.5, 0, 0);
+    Gaussians rows = balls(means, 0.1);
+    for (size_t i = 10; i < 20; ++i) rows.sh[3 * i] = 0.2f;
+    sized(rows, 20, 0.19);
+    rows.opacity_logits[20] = -4;
+    EXPECT_EQ(count(rows, "flood=0,0,0,0.1"), 21);
+    EXPECT_EQ(count(rows, "flood=0,0,0,0.1,0.01"), 21) << "its opacity is 0.018";
+    EXPECT_EQ(count(rows, "flood=0,0,0,0.1,0.1"), 10);
+    EXPECT_EQ(count(rows, "flood=3,0,0,0.1,0.1"), 10);
+    EXPECT_EQ(count(rows, "flood=1.4,0,0,0.1,0.1"), 10) << "it does not begin with the faint one";
+    // Opaque splats of rising, then of falling sizes.
+    Gaussians chain =
+        balls({{0, 0, 0}, {0.5, 0, 0}, {1.6, 0, 0}, {3.6, 0, 0}, {5.6, 0, 0}, {6.7, 0, 0}, {7.2, 0, 0}}, 0.1);
+    for (const auto& [i, deviation] : {std::pair(1, 0.19), {2, 0.36}, {3, 0.68}, {4, 0.36}, {5, 0.19}})
+        sized(chain, size_t(i), deviation);
+    EXPECT_EQ(count(chain, "flood=0,0,0,1"), 7);
+    EXPECT_EQ(count(chain, "flood=0,0,0,1,0"), 3);
+    EXPECT_EQ(count(chain, "flood=7.2,0,0,1,0"), 3);
+    EXPECT_EQ(count(chain, "flood=3.6,0,0,1,0"), 7) << "none is larger than the first one";
+}
+
 TEST(Selection, TakesSplatsByTheirNumbers) {
     const Gaussians g = balls({{0, 0, 0}, {1, 0, 0}, {3, 0, 0}, {9, 9, 9}}, 0.1);
     using Flags = std::vector<bool>;

@@ -14,6 +14,11 @@
 #include "viewer/editor/theme.h"
 
 namespace ewa::viewer {
+namespace {
+
+constexpr double kLeastOpacity = 0.1;  // of flooded splats
+
+}  // namespace
 
 void PickTools::click(const ToolPicture& picture) {
     asked_ = room_.settings().tool;
@@ -26,7 +31,8 @@ bool PickTools::take_point(const SurfacePoint& point) {
     if (!point.place) {
         room_.say(texts::kNoSurface);
     } else if (asked_ == Tool::flood) {
-        room_.select(fmt::format("flood={},{:.4g}", point_text(*point.place), room_.settings().tolerance),
+        room_.select(fmt::format("flood={},{:.4g},{:.4g}", point_text(*point.place),
+                                 room_.settings().tolerance, kLeastOpacity),
                      operation_);
     } else if (asked_ == Tool::eyedropper) {
         room_.select(fmt::format("color={:.4g},{:.4g},{:.4g},{:.4g}", point.color.r, point.color.g,
