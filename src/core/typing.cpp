@@ -189,10 +189,10 @@ std::optional<std::array<double, 6>> parse_box(std::string_view text) {
     return box;
 }
 
-std::vector<std::string_view> split_list(std::string_view text) {
+std::vector<std::string_view> split_list(std::string_view text, char separator) {
     std::vector<std::string_view> parts;
     for (size_t begin = 0, end = 0; begin <= text.size(); begin = end + 1) {
-        end = std::min(text.find(',', begin), text.size());
+        end = std::min(text.find(separator, begin), text.size());
         parts.push_back(trim(text.substr(begin, end - begin)));
     }
     return parts;

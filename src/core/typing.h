@@ -41,8 +41,8 @@ std::optional<T> parse_count(std::string_view text) {
     return parse_integer<T>(whole_digits(text).value_or(std::string(text)));
 }
 
-/// The parts of the text between commas, without blanks around them. A text without commas is one part.
-std::vector<std::string_view> split_list(std::string_view text);
+/// The parts of the text between separators, without blanks around them. A text without one is one part.
+std::vector<std::string_view> split_list(std::string_view text, char separator = ',');
 
 /// The finite numbers of a list with commas between them. Empty for other text.
 std::optional<std::vector<double>> parse_list(std::string_view text);

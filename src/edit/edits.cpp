@@ -166,12 +166,9 @@ Adjustment parse_adjustment(const std::string& text) {
             "them with ; between; tint is from 0 to 1000, brightness from -1 to 1, other factors "
             "from 0.000001 to 1000");
     };
-    size_t begin = 0;
-    while (begin <= text.size()) {
-        const size_t end = std::min(text.find(';', begin), text.size());
-        const std::string step = text.substr(begin, end - begin);
+    for (const std::string_view step : core::split_list(text, ';')) {
         const size_t equals = std::min(step.find('='), step.size());
-        const std::string name = step.substr(0, equals);
+        const std::string_view name = step.substr(0, equals);
         const auto n = core::parse_list(equals < step.size() ? step.substr(equals + 1) : "");
         const auto factor = [&](float& member) {
             if (!n || n->size() != 1 || n->front() < kLeastFactor || n->front() > kMostFactor) refuse();
@@ -193,7 +190,6 @@ Adjustment parse_adjustment(const std::string& text) {
         } else {
             refuse();
         }
-        begin = end + 1;
     }
     return a;
 }

@@ -98,13 +98,16 @@ Filter filter_of(const Column& column, const Range& range) {
     };
 }
 
+/// Refuses what only the cameras or photos of a run can say.
+[[noreturn]] void refuse_without_run(const std::string& what, const char* unknown) {
+    throw InputError(what + ": " + unknown +
+                     " are known of the folder of a training run alone, before its splats move or others "
+                     "join them");
+}
+
 Filter filter_of_views(const Range& range, const std::string& what) {
     return [=](const Gaussians& g, const Cameras& cameras) {
-        if (!cameras)
-            throw InputError(
-                what +
-                ": views are known of the folder of a training run alone, before its splats move "
-                "or others join them");
+        if (!cameras) refuse_without_run(what, kViews);
         const std::vector<uint32_t> views = scene::views_of_splats(g, cameras());
         return splats_with(g, [&](size_t i) { return range.has(views[i]); });
     };
@@ -163,11 +166,7 @@ std::vector<bool> grounded_splats(const Gaussians& gaussians) {
 
 std::vector<bool> contradicted_splats(const Gaussians& gaussians, const std::vector<uint32_t>& left,
                                       const Cameras& cameras, const std::string& what) {
-    if (!cameras.contradicted)
-        throw InputError(
-            what +
-            ": photos are known of the folder of a training run alone, before its splats move or "
-            "others join them");
+    if (!cameras.contradicted) refuse_without_run(what, "photos");
     return cameras.contradicted(gaussians, left);
 }
 

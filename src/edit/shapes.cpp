@@ -84,20 +84,18 @@ std::optional<size_t> nearest_to(const Part& part, const glm::dvec3& point) {
     return nearest;
 }
 
-/// The group that the nearest splat is in.
-std::vector<bool> group_at(const Part& part, size_t seed) {
+/// The group of touching splats of a part that the nearest one to a point is in.
+std::vector<bool> group_at(const EditedSplats& all, const Part& part, const glm::dvec3& point) {
+    const auto seed = nearest_to(part, point);
+    if (!seed) return std::vector<bool>(all.size());
     const scene::SplatGroups groups = scene::touching_groups(part.splats);
     std::vector<bool> flags(part.splats.size());
-    for (size_t k = 0; k < flags.size(); ++k) flags[k] = groups.of[k] == groups.of[seed];
-    return flags;
+    for (size_t k = 0; k < flags.size(); ++k) flags[k] = groups.of[k] == groups.of[*seed];
+    return taken(all, part, flags);
 }
 
 Shape cluster(const glm::dvec3& point) {
-    return [=](const EditedSplats& all) {
-        const Part part = whole(all);
-        const auto seed = nearest_to(part, point);
-        return taken(all, part, seed ? group_at(part, *seed) : std::vector<bool>());
-    };
+    return [=](const EditedSplats& all) { return group_at(all, whole(all), point); };
 }
 
 /// opacity: the least of a splat that is taken; with it, none is much larger than the first one.
@@ -115,8 +113,7 @@ Shape flood(const glm::dvec3& point, double tolerance, const std::optional<doubl
             return solid(i) && !(opacity && scale_of(g, i) > largest) &&
                    like(color_of(g, i), color, tolerance);
         });
-        const auto seed = nearest_to(part, point);  // none if its colour is not finite
-        return taken(all, part, seed ? group_at(part, *seed) : std::vector<bool>());
+        return group_at(all, part, point);  // none if the first colour is not finite
     };
 }
 
@@ -249,10 +246,9 @@ Shape parse_shape(const std::string& text, const std::string& what) {
 }  // namespace
 
 Selection parse_selection(const std::string& text, const std::string& what) {
-    constexpr std::pair<std::string_view, Operation> kOperations[] = {
-        {"add:", Operation::add}, {"remove:", Operation::remove}, {"and:", Operation::intersect}};
-    for (const auto& [word, operation] : kOperations)
-        if (text.starts_with(word)) return {operation, parse_shape(text.substr(word.size()), what)};
+    for (size_t i = 1; i < std::size(kOperationWords); ++i)
+        if (const std::string_view word = kOperationWords[i]; text.starts_with(word))
+            return {Operation(i), parse_shape(text.substr(word.size()), what)};
     return {Operation::set, parse_shape(text, what)};
 }
 

@@ -12,6 +12,7 @@
 namespace ewa::edit {
 
 enum class Operation { set, add, remove, intersect };
+inline constexpr std::string_view kOperationWords[] = {"", "add:", "remove:", "and:"};
 
 /// A parsed --select.
 struct Selection {

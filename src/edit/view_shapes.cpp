@@ -287,11 +287,9 @@ bool parse_points(Region& region, const std::string& value, bool brush) {
 Region parse_region(const std::string& text, const std::string& what) {
     Region region;
     bool has_view = false;
-    for (size_t begin = 0; begin <= text.size();) {
-        const size_t end = std::min(text.find(';', begin), text.size());
-        const std::string part = text.substr(begin, end - begin),
-                          value = part.substr(part.find('=') + 1);  // without "=", all
-        if (begin == 0) {
+    for (const std::string_view word : core::split_list(text, ';')) {
+        const std::string part(word), value = part.substr(part.find('=') + 1);  // without "=", all
+        if (region.points.empty()) {
             const bool brush = part.starts_with("brush");
             if (!parse_points(region, value, brush))
                 refuse_shape(what, part,
@@ -312,7 +310,6 @@ Region parse_region(const std::string& text, const std::string& what) {
         } else {
             refuse_shape(what, part, "view=VIEW, front or extent");
         }
-        begin = end + 1;
     }
     if (!has_view) refuse_shape(what, text, "a polygon or a brush with ;view=VIEW behind its points");
     return region;

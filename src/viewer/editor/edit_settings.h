@@ -39,6 +39,7 @@ struct SelectionShapes {
     glm::dvec3 box_low{-1}, box_high{1}, sphere_center{0};
     double sphere_radius = 1;
 };
+inline constexpr float kLeastBrush = 2, kMostBrush = 500;  // radius, px of the window
 
 /// What the tools and the panel share: settings of selecting and of gizmos. The keys of docs/editor.md change them too.
 struct EditSettings : SelectionShapes {

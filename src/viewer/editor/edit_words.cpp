@@ -30,7 +30,7 @@ Tone tone_of(const edit::Adjustment& a) {
 
 /// Whether "x,y,x,y,..." before a semicolon are the corners of a rectangle.
 bool is_rectangle(std::string_view text) {
-    const auto n = core::parse_list(std::string(text.substr(0, text.find(';'))));
+    const auto n = core::parse_list(text.substr(0, text.find(';')));
     if (!n || n->size() != 8) return false;
     const std::vector<double>& at = *n;
     return at[1] == at[3] && at[2] == at[4] && at[5] == at[7] && at[6] == at[0];
@@ -65,11 +65,10 @@ std::vector<edit::Words> adjust(std::initializer_list<edit::Adjustment> adjustme
 std::string selection_title(std::string_view shape) {
     namespace say = texts::edit_panel;
     std::string_view verb = say::kSelect.name;
-    constexpr std::string_view kPrefixes[] = {"add:", "remove:", "and:"};
-    for (size_t i = 0; i < std::size(kPrefixes); ++i) {
-        if (!shape.starts_with(kPrefixes[i])) continue;
-        shape.remove_prefix(kPrefixes[i].size());
-        verb = say::kOperations[i + 1].name;
+    for (size_t i = 1; i < std::size(edit::kOperationWords); ++i) {
+        if (!shape.starts_with(edit::kOperationWords[i])) continue;
+        shape.remove_prefix(edit::kOperationWords[i].size());
+        verb = say::kOperations[i].name;
     }
     const std::string_view name = shape.substr(0, shape.find('='));
     for (const texts::Item& item : {say::kInvert, say::kGrow, say::kShrink})

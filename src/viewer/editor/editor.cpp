@@ -107,8 +107,7 @@ void Editor::insert(const std::string& name, const fs::path& file, std::shared_p
     scene->journaled = journaled;
     scene->id = ++ids_;
     scene->head = edit::head_of(file, splats->size());
-    worker_.add(scene->id, std::move(splats), std::move(cameras), place_of(*scene),
-                std::move(frozen));
+    worker_.add(scene->id, std::move(splats), std::move(cameras), place_of(*scene), std::move(frozen));
     scenes_.push_back(std::move(scene));
     active_ = scenes_.size() - 1;
 }
@@ -202,8 +201,7 @@ void Editor::perform(edit::Step step) {
 }
 
 void Editor::select(const std::string& shape, edit::Operation operation) {
-    constexpr const char* kPrefixes[] = {"", "add:", "remove:", "and:"};
-    std::string text = kPrefixes[size_t(operation)] + shape;
+    std::string text = std::string(edit::kOperationWords[size_t(operation)]) + shape;
     const bool in_view = shape.starts_with("polygon=") || shape.starts_with("brush=");
     if (in_view && settings.front) text += ";front";
     if (in_view && settings.extent) text += ";extent";

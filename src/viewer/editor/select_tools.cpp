@@ -18,7 +18,6 @@ namespace {
 constexpr double kPickPx = 3;           // side of the rectangle of a click
 constexpr double kLineTolerance = 0.5;  // of drawn lines, ToolPicture::unit
 constexpr const char* kOperationSigns[] = {"", "+", "-", "&"};
-constexpr float kLeastBrush = 2, kMostBrush = 500;
 
 bool same_picture(const Camera& a, const Camera& b) {
     return a.width == b.width && a.height == b.height && a.fx == b.fx && a.fy == b.fy &&

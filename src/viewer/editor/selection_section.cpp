@@ -15,8 +15,7 @@
 namespace ewa::viewer {
 namespace {
 
-constexpr float kThinnestBrush = 2, kThickestBrush = 500;  // px
-constexpr double kFirstDistance = 0.01;                    // of the selection's diagonal
+constexpr double kFirstDistance = 0.01;  // of the selection's diagonal
 
 void enclose(EditSettings& settings, const std::array<glm::dvec3, 2>& bounds) {
     settings.box_low = bounds[0];
@@ -66,7 +65,7 @@ void SelectionSection::draw(Editor& editor) {
     ui::checkbox(say::kFront, settings.front);
     ImGui::SameLine();
     ui::checkbox(say::kExtent, settings.extent);
-    ui::slider(say::kBrush, settings.brush, kThinnestBrush, kThickestBrush, "%.0f px", true);
+    ui::slider(say::kBrush, settings.brush, kLeastBrush, kMostBrush, "%.0f px", true);
     ui::slider(say::kTolerance, settings.tolerance, 0, 1, "%.2f");
     draw_shape(editor);
     draw_growth(editor);
