@@ -17,13 +17,6 @@ namespace {
 
 constexpr size_t kMostEditsOfBody = 1000;
 
-/// What a training can do: remove splats, and freeze them, which is --lock.
-bool changes_states(const std::string& name) {
-    for (const char* known : {"select", "delete", "lock", "unlock", "hide", "unhide"})
-        if (name == known) return true;
-    return false;
-}
-
 struct NamedEdit {
     std::string name;
     edit::Edit edit;
@@ -43,7 +36,7 @@ std::vector<NamedEdit> parsed_edits(const std::string& body) {
         const auto& name = texts.front().get_ref<const std::string&>();
         edits.push_back(
             {name, edit::parse(name, texts.size() == 2 ? texts.back().get_ref<const std::string&>() : "")});
-        if (!edits.back().edit.filter && !changes_states(name))
+        if (!edits.back().edit.filter && !edit::changes_states(name))
             throw InputError("--" + name +
                              " changes splats; a training that runs takes edits that remove or lock splats");
     }

@@ -128,6 +128,12 @@ Edit select_shape(const std::string& value) {
             .act = [selection = parse_selection(value)](EditedSplats& splats) { select(splats, selection); }};
 }
 
+Edit remove_shape(const std::string& value) {
+    return {.text = "--remove", .act = [shape = parse_shape(value, "--remove")](EditedSplats& splats) {
+                delete_shape(splats, shape);
+            }};
+}
+
 /// Sets and clears bits of the states of the affected splats.
 template <uint8_t set, uint8_t cleared>
 Edit mark_selected(const char* text) {
@@ -249,6 +255,7 @@ constexpr std::array kRows{
         select_shape},
     Row{"delete", "", "Delete the selected splats",
         [](const std::string&) { return mark_selected<kDeleted, kSelected>("--delete"); }},
+    Row{"remove", "SHAPE", "Delete the splats of a SHAPE of --select. The selection stays", remove_shape},
     Row{"duplicate", "", "Copy the selected splats, and select the copies", duplicate},
     Row{"adjust", "STEP",
         "Change the colours and opacities of the selected splats: tint=r,g,b (factors), brightness=x "
@@ -326,7 +333,8 @@ class Chain {
                                applied_.moved ? Cameras() : cameras_);
         EditedSplats& splats = *selection_;
         const size_t before = splats.left();
-        const bool selects = edit.text.starts_with("--select "), none = splats.count(kSelected) == 0;
+        const bool selects = edit.text.starts_with("--select ");
+        const bool none = edit.text != "--remove" && splats.count(kSelected) == 0;
         acted_ = acted_ || (edit.act && !edit.all);
         Edit now = edit;
         now.all = edit.all || !acted_;  // without --select, each place edit moves the scene
@@ -383,6 +391,11 @@ Edit parse(std::string_view name, const std::string& value) {
     const auto row = std::ranges::find(kRows, name, [](const Row& r) { return std::string_view(r.name); });
     if (row == kRows.end()) throw InputError("--" + std::string(name) + " is no edit");
     return row->parse(value);
+}
+
+bool changes_states(std::string_view name) {
+    return name == "select" || name == "delete" || name == "remove" || name.ends_with("lock") ||
+           name.ends_with("hide");
 }
 
 void perform_on(EditedSplats& splats, const Edit& edit) {

@@ -44,6 +44,9 @@ std::span<const Row> rows();
 /// The edit of this name, without dashes. Throws InputError for a value that cannot be read.
 Edit parse(std::string_view name, const std::string& value = "");
 
+/// Whether the edit of this name selects, deletes, locks or hides splats, and changes no others.
+bool changes_states(std::string_view name);
+
 /// Performs an edit with `act` or `place`. A place edit moves the selected splats, or all of them (Edit::all). Throws InputError, and has changed nothing then.
 void perform_on(EditedSplats& splats, const Edit& edit);
 

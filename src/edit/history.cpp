@@ -88,7 +88,8 @@ bool History::perform(const Step& step) {
     try {
         for (size_t k = 0; k < edits.size(); ++k) {
             Words& words = done.edits[k];
-            if (words.name == "select" && write_contradicted(words.value, splats_))
+            if ((words.name == "select" || words.name == "remove") &&
+                write_contradicted(words.value, splats_))
                 edits[k] = parse(words.name, words.value);
             perform_on(splats_, edits[k]);
         }

@@ -206,6 +206,8 @@ double radius_of(const std::string& what, const std::string& text, const std::st
     return radius;
 }
 
+}  // namespace
+
 Shape parse_shape(const std::string& text, const std::string& what) {
     if (text == "all") return same(true);
     if (text == "none") return same(false);
@@ -243,8 +245,6 @@ Shape parse_shape(const std::string& text, const std::string& what) {
     return of_filter(parse_filter(text, what));
 }
 
-}  // namespace
-
 Selection parse_selection(const std::string& text, const std::string& what) {
     for (size_t i = 1; i < std::size(kOperationWords); ++i)
         if (const std::string_view word = kOperationWords[i]; text.starts_with(word))
@@ -264,6 +264,14 @@ void select(EditedSplats& splats, const Selection& selection) {
         if (selection.operation == Operation::intersect) now = before && flag;
         states[i] = uint8_t((states[i] & ~kSelected) | (now ? kSelected : 0));
     }
+    splats.set_states(std::move(states));
+}
+
+void delete_shape(EditedSplats& splats, const Shape& shape) {
+    const std::vector<bool> flags = shape(splats);
+    std::vector<uint8_t> states = splats.states();
+    for (size_t i = 0; i < states.size(); ++i)
+        if (flags[i] && splats.selectable(i)) states[i] = uint8_t((states[i] | kDeleted) & ~kSelected);
     splats.set_states(std::move(states));
 }
 

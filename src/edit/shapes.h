@@ -42,7 +42,10 @@ struct Selection {
 /// before it, fx and fy are px per world unit of parallel rays.
 Selection parse_selection(const std::string& text, const std::string& what = "--select");
 
-/// Replaces `contradicted` in a --select by the numbers of its splats, as splats= or none. Returns whether the text was one.
+/// Parses a SHAPE alone.
+Shape parse_shape(const std::string& text, const std::string& what);
+
+/// Replaces `contradicted` in a --select or --remove by the numbers of its splats, as splats= or none. Returns whether the text was one.
 bool write_contradicted(std::string& selection, const EditedSplats& splats);
 
 // What tools write; edit/view_shapes.h has the others.
@@ -52,5 +55,7 @@ std::string splats_shape(const std::vector<bool>& flags);  // `none` if no flag 
 
 /// Selects. The states that do not change stay.
 void select(EditedSplats& splats, const Selection& selection);
+/// Deletes the splats of a shape. The others that are selected stay so.
+void delete_shape(EditedSplats& splats, const Shape& shape);
 
 }  // namespace ewa::edit

@@ -428,7 +428,7 @@ void App::send_edits() {
     for (size_t i = sent; i < snapshot.done; ++i)
         for (const edit::Words& words : snapshot.steps[i].edits) {
             edits.push_back({words.name, words.value});
-            changes = changes || words.name == "delete" || words.name.ends_with("lock");
+            changes = changes || !(words.name == "select" || words.name.ends_with("hide"));
         }
     if (!changes) return;
     sent_before_ = std::exchange(sent, snapshot.done);

@@ -33,6 +33,8 @@ TEST_F(ConvertSelection, ChangesTheSelectedSplatsAlone) {
     }
     EXPECT_GT(far, 10u);
     EXPECT_EQ(converted({"--select", "x=0..", "--delete"}).size(), before.size() - far);
+    EXPECT_EQ(converted({"--remove", "x=0.."}).size(), before.size() - far);
+    EXPECT_EQ(converted({"--select", "all", "--remove", "x=0..", "--delete"}).size(), 0u);
     EXPECT_EQ(converted({"--select", "x=0..", "--duplicate"}).size(), before.size() + far);
     EXPECT_EQ(converted({"--select", "x=0..", "--lock", "--select", "all", "--delete", "--unlock"}).size(),
               far);
@@ -52,6 +54,7 @@ TEST_F(ConvertSelection, WarnsWhereNothingIsSelected) {
         EXPECT_EQ(read_splats(out_).gaussians.size(), 200u);
         return outcome.err;
     };
+    EXPECT_EQ(warned({"--remove", "x=900.."}), "");
     EXPECT_EQ(warned({"--delete"}), "warning: --delete changed nothing: no splat is selected\n");
     EXPECT_EQ(warned({"--select", "x=900..", "--transform", "move=1,0,0"}),
               "warning: --select x=900.. selects no splat\n"

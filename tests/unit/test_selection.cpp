@@ -229,6 +229,28 @@ TEST(Selection, TakesSplatsByTheirNumbers) {
     expect_error<InputError>([&] { taken(g, "contradicted"); }, {"--select: photos are known of the folder"});
 }
 
+TEST(Selection, StaysWhereAShapeIsRemoved) {
+    using Flags = std::vector<bool>;
+    const Gaussians g = balls({{0, 0, 0}, {1, 0, 0}, {3, 0, 0}, {9, 9, 9}}, 0.1);
+    History history(std::make_shared<const Gaussians>(g));
+    history.perform(step({{"select", "x=9.."}, {"lock", ""}, {"select", "x=1.."}}));
+    const Step removal = step({{"remove", "x=2.."}, {"remove", "x=..0"}});
+    ASSERT_TRUE(history.perform(removal));
+    EXPECT_EQ(selected(history), (Flags{false, true, false, false}));
+    EXPECT_EQ(history.splats().left(), 2u) << "the last one is locked";
+    EXPECT_EQ(lasting_edits(history.in_effect()).size(), 5u);
+    expect_same_bytes(replayed(g, history.edits()), history.splats().result());
+    expect_same_bytes(replayed(g, needed_edits(history.edits())), history.splats().result());
+    history.undo();
+    EXPECT_EQ(selected(history), (Flags{false, true, true, false}));
+    EXPECT_EQ(history.splats().left(), 4u);
+    history.redo();
+    EXPECT_EQ(selected(history), (Flags{false, true, false, false}));
+    history.perform(step({{"delete", ""}}));
+    EXPECT_EQ(history.splats().left(), 1u);
+    expect_error<InputError>([] { parse("remove", "add:x=2.."); }, {"--remove: 'add:x=2..'"});
+}
+
 TEST(Selection, OfContradictedSplatsIsWrittenAsTheirNumbers) {
     Cameras cameras = [] { return std::vector<Camera>(); };
     std::vector<std::vector<uint32_t>> asked;

@@ -50,13 +50,12 @@ TEST(Comparing, IsOfWhatTheFloatersLeave) {
     worker.preview({"floaters", "contradicted"});
     EXPECT_EQ(done_with(worker).preview_count, 4u);
     worker.preview({});
-    worker.perform(
-        1, {"Clean", {{"select", "floaters"}, {"delete", ""}, {"select", "contradicted"}, {"delete", ""}}});
+    worker.perform(1, {"Clean", {{"remove", "floaters"}, {"remove", "contradicted"}}});
     const EditWorker::Done done = done_with(worker);
     EXPECT_EQ(done.note, "");
     EXPECT_EQ(done.preview_count, std::nullopt);
     ASSERT_EQ(done.snapshot->steps.size(), 1u);
-    EXPECT_EQ(done.snapshot->steps[0].edits[2], (edit::Words{"select", "splats=3-4,7"}));
+    EXPECT_EQ(done.snapshot->steps[0].edits[1], (edit::Words{"remove", "splats=3-4,7"}));
     EXPECT_EQ(done.snapshot->left, 9u);
     EXPECT_EQ(asked, 2u);
 }

@@ -52,8 +52,7 @@ void CleanSection::preview(Editor& editor, const std::vector<std::string>& shape
 /// A preview stays until the splats are gone.
 void CleanSection::remove(Editor& editor, const char* title, const std::vector<std::string>& shapes) {
     edit::Step step{title, {}};
-    for (const std::string& shape : shapes)
-        step.edits.insert(step.edits.end(), {{"select", shape}, {"delete", ""}});
+    for (const std::string& shape : shapes) step.edits.push_back({"remove", shape});
     editor.perform(step);
 }
 

@@ -231,15 +231,11 @@ void EditWorker::find_preview() {
     if (preview_.empty() || found == scenes_.end()) return;
     edit::EditedSplats splats = found->second.history->splats();
     previewed_.resize(splats.size());
-    for (const std::string& selection : preview_) {
-        const std::vector<bool> flags = edit::parse_selection(selection).shape(splats);
-        std::vector<uint8_t> states = splats.states();
-        for (size_t i = 0; i < flags.size(); ++i) {
-            if (!flags[i] || !splats.selectable(i)) continue;
-            previewed_[i] = true;
-            states[i] |= edit::kDeleted;
-        }
-        splats.set_states(std::move(states));
+    for (const std::string& shape : preview_) {
+        edit::delete_shape(splats, edit::parse_shape(shape, "--remove"));
+        const auto& before = found->second.history->splats().states();
+        for (size_t i = 0; i < before.size(); ++i)
+            previewed_[i] = ((before[i] ^ splats.states()[i]) & edit::kDeleted) != 0;
     }
 }
 
@@ -474,9 +470,9 @@ void EditWorker::saved(uint64_t id, const std::vector<edit::Step>& steps) {
     });
 }
 
-void EditWorker::preview(const std::vector<std::string>& selections) {
-    post([this, selections] {
-        preview_ = selections;
+void EditWorker::preview(const std::vector<std::string>& shapes) {
+    post([this, shapes] {
+        preview_ = shapes;
         try {
             find_preview();
         } catch (const std::exception& error) {

@@ -57,8 +57,8 @@ class EditWorker {
     void redo(uint64_t scene);
     /// These edits of state_of() are in a file that was saved.
     void saved(uint64_t scene, const std::vector<edit::Step>& steps);
-    /// selections: each of the splats that those before leave; empty: none.
-    void preview(const std::vector<std::string>& selections);
+    /// shapes: each of the splats that those before leave; empty: none.
+    void preview(const std::vector<std::string>& shapes);
     void drag(const std::optional<glm::dmat4>& transform);  // a newer one replaces one that waits
 
     /// The steps in effect and the splats of a scene, once all tasks before are done.
@@ -132,7 +132,7 @@ class EditWorker {
     // The thread alone uses these.
     std::map<uint64_t, Scene> scenes_;
     uint64_t active_ = 0;
-    std::vector<std::string> preview_;  // selections; empty: none
+    std::vector<std::string> preview_;  // shapes; empty: none
     std::vector<bool> previewed_;       // of the active scene's splats; empty: none
     std::optional<glm::dmat4> drag_;
     std::shared_ptr<const Gaussians> joined_;

@@ -188,11 +188,7 @@ void Editor::separate() {
 
 void Editor::perform(edit::Step step) {
     if (scenes_.empty()) return;
-    const auto states_alone = [](const edit::Words& words) {
-        return words.name == "select" || words.name == "delete" || words.name.ends_with("lock") ||
-               words.name.ends_with("hide");
-    };
-    if (settings.live && !std::ranges::all_of(step.edits, states_alone)) {
+    if (settings.live && !std::ranges::all_of(step.edits, edit::changes_states, &edit::Words::name)) {
         note_ = texts::kLiveRefuses;
         return;
     }
@@ -219,9 +215,9 @@ void Editor::redo() {
     if (!scenes_.empty()) worker_.redo(now().id);
 }
 
-void Editor::preview(const std::vector<std::string>& selections) {
-    if (selections.empty()) worker_.cancel();
-    worker_.preview(selections);
+void Editor::preview(const std::vector<std::string>& shapes) {
+    if (shapes.empty()) worker_.cancel();
+    worker_.preview(shapes);
 }
 
 Editor::News Editor::take() {

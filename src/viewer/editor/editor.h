@@ -70,9 +70,9 @@ class Editor {
     void select(const std::string& shape, edit::Operation operation);
     void undo();
     void redo();
-    /// Shows in red what selections would take, each of the splats that those before leave. Nothing changes. None: ends that, and
-    /// comparisons with photos.
-    void preview(const std::vector<std::string>& selections);
+    /// Shows in red what the removal of shapes would take, each of the splats that those before leave. Nothing changes. None: ends
+    /// that, and comparisons with photos.
+    void preview(const std::vector<std::string>& shapes);
     /// The comparison with photos in progress.
     const std::shared_ptr<Comparing>& comparing() const { return worker_.comparing(); }
     std::optional<size_t> preview_count() const { return preview_count_; }
