@@ -63,7 +63,7 @@ inline constexpr ToolText kTools[] = {
     {Tool::sphere, "Sphere", "N", "Click a centre, drag the handles; Enter selects, Esc takes a drag back"},
     {Tool::box, "Box", "X", "Drag the handles of the box; Enter selects, Esc takes a drag back"},
     {Tool::flood, "Flood", "O",
-     "Click a splat: it and those that touch it, of like colour; Shift adds, Ctrl removes"},
+     "Click a splat: it and those that touch it, of like colour, not faint; Shift adds, Ctrl removes"},
     {Tool::eyedropper, "Eyedropper", "I", "Click a splat: all of its colour; Shift adds, Ctrl removes"},
     {Tool::move, "Move", "1", "Drag an arrow: the selection moves, or everything; Shift snaps, Esc cancels"},
     {Tool::rotate, "Rotate", "2", "Drag a ring; Shift snaps to 15 degrees, Esc cancels"},
