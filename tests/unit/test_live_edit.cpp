@@ -42,6 +42,7 @@ TEST(LiveEdit, DeletesAndLocksSelections) {
     };
     const SplatEdit deleted = edit(R"([["select", "x=2.."], ["select", "remove:x=4.."], ["delete"]])");
     EXPECT_EQ(deleted.remove, (std::vector<uint32_t>{2, 3}));
+    EXPECT_EQ(edit(R"([["remove", "x=4.."]])").remove, std::vector<uint32_t>{4});
     const SplatEdit locked = edit(R"([["select", "x=..1"], ["lock"], ["select", "invert"], ["delete", ""]])");
     EXPECT_EQ(locked.freeze, (std::vector<uint32_t>{0, 1}));
     EXPECT_EQ(locked.remove, (std::vector<uint32_t>{2, 3, 4}));
