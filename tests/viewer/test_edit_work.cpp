@@ -119,6 +119,18 @@ TEST_F(EditWork, LocksWhatATrainingHasFrozen) {
     EXPECT_EQ(editor_->snapshot().locked, 0u);
 }
 
+/// The file of a training that runs has splats of an earlier step.
+TEST_F(EditWork, SavesTheSplatsOfATrainingAndNotThoseOfItsFile) {
+    Gaussians newer = load_splats(scene_);
+    newer.resize(300);
+    editor_->enter("a.ply", scene_, std::make_shared<const Gaussians>(newer), {}, false);
+    settle(*editor_);
+    EXPECT_EQ(saved(), 300u);
+    EXPECT_FALSE(noted("has changed")) << note_;
+    delete_right();
+    EXPECT_EQ(saved(), left());
+}
+
 TEST_F(EditWork, IsUnsavedAfterASaveThatFails) {
     delete_right();
     write_file(folder_ / "folder", "");

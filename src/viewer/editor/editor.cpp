@@ -61,7 +61,7 @@ std::string save_parts(const fs::path& program, std::vector<Part>& parts, const 
         part.state = part.future.get();
         if (!part.state.first) throw RunError("the scene is closed");
         part.as_opened = part.scene.as_opened();
-        if (!part.as_opened)
+        if (!part.as_opened && !part.scene.newer)
             note += "; " + core::one_line(part.scene.file.filename().string()) +
                     " has changed on disk, and these are the splats that were opened";
         if (part.state.left > 0 || parts.size() == 1) filled.push_back(&part);
@@ -96,7 +96,7 @@ void Editor::set_budget(size_t budget) {
 }
 
 bool EditedScene::as_opened() const {
-    return edit::same_version(head, edit::head_of(file, head.splats));
+    return !newer && edit::same_version(head, edit::head_of(file, head.splats));
 }
 
 void Editor::insert(const std::string& name, const fs::path& file, std::shared_ptr<const Gaussians> splats,
@@ -124,6 +124,7 @@ void Editor::enter(const std::string& name, const fs::path& file, std::shared_pt
                    edit::Cameras cameras, bool journaled, std::vector<bool> frozen) {
     clear();
     insert(name, file, std::move(splats), std::move(cameras), journaled, std::move(frozen));
+    scenes_.back()->newer = !journaled && !file.empty();
 }
 
 void Editor::activate(size_t scene) {

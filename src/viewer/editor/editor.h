@@ -25,6 +25,7 @@ struct EditedScene {
     size_t part = 1;             // more: it was separated from another scene of the file
     edit::JournalHead head;      // of the file, as it was when it was opened
     bool journaled = false;      // all edits are in the journal; it is there once there are edits
+    bool newer = false;          // the splats are those of a training, and newer than the file's
     uint64_t id = 0;
     bool shown = true;
     bool unsaved = false;
