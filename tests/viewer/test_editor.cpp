@@ -119,8 +119,8 @@ TEST_F(Editor, AsksNothingOnceAllIsSaved) {
     ASSERT_TRUE(session.found());
     screenshot(session);
     session.send("key Tab key ctrl+a");
+    EXPECT_TRUE(soon([&] { return std::filesystem::exists(journal_ + ".before"); }, kSessionPatience));
     EXPECT_TRUE(journal_has(2));
-    EXPECT_TRUE(std::filesystem::exists(journal_ + ".before"));
 }
 
 TEST_F(Editor, RestoresTheEditsOfASessionThatWasKilled) {
