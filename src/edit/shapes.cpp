@@ -289,8 +289,8 @@ std::string splats_shape(const std::vector<bool>& flags) {
         if (!flags[i]) continue;
         size_t last = i;
         while (last + 1 < flags.size() && flags[last + 1]) ++last;
-        text += (text.empty() ? "splats=" : ",") + std::to_string(i);
-        if (last > i) text += "-" + std::to_string(last);
+        text.append(text.empty() ? "splats=" : ",").append(std::to_string(i));
+        if (last > i) text.append("-").append(std::to_string(last));
         i = last;
     }
     return text.empty() ? "none" : text;
