@@ -8,11 +8,14 @@
 namespace ewa::core {
 
 struct Plugin {
-    const char* file;     // "libewa_mpi.so"
+    const char* name;     // of its file, without the system's ending: "libewa_mpi"
     const char* entry;    // the name of the table of functions that it exports
     const char* purpose;  // for messages: "which lets processes train together"
     const char* help;     // for messages: what to install
 };
+
+/// The name of the library's file: "libewa_mpi.so".
+std::string file_name(const Plugin& plugin);
 
 /// Throws RunError: the library cannot be loaded, with the reason and a remedy.
 [[noreturn]] void cannot_load(const Plugin& plugin, const std::string& reason);

@@ -3,14 +3,12 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <sys/auxv.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -22,6 +20,7 @@
 #include "core/folders.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "platform/library.h"
 
 extern char** environ;
 
@@ -206,8 +205,7 @@ std::filesystem::path find_program(const std::string& name) {
 
 std::filesystem::path own_program() {
     std::error_code unknown;
-    const auto program =
-        std::filesystem::canonical(std::bit_cast<const char*>(getauxval(AT_EXECFN)), unknown);
+    std::filesystem::path program = platform::own_program(unknown);
     if (unknown) throw RunError("cannot find where this program is: " + unknown.message());
     return program;
 }

@@ -177,7 +177,7 @@ struct OpenImageIO {
     void (*jpeg_of_heif)(const std::string& heif, const std::string& jpeg,
                          const std::function<void(const ImageHeader&)>& check);
 };
-constexpr const char* kModuleFile = "libewa_openimageio.so";
+constexpr const char* kModuleName = "libewa_openimageio";
 /// The module's entry, whose name ends in the number of the layout. Increase it whenever a type above changes: a
 /// module of another layout then lacks this entry, and is refused.
 constexpr const char* kModuleEntry = "ewa_openimageio_layout_2";

@@ -8,7 +8,7 @@ namespace ewa::image {
 namespace {
 
 constexpr core::Plugin kPlugin{
-    kModuleFile, kModuleEntry, "which reads and writes all image formats but PNG and JPEG",
+    kModuleName, kModuleEntry, "which reads and writes all image formats but PNG and JPEG",
     "install ewa's module and OpenImageIO (Debian: libopenimageio-dev), or convert the image to PNG"};
 
 // Some of OpenImageIO's libraries start threads when they are loaded. Where they cannot, the process hangs or
@@ -19,7 +19,7 @@ constexpr int kThreads = 8;
 /// Throws unless the module can be loaded with what the system still gives.
 void check_room() {
     if (core::has_room(kAddressSpace, kThreads)) return;
-    throw RunError(std::string(kModuleFile) + " needs " + std::to_string(kAddressSpace >> 20) +
+    throw RunError(core::file_name(kPlugin) + " needs " + std::to_string(kAddressSpace >> 20) +
                    " MiB of address space and " + std::to_string(kThreads) +
                    " threads, more than the system gives; " + core::address_limit_text() +
                    "a higher limit (ulimit -a) helps, or an image in PNG");

@@ -6,7 +6,7 @@
 namespace ewa::mesh {
 
 const Meshing& meshing() {
-    static constexpr core::Plugin plugin{"libewa_meshing.so", kMeshingEntry, "which makes meshes",
+    static constexpr core::Plugin plugin{"libewa_meshing", kMeshingEntry, "which makes meshes",
                                          "install ewa's module and OpenVDB (Debian: libopenvdb-dev)"};
     static const auto& loaded = *static_cast<const Meshing*>(core::load_plugin(plugin));
     return loaded;

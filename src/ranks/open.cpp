@@ -12,7 +12,7 @@ namespace ewa {
 namespace ranks {
 
 const Mpi& load_mpi() {
-    constexpr core::Plugin kPlugin{kMpiFile, kMpiEntry,
+    constexpr core::Plugin kPlugin{kMpiName, kMpiEntry,
                                    "which lets the processes of a launcher train together",
                                    "install ewa's module and Open MPI (Debian: openmpi-bin), or start ewa "
                                    "without mpirun and srun"};

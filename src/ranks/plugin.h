@@ -22,7 +22,7 @@ struct Mpi {
     const char* version;  // EWA_VERSION; the loader reads it before it calls a function
     std::shared_ptr<Ranks> (*open)(const MpiOptions& options);
 };
-constexpr const char* kMpiFile = "libewa_mpi.so";
+constexpr const char* kMpiName = "libewa_mpi";
 /// Ends in the number of the layout. Count it up whenever a type above or Ranks changes: a module of another layout
 /// then has no such entry, and is refused.
 constexpr const char* kMpiEntry = "ewa_mpi_layout_2";
