@@ -8,6 +8,7 @@
 #include "core/exclusion.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "platform/terminal.h"
 
 namespace {
 
@@ -20,6 +21,7 @@ int fail(const std::string& what, int status) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    ewa::platform::begin_program(argc, argv);
     CLI::App app{
         "Measures the time of each pass of ewa on a Vulkan device, and its error against the CPU reference."};
     app.name("ewa-bench");

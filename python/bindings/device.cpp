@@ -4,7 +4,6 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
@@ -15,6 +14,7 @@
 
 #include "bindings.h"
 #include "ewa/error.h"
+#include "platform/process.h"
 #include "vulkan_loader.h"
 
 namespace ewa::python {
@@ -25,7 +25,7 @@ struct DefaultDevice {
     std::recursive_mutex mutex;
     std::string selector;
     std::shared_ptr<gpu::Device> device;
-    std::atomic<pid_t> opened_by = 0;
+    std::atomic<int> opened_by = 0;
     std::atomic<int> present = 0;  // DeviceWorks
     std::atomic<bool> ending = false;
     std::thread::id ended_by;
@@ -98,8 +98,8 @@ std::string device_text(const DeviceInfo& info) {
 }  // namespace
 
 bool was_forked() {
-    const pid_t opened_by = default_device().opened_by;
-    return opened_by != 0 && opened_by != getpid();
+    const int opened_by = default_device().opened_by;
+    return opened_by != 0 && opened_by != platform::process_id();
 }
 
 DeviceWork::DeviceWork()
@@ -125,7 +125,7 @@ void DeviceWork::stay_while_python_ends() {
     if (!one.ending || one.ended_by == std::this_thread::get_id()) return;
     lock_.unlock();
     --one.present;
-    for (;;) pause();
+    for (;;) std::this_thread::sleep_for(std::chrono::hours(1));
 }
 
 std::shared_ptr<gpu::Device> DeviceWork::device() const {
@@ -137,7 +137,7 @@ std::shared_ptr<gpu::Device> DeviceWork::device() const {
         } catch (const InputError& error) {
             throw RunError(error.what());  // a device that is missing is a DeviceError
         }
-        one.opened_by = getpid();
+        one.opened_by = platform::process_id();
     }
     return one.device;
 }

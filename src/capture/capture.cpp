@@ -20,6 +20,7 @@
 #include "io/datasets/dataset_folders.h"
 #include "io/splats/place.h"
 #include "io/splats/zip_files.h"
+#include "platform/file.h"
 
 namespace ewa {
 namespace {
@@ -246,8 +247,8 @@ void convert(Making& now, const fs::path& photos, const fs::path& link, capture:
         if (std::ranges::any_of(chosen.names, capture::is_heif))
             capture::convert_photos(photos, chosen.names, images, now.folder / "colmap/log.txt",
                                     now.progress);
-        else
-            fs::create_directory_symlink(link, images);
+        else if (const auto error = platform::link_folder(link, images, platform::Elsewhere::copied))
+            throw fs::filesystem_error("cannot create directory symlink", link, images, error);
     }
     std::vector<capture::Skipped> skipped;
     std::set<std::string> gone;

@@ -59,7 +59,8 @@ std::string said(std::vector<std::string> words, const fs::path& film, const std
     words.insert(words.end(), more.begin(), more.end());
     const bool errors = words[0] == "ffmpeg";
     const core::Answer answer = core::ask_program(
-        {.command = std::move(words), .environment = {}, .log = "/dev/null", .joined = errors}, go_on);
+        {.command = std::move(words), .environment = {}, .log = platform::kNullFile, .joined = errors},
+        go_on);
     if (answer.ended == core::Ended::stopped) throw Stopped();
     return answer.ended == core::Ended::done || errors ? answer.text : std::string();
 }

@@ -27,7 +27,7 @@ bool is_here(const Converter& converter) {
     if (core::find_program(converter.program).empty()) return false;
     if (!converter.of_imagemagick) return true;
     const core::Answer formats = core::ask_program(
-        {.command = {converter.program, "-list", "format"}, .environment = {}, .log = "/dev/null"});
+        {.command = {converter.program, "-list", "format"}, .environment = {}, .log = platform::kNullFile});
     return formats.text.find("HEIC") != std::string::npos;
 }
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/inputs.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <memory>
@@ -23,6 +21,7 @@
 #include "io/datasets/importers/importer.h"
 #include "io/gltf/mesh.h"
 #include "io/splats/zip_files.h"
+#include "platform/process.h"
 
 namespace ewa {
 namespace {
@@ -183,8 +182,9 @@ std::shared_ptr<const void> read_archive(const fs::path& archive,
                          ": an archive without cameras; ewa cameras searches those of the photos in it");
     // A process that is forked from this one leaves the folder to it.
     const std::shared_ptr<const core::TemporaryFolder> folder(
-        new core::TemporaryFolder("ewa-zip-"), [owner = getpid()](const core::TemporaryFolder* made) {
-            if (getpid() == owner) delete made;
+        new core::TemporaryFolder("ewa-zip-"),
+        [owner = platform::process_id()](const core::TemporaryFolder* made) {
+            if (platform::process_id() == owner) delete made;
         });
     try {
         read(unpack_archive(archive, folder->path()));

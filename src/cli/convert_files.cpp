@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/convert_files.h"
 
-#include <sys/stat.h>
-
 #include <set>
-#include <utility>
 
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/splats/format_table.h"
 #include "io/splats/scene_page.h"
+#include "platform/file.h"
 
 namespace ewa::cli {
 
@@ -30,11 +28,13 @@ std::vector<fs::path> parts_of(const fs::path& out, bool unbundled) {
 
 uint64_t bytes_of(const std::vector<fs::path>& files) {
     uint64_t sum = 0;
-    std::set<std::pair<dev_t, ino_t>> counted;
-    for (const fs::path& file : files)
-        if (struct stat found{};
-            stat(file.c_str(), &found) == 0 && counted.emplace(found.st_dev, found.st_ino).second)
-            sum += uint64_t(found.st_size);
+    std::set<platform::FileId> counted;
+    for (const fs::path& file : files) {
+        std::error_code absent;
+        const uint64_t bytes = fs::file_size(file, absent);
+        const auto id = platform::file_id(file);
+        if (id && !absent && counted.insert(*id).second) sum += bytes;
+    }
     return sum;
 }
 

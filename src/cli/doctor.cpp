@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa doctor: what works on this machine, and what to install for the rest.
 #include <spdlog/fmt/fmt.h>
-#include <unistd.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -25,6 +24,9 @@
 #include "ewa/error.h"
 #include "ewa/trainer.h"
 #include "image/image_files.h"
+#include "platform/file.h"
+#include "platform/folders.h"
+#include "platform/system.h"
 #include "ranks/plugin.h"
 
 namespace ewa::cli {
@@ -122,17 +124,11 @@ std::string train_once(const DeviceOptions& options) {
 
 std::string memory_text() {
     constexpr uint64_t kLeast = uint64_t(1) << 30;
-    std::ifstream file("/proc/meminfo");
-    for (std::string name, unit; file >> name;) {
-        uint64_t kilobytes = 0;
-        file >> kilobytes;
-        std::getline(file, unit);
-        if (name != "MemAvailable:") continue;
-        const std::string text = core::bytes_text(kilobytes * 1024) + " free";
-        if (kilobytes * 1024 < kLeast) throw RunError(text + "; trainings need 1 GB and more");
-        return text;
-    }
-    return "the system does not say how much is free";
+    const std::optional<uint64_t> free = platform::free_memory();
+    if (!free) return "the system does not say how much is free";
+    const std::string text = core::bytes_text(*free) + " free";
+    if (*free < kLeast) throw RunError(text + "; trainings need 1 GB and more");
+    return text;
 }
 
 /// A folder that does not exist is made where its first parent is.
@@ -142,7 +138,7 @@ std::string folder_text(fs::path folder) {
     folder = fs::absolute(folder);
     while (!fs::exists(folder) && folder.has_relative_path()) folder = folder.parent_path();
     if (!fs::is_directory(folder)) throw RunError(core::one_line(folder.string()) + " is no folder");
-    if (access(folder.c_str(), W_OK | X_OK) != 0)
+    if (platform::refuses_files(folder))
         throw RunError(core::one_line(folder.string()) + " cannot be written");
     const uint64_t room = fs::space(folder).available;
     const std::string text = name + ", " + core::bytes_text(room) + " free";
@@ -152,10 +148,8 @@ std::string folder_text(fs::path folder) {
 
 /// Where Mesa keeps compiled shaders.
 fs::path shader_cache() {
-    for (const char* variable : {"MESA_SHADER_CACHE_DIR", "XDG_CACHE_HOME"})
-        if (const char* folder = std::getenv(variable); folder && *folder) return folder;
-    const char* home = std::getenv("HOME");
-    return fs::path(home ? home : "/") / ".cache";
+    const std::string own = platform::variable("MESA_SHADER_CACHE_DIR");
+    return own.empty() ? platform::cache_folder() : fs::path(own);
 }
 
 std::string program_path(const std::vector<const char*>& names) {
@@ -174,7 +168,7 @@ std::string python_version() {
     const core::Answer answer = core::ask_program(
         {.command = {python, "-c", "import sys; sys.path.pop(0); import ewa; print(ewa.__version__)"},
          .environment = {},
-         .log = "/dev/null"});
+         .log = platform::kNullFile});
     if (answer.ended != core::Ended::done) throw RunError(python + " has no package ewa");
     return core::one_line(core::trim(answer.text)) + ", " + python;
 }

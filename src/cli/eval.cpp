@@ -19,6 +19,7 @@
 #include "core/text.h"
 #include "ewa/evaluation.h"
 #include "ewa/splat_files.h"
+#include "platform/terminal.h"
 #include "scene/dataset_files.h"
 
 namespace ewa::cli {
@@ -83,7 +84,8 @@ int run(const CLI::App& app, const EvalArguments& arguments) {
     if (arguments.depth) train::check_depth_evaluation(dataset, frames, options);
 
     // The lines of the frames follow: a file gets no others.
-    Progress progress("evaluated", int(frames.size()) * (arguments.depth ? 2 : 1), "views", !core::redraws());
+    Progress progress("evaluated", int(frames.size()) * (arguments.depth ? 2 : 1), "views",
+                      !platform::redraws());
     int begun = 0;
     const auto before_frame = [&] { progress.update(begun++); };
     const auto device = open_device(arguments.views.device);

@@ -1,27 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 // Ctrl-C and other requests to end. Long work checks for them between its steps.
 #pragma once
-#include <csignal>
-
-#include <array>
 #include <string>
 #include <vector>
 
+#include "platform/signals.h"
+
 namespace ewa::cli {
 
-/// While a watch exists, SIGINT, SIGTERM, SIGUSR1, SIGXCPU and SIGHUP (unless nohup ignores it) only set a flag, however often
-/// they arrive. timeout(1) signals the program and then its group, and a second Ctrl-C must not prevent what
+/// While a watch exists, requests to end (platform/signals.h) only set a flag, however often they arrive; SIGHUP does nothing where
+/// nohup ignores it. timeout(1) signals the program and then its group, and a second Ctrl-C must not prevent what
 /// the first one saves. SIGQUIT (Ctrl-\ on a terminal) and SIGKILL still end the program at once.
 /// The destructor restores the handlers. At most one watch exists at a time.
 class InterruptWatch {
   public:
     InterruptWatch();
-    ~InterruptWatch();
-    InterruptWatch(const InterruptWatch&) = delete;
-    InterruptWatch& operator=(const InterruptWatch&) = delete;
 
   private:
-    std::array<struct sigaction, 5> before_;
+    platform::HandledRequests handled_;
 };
 
 /// Whether a signal has arrived during a watch.

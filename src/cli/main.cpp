@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/program.h"
 #include "core/messages.h"
-#include "core/terminal.h"
+#include "platform/terminal.h"
 
 int main(int argc, char** argv) {
-    ewa::core::open_standard_streams();
+    ewa::platform::begin_program(argc, argv);
     ewa::core::print_warnings();
     return ewa::cli::run_program(argc, argv);
 }

@@ -18,6 +18,7 @@
 #include "folders/run_folder.h"
 #include "live/server.h"
 #include "live/watcher.h"
+#include "platform/terminal.h"
 #include "report/summary.h"
 #include "scene/splat_arrays.h"
 
@@ -244,7 +245,7 @@ void TrainObserver::on_saved(const StepReport&) {
 
 void TrainObserver::on_view(size_t done, size_t views) {
     // A file gets the note that comes before.
-    if (!core::redraws()) return;
+    if (!platform::redraws()) return;
     if (!progress_) progress_ = std::make_unique<Progress>("evaluated", int(views), "views", output_.quiet);
     progress_->update(int(done));
 }

@@ -5,8 +5,10 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include "ewa/error.h"
+#include "platform/file.h"
 
 namespace ewa::core {
 
@@ -16,8 +18,9 @@ class FullDisk : public RunError {
     using RunError::RunError;
 };
 
-/// Throws FullDisk or RunError for a file that cannot be written. doing: the operation that failed. reason: its errno.
-[[noreturn]] void fail_to_write(const std::filesystem::path& path, const char* doing, int reason);
+/// Throws FullDisk or RunError for a file that cannot be written. doing: the operation that failed. reason: the system's.
+[[noreturn]] void fail_to_write(const std::filesystem::path& path, const char* doing,
+                                const std::error_code& reason);
 
 /// Writes a temporary file in the same directory, which commit() renames to the path. Until then, and after
 /// any failure, the path keeps its content. The destructor removes the temporary file. Throws RunError that
@@ -46,10 +49,10 @@ class AtomicFile {
     void commit();
 
   private:
-    [[noreturn]] void fail(const char* doing) const;
+    void check(const std::error_code& error, const char* doing) const;
 
     std::filesystem::path target_, temporary_;
-    int descriptor_ = -1;
+    platform::File file_;
     int listed_ = -1;  // for remove_unfinished_files()
     bool claimed_ = false;
 };

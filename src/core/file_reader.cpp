@@ -1,12 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/file_reader.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 
 #include "core/text.h"
 #include "ewa/error.h"
@@ -19,22 +14,22 @@ constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";  // of Windows' edit
 }  // namespace
 
 FileReader::FileReader(const std::filesystem::path& path) : name_(one_line(path.string())) {
-    struct stat status {};
+    std::error_code error;
     // Checked before it is opened, because opening a named pipe would wait for a writer.
-    if (stat(path.c_str(), &status) != 0)
-        throw InputError(name_ + ": cannot be read: " + std::strerror(errno));
-    if (!S_ISREG(status.st_mode)) throw InputError(name_ + ": is not a regular file");
-    descriptor_ = open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    if (descriptor_ < 0) throw InputError(name_ + ": cannot be opened: " + std::strerror(errno));
-    size_ = static_cast<uint64_t>(status.st_size);
+    const auto status = std::filesystem::status(path, error);
+    if (error) throw InputError(name_ + ": cannot be read: " + error.message());
+    if (!std::filesystem::is_regular_file(status)) throw InputError(name_ + ": is not a regular file");
+    error = file_.open(path, platform::Open::read);
+    if (error) throw InputError(name_ + ": cannot be opened: " + error.message());
+    check(file_.size(size_));
     buffer_.resize(static_cast<size_t>(std::min<uint64_t>(size_, kBufferBytes)));
 }
 
 FileReader::FileReader(std::string name, std::vector<std::byte> bytes)
     : name_(std::move(name)), size_(bytes.size()), buffer_(std::move(bytes)), end_(buffer_.size()) {}
 
-FileReader::~FileReader() {
-    if (descriptor_ >= 0) close(descriptor_);
+void FileReader::check(const std::error_code& error) const {
+    if (error) fail("cannot be read: " + error.message());
 }
 
 void FileReader::fail(std::string_view text) const {
@@ -48,11 +43,10 @@ void FileReader::fill(size_t n) {
     begin_ = 0;
     if (buffer_.size() < n) buffer_.resize(n);
     while (end_ < n) {
-        const ssize_t got = ::read(descriptor_, buffer_.data() + end_, buffer_.size() - end_);
-        if (got < 0 && errno == EINTR) continue;
-        if (got < 0) fail(std::string("cannot be read: ") + std::strerror(errno));
+        size_t got = 0;
+        check(file_.read(buffer_.data() + end_, buffer_.size() - end_, got));
         if (got == 0) fail("the file became shorter while it was read");
-        end_ += static_cast<size_t>(got);
+        end_ += got;
     }
 }
 
@@ -75,8 +69,7 @@ void FileReader::skip(uint64_t n, std::string_view what) {
     require_bytes(n, what);
     const size_t buffered = static_cast<size_t>(std::min<uint64_t>(n, end_ - begin_));
     begin_ += buffered;
-    if (n > buffered && lseek(descriptor_, static_cast<off_t>(n - buffered), SEEK_CUR) < 0)
-        fail(std::string("cannot be read: ") + std::strerror(errno));
+    if (n > buffered) check(file_.skip(n - buffered));
     offset_ += n;
 }
 
@@ -85,12 +78,11 @@ void FileReader::go_to(uint64_t offset, std::string_view what) {
         fail("the file ends before " + std::string(what) + ", which is said to be at byte " +
              std::to_string(offset) + " of " + std::to_string(size_));
     offset_ = offset;
-    if (descriptor_ < 0) {  // all bytes are in the buffer
+    if (!file_.is_open()) {  // all bytes are in the buffer
         begin_ = static_cast<size_t>(offset);
         return;
     }
-    if (lseek(descriptor_, static_cast<off_t>(offset), SEEK_SET) < 0)
-        fail(std::string("cannot be read: ") + std::strerror(errno));
+    check(file_.go_to(offset));
     begin_ = end_ = 0;
 }
 

@@ -8,7 +8,10 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
+
+#include "platform/file.h"
 
 namespace ewa::core {
 
@@ -21,7 +24,6 @@ class FileReader {
     explicit FileReader(const std::filesystem::path& path);
     /// Reads bytes in memory as if they were a file. name: what errors begin with.
     FileReader(std::string name, std::vector<std::byte> bytes);
-    ~FileReader();
     FileReader(const FileReader&) = delete;
     FileReader& operator=(const FileReader&) = delete;
 
@@ -61,11 +63,12 @@ class FileReader {
     [[noreturn]] void fail(std::string_view text) const;
 
   private:
+    void check(const std::error_code& error) const;
     void require_bytes(uint64_t n, std::string_view what) const;
     void fill(size_t n);  // makes at least n bytes available in the buffer
 
     std::string name_;
-    int descriptor_ = -1;
+    platform::File file_;
     uint64_t size_ = 0, offset_ = 0;
     std::vector<std::byte> buffer_;
     size_t begin_ = 0, end_ = 0;  // the part of the buffer that was read from the file but not taken

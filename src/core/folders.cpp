@@ -1,17 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/folders.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstdlib>
-#include <cstring>
 #include <system_error>
 
 #include "core/text.h"
 #include "ewa/error.h"
+#include "platform/folders.h"
 
 namespace ewa::core {
 
@@ -34,11 +28,11 @@ bool is_of_desktop(const std::filesystem::path& inside) {
 }
 
 std::string with_home(const std::string& word) {
-    const char* home = std::getenv("HOME");
+    const std::string home = platform::home_folder().string();
     const size_t equals = word.find('=');
     const size_t begin = word.starts_with("--") && equals != std::string::npos ? equals + 1 : 0;
     const bool names_home = word.compare(begin, 2, "~/") == 0 || word.substr(begin) == "~";
-    if (!home || *home == 0 || !names_home) return word;
+    if (home.empty() || !names_home) return word;
     return word.substr(0, begin) + home + word.substr(begin + 1);
 }
 
@@ -51,21 +45,14 @@ void make_folder(const std::filesystem::path& folder) {
 }
 
 FolderLock::FolderLock(const std::filesystem::path& folder) {
-    descriptor_ = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (descriptor_ < 0 || flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
-    close(descriptor_);
-    throw RunError(one_line(folder.string()) +
-                   ": another process uses this folder; wait for it, or give another --output");
-}
-
-FolderLock::~FolderLock() {
-    if (descriptor_ >= 0) close(descriptor_);
+    if (platform::lock_folder(folder, held_) == platform::Lock::taken)
+        throw RunError(one_line(folder.string()) +
+                       ": another process uses this folder; wait for it, or give another --output");
 }
 
 TemporaryFolder::TemporaryFolder(const std::string& prefix) {
-    std::string name = (std::filesystem::temp_directory_path() / (prefix + "XXXXXX")).string();
-    if (!mkdtemp(name.data())) throw RunError(name + ": cannot be created: " + std::strerror(errno));
-    path_ = name;
+    if (const auto error = platform::make_temporary_folder(prefix.c_str(), path_))
+        throw RunError(path_.string() + ": cannot be created: " + error.message());
 }
 
 TemporaryFolder::~TemporaryFolder() {

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <string>
 
+#include "platform/file.h"
+
 namespace ewa::core {
 
 /// Whether the path is a regular file (is_file), or a folder (is_folder). False on any error.
@@ -19,7 +21,7 @@ bool is_of_desktop(const std::filesystem::path& inside);
 void make_folder(const std::filesystem::path& folder);
 
 /// A word that begins with ~/, or --option=~/, with the user's home folder in place of ~: shells expand neither a quoted ~
-/// nor one behind =. Other words, and all where $HOME is not set, stay as they are.
+/// nor one behind =. Other words, and all where the user has no home folder, stay as they are.
 std::string with_home(const std::string& word);
 
 /// Locks a folder until the object or the process ends. Nothing is left on disk. Throws RunError if another
@@ -27,12 +29,9 @@ std::string with_home(const std::string& word);
 class FolderLock {
   public:
     explicit FolderLock(const std::filesystem::path& folder);
-    ~FolderLock();
-    FolderLock(const FolderLock&) = delete;
-    FolderLock& operator=(const FolderLock&) = delete;
 
   private:
-    int descriptor_ = -1;
+    platform::File held_;
 };
 
 /// A new folder in the system's folder for temporary files. The destructor removes it with its contents.

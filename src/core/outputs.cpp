@@ -1,29 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/outputs.h"
 
-#include <sys/stat.h>
-#include <unistd.h>
-
-#include <cerrno>
 #include <compare>
 #include <map>
+#include <optional>
 #include <set>
 #include <system_error>
 
 #include "core/atomic_file.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "platform/file.h"
 
 namespace ewa::core {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// Where a file is, however its path is spelled: the deepest existing part of the path by device and inode, and the
+/// Where a file is, however its path is spelled: the deepest existing part of the path by its FileId, and the
 /// names below it. Two hard links to one file are the same place.
 struct Place {
-    dev_t device = 0;
-    ino_t inode = 0;
+    platform::FileId there;
     std::string rest;
     auto operator<=>(const Place&) const = default;
 };
@@ -33,13 +30,12 @@ Place place_of(const fs::path& path) {
     fs::path there = fs::weakly_canonical(fs::absolute(path, error), error);
     if (error) there = fs::absolute(path, error).lexically_normal();
     Place place;
-    struct stat found {};
-    while (stat(there.c_str(), &found) != 0 && there.has_relative_path()) {
+    std::optional<platform::FileId> found = platform::file_id(there);
+    for (; !found && there.has_relative_path(); found = platform::file_id(there)) {
         place.rest = there.filename().string() + "/" + place.rest;
         there = there.parent_path();
     }
-    place.device = found.st_dev;
-    place.inode = found.st_ino;
+    place.there = found.value_or(platform::FileId());
     return place;
 }
 
@@ -67,8 +63,7 @@ void check_creatable(const fs::path& folder) {
     while (!above.empty() && !fs::exists(above, error)) above = above.parent_path();
     if (above.empty()) above = ".";
     if (!fs::is_directory(above, error)) no_folder(folder, std::make_error_code(std::errc::not_a_directory));
-    if (access(above.c_str(), W_OK | X_OK) != 0)
-        no_folder(folder, std::error_code(errno, std::generic_category()));
+    if (const auto refusal = platform::refuses_files(above)) no_folder(folder, refusal);
 }
 
 }  // namespace

@@ -1,38 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs other programs. Finds them in PATH, starts them without a shell, and ends them when the caller wishes.
 #pragma once
-#include <sys/types.h>
-
 #include <filesystem>
 #include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "platform/process.h"
+
 namespace ewa::core {
 
-/// The executable file of this name in PATH; empty if there is none. Entries of PATH that are empty count for nothing.
-std::filesystem::path find_program(const std::string& name);
+using platform::find_program;
 
-/// The file of the program that runs, without symbolic links. It needs no /proc, which a bare chroot does not have.
+/// The file of the program that runs. Throws RunError if the system does not say.
 std::filesystem::path own_program();
-
-/// File descriptors that a program gets.
-struct Streams {
-    int input = -1;   // -1: standard input is empty
-    int output = -1;  // -1: standard output is thrown away
-    int errors = -1;  // -1: standard error is this process's
-};
-
-/// Whether Ctrl-C on a terminal reaches only this process (own), or the started program as well (shared).
-enum class ProcessGroup { own, shared };
 
 /// Starts a program. The caller waits for it. The program is killed if the thread that started it ends.
 /// command: the path of the program, or a name for find_program, then its arguments.
 /// environment: NAME=value, beside those of this process.
 /// Throws RunError if the program cannot be started.
-pid_t start_program(std::vector<std::string> command, const std::vector<std::string>& environment,
-                    const Streams& streams, ProcessGroup group = ProcessGroup::own);
+platform::Process start_program(std::vector<std::string> command, const std::vector<std::string>& environment,
+                                const platform::Streams& streams,
+                                platform::Orphan orphan = platform::Orphan::killed);
 
 struct Program {
     std::vector<std::string> command;      // the name or path of the program, then its arguments
@@ -49,7 +39,7 @@ enum class Ended { done, failed, stopped };
 
 /// Runs a program to its end. Processes that it started and did not wait for keep running. Its standard input is empty.
 /// - output(text): called with each piece of standard output, as it arrives, and with an empty text at least every
-///   tenth of a second. False ends the program (SIGTERM, after three seconds SIGKILL), and the result is then `stopped`.
+///   tenth of a second. False asks the program to end, kills it after three seconds, and the result is then `stopped`.
 /// The result is `failed` where the exit status is not 0. Throws RunError if the program cannot be started, or the
 /// log cannot be written.
 Ended run_program(const Program& program, const std::function<bool(std::string_view text)>& output);

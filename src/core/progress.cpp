@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/progress.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <cstdlib>
-#include <string_view>
 #include <utility>
 
 #include "core/terminal.h"
 #include "core/text.h"
+#include "platform/terminal.h"
 
 namespace ewa::core {
 
@@ -27,21 +24,6 @@ std::string three_digits(double value) {
     return text.data();
 }
 
-std::string_view variable(const char* name) {
-    const char* value = std::getenv(name);
-    return value ? value : "";
-}
-
-/// Whether the terminal shows UTF-8, as the locale says.
-bool shows_unicode() {
-    for (const char* name : {"LC_ALL", "LC_CTYPE", "LANG"})
-        if (const std::string_view value = variable(name); !value.empty()) {
-            const std::string locale = lower(value);
-            return locale.find("utf-8") != std::string::npos || locale.find("utf8") != std::string::npos;
-        }
-    return false;
-}
-
 std::string bar(double share, size_t cells, bool unicode) {
     const auto filled = size_t(std::clamp(share, 0.0, 1.0) * double(cells) + 1e-9);
     std::string text;
@@ -51,10 +33,6 @@ std::string bar(double share, size_t cells, bool unicode) {
 }
 
 }  // namespace
-
-bool redraws() {
-    return isatty(STDOUT_FILENO) && variable("TERM") != "dumb";
-}
 
 void Pace::add(double seconds, double done) {
     if (done <= marks_.back().done) return;
@@ -99,7 +77,11 @@ std::string drawn(const ProgressLine& line, size_t columns, bool unicode) {
 }
 
 Progress::Progress(std::string what, int total, std::string unit, bool quiet)
-    : what_(std::move(what)), unit_(std::move(unit)), total_(total), quiet_(quiet), terminal_(redraws()) {}
+    : what_(std::move(what)),
+      unit_(std::move(unit)),
+      total_(total),
+      quiet_(quiet),
+      terminal_(platform::redraws()) {}
 
 Progress::~Progress() {
     if (drawn_) std::fputc('\n', stdout);
@@ -179,7 +161,7 @@ void Progress::update(int done, const std::string& details) {
 
     clear();
     if (terminal_) {
-        std::fputs(drawn(line, terminal_columns(), shows_unicode()).c_str(), stdout);
+        std::fputs(drawn(line, terminal_columns(), platform::shows_unicode()).c_str(), stdout);
         drawn_ = true;
     } else {
         if (line.left) line.text.append(", ").append(duration_text(*line.left)).append(" left");

@@ -8,9 +8,6 @@
 
 namespace ewa::core {
 
-/// Whether standard output is a terminal on which a line can be redrawn: TERM is not "dumb".
-bool redraws();
-
 /// Estimates the time left of work in units of about equal length, from the times at which units were done. The estimate takes
 /// the mean time of units done in the later half of the time so far. A current unit that takes longer lengthens it.
 class Pace {

@@ -1,28 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/terminal.h"
 
-#include <fcntl.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdio>
 
 #include "core/text.h"
+#include "platform/terminal.h"
 
 namespace ewa::core {
 
-void open_standard_streams() {
-    // open() gives the lowest free number.
-    int descriptor = open("/dev/null", O_RDWR);
-    while (descriptor >= 0 && descriptor <= STDERR_FILENO) descriptor = open("/dev/null", O_RDWR);
-    if (descriptor >= 0) close(descriptor);
-}
-
 size_t terminal_columns() {
     constexpr size_t kUnknown = 80;
-    winsize size{};
-    return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0 ? kUnknown : size.ws_col;
+    const size_t columns = platform::terminal_columns();
+    return columns == 0 ? kUnknown : columns;
 }
 
 size_t terminal_width() {

@@ -6,10 +6,6 @@
 
 namespace ewa::core {
 
-/// Opens /dev/null for each of the descriptors 0, 1 and 2 that is closed. Without this, the next opened file would get
-/// such a number, and messages would be written into this file. Call it first in main().
-void open_standard_streams();
-
 /// The columns of the terminal on standard output. 80 if standard output is no terminal.
 size_t terminal_columns();
 /// terminal_columns(), clamped to 40..120.

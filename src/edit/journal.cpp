@@ -1,13 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "edit/journal.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -18,6 +12,7 @@
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
+#include "platform/file.h"
 
 namespace ewa::edit {
 namespace {
@@ -194,42 +189,31 @@ void set_aside(const std::filesystem::path& journal) {
     std::filesystem::rename(journal, journal.string() + ".before", ignored);
 }
 
-struct Journal::File {
-    int descriptor = -1;
-
-    /// more: flags of open(2). File systems without locks open the file too.
-    File(const std::filesystem::path& file, int more)
-        : descriptor(::open(file.c_str(), O_RDWR | O_CLOEXEC | more, 0666)) {
-        if (descriptor < 0) throw RunError(core::one_line(file.string()) + ": " + std::strerror(errno));
-        if (flock(descriptor, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
-        ::close(descriptor);
-        throw RunError("another window edits this file");
+/// The open file, locked. File systems without locks open it too.
+struct Journal::File : platform::File {
+    File(const std::filesystem::path& file, platform::Open how) {
+        if (const auto error = open(file, how))
+            throw RunError(core::one_line(file.string()) + ": " + error.message());
+        if (try_lock() == platform::Lock::taken) throw RunError("another window edits this file");
     }
-    File(const File&) = delete;
-    File& operator=(const File&) = delete;
-    ~File() { ::close(descriptor); }
 };
 
 bool in_use(const std::filesystem::path& journal) {
-    const int descriptor = ::open(journal.c_str(), O_RDONLY | O_CLOEXEC);
-    if (descriptor < 0) return false;
-    const bool used = flock(descriptor, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
-    ::close(descriptor);
-    return used;
+    return platform::is_locked(journal);
 }
 
 Journal::Journal(std::filesystem::path file, const JournalHead& head, bool go_on)
-    : file_(std::move(file)), open_(std::make_unique<File>(file_, O_CREAT)) {
+    : file_(std::move(file)), open_(std::make_unique<File>(file_, platform::Open::edit)) {
     const std::string text = whole_text(file_);
     if (go_on) {
         // A line that a crash has cut off would join the next one.
         whole_ = text.rfind('\n') + 1;  // npos + 1 is 0
         std::filesystem::resize_file(file_, whole_);
-        if (lseek(open_->descriptor, 0, SEEK_END) < 0)
-            throw RunError(core::one_line(file_.string()) + ": " + std::strerror(errno));
+        if (const auto error = open_->go_to(whole_))
+            throw RunError(core::one_line(file_.string()) + ": " + error.message());
     } else if (!text.empty()) {
         set_aside(file_);
-        open_ = std::make_unique<File>(file_, O_CREAT | O_EXCL);
+        open_ = std::make_unique<File>(file_, platform::Open::create);
     }
     if (whole_ == 0) append(head_line(head));
 }
@@ -239,21 +223,14 @@ Journal::~Journal() = default;
 void Journal::append(const std::string& line) {
     if (!open_ || broken_) return;
     const std::string text = line + '\n';
-    for (size_t written = 0; written < text.size();) {
-        const ssize_t count = ::write(open_->descriptor, text.data() + written, text.size() - written);
-        if (count < 0 && errno == EINTR) continue;
-        if (count > 0) {
-            written += size_t(count);
-            continue;
-        }
-        const std::string reason = std::strerror(errno);
+    if (const auto error = open_->write(text.data(), text.size())) {
         broken_ = true;
         std::error_code ignored;
         if (whole_ == 0)
             std::filesystem::remove(file_, ignored);
         else
             std::filesystem::resize_file(file_, whole_, ignored);
-        throw RunError(core::one_line(file_.string()) + " cannot be written: " + reason);
+        throw RunError(core::one_line(file_.string()) + " cannot be written: " + error.message());
     }
     whole_ += text.size();
 }

@@ -16,6 +16,7 @@
 #include "gpu/capabilities.h"
 #include "gpu/choose.h"
 #include "gpu/pipeline.h"
+#include "platform/system.h"
 
 namespace ewa {
 namespace gpu {
@@ -123,7 +124,7 @@ DeviceInfo described(const VulkanDevice& borrowed) {
 /// Mesa's compiler for CPUs crashes where it gets no memory.
 void check_address_space(const DeviceInfo& info) {
     constexpr uint64_t kLeast = uint64_t(960) << 20;
-    const uint64_t limit = core::memory_limit();
+    const uint64_t limit = platform::memory_limit();
     if (info.type != "cpu" || limit >= kLeast) return;
     throw RunError(info.name + " needs " + std::to_string(kLeast >> 20) +
                    " MiB of address space; this process may use only " + std::to_string(limit >> 20) +

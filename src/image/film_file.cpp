@@ -1,16 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "image/film_file.h"
 
-#include <fcntl.h>
-#include <signal.h>
 #include <spdlog/fmt/fmt.h>
-#include <sys/socket.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <fstream>
 #include <string>
 #include <string_view>
@@ -137,65 +130,41 @@ FilmFile::FilmFile(const fs::path& file, int width, int height, const std::strin
     : file_(file), folder_("ewa-film-"), made_(folder_.path() / ("film" + file.extension().string())) {
     if (width < 2 || height < 2) throw InputError("a film needs at least 2x2 pixels");
     const fs::path program = find_ffmpeg();
-    int ends[2];
-    // A socket, since writing to a pipe whose reader has ended would send a signal.
-    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
-        throw RunError(std::string("cannot connect to ffmpeg: ") + std::strerror(errno));
-    input_ = ends[0];
-    const int log = open((folder_.path() / "log").c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
-    try {
-        process_ = core::start_program(arguments_of(program, encoder, made_, width, height, rate), {},
-                                       {.input = ends[1], .output = -1, .errors = log});
-    } catch (...) {
-        for (const int descriptor : {ends[0], ends[1], log}) close(descriptor);
-        throw;
-    }
-    close(ends[1]);
-    close(log);
+    if (const auto error = input_.open()) throw RunError("cannot connect to ffmpeg: " + error.message());
+    platform::File log;
+    log.open(folder_.path() / "log", platform::Open::create_owned);
+    process_ = core::start_program(arguments_of(program, encoder, made_, width, height, rate), {},
+                                   {.input = input_.from.handle(), .errors = log.handle()});
+    input_.from.close();
 }
 
 FilmFile::~FilmFile() {
-    if (input_ >= 0) close(input_);
-    if (process_ < 0) return;
-    kill(process_, SIGKILL);
-    wait();
+    if (!process_.is_open()) return;
+    process_.kill();
+    process_.wait();
 }
 
-int FilmFile::wait() {
-    int status = 0;
-    while (waitpid(process_, &status, 0) < 0 && errno == EINTR) {
-    }
-    process_ = -1;
-    return status;
-}
-
-void FilmFile::fail(int status) {
+void FilmFile::fail(const platform::ProcessEnd& ended) {
     std::string reason = last_line_of(folder_.path() / "log");
     if (reason.empty())
-        reason = WIFSIGNALED(status) ? fmt::format("it ended by signal {}", WTERMSIG(status))
-                                     : fmt::format("exit status {}, no film", WEXITSTATUS(status));
+        reason = ended.signal ? fmt::format("it ended by signal {}", ended.signal)
+                              : fmt::format("exit status {}, no film", ended.status);
     throw RunError(core::one_line(file_.string()) + ": ffmpeg failed: " + reason);
 }
 
-int FilmFile::end() {
-    close(input_);
-    input_ = -1;
-    return wait();
+platform::ProcessEnd FilmFile::end() {
+    input_.to.close();
+    return process_.wait();
 }
 
 void FilmFile::add(const std::vector<uint8_t>& rgba) {
-    for (size_t done = 0; done < rgba.size();) {
-        const ssize_t sent = send(input_, rgba.data() + done, rgba.size() - done, MSG_NOSIGNAL);
-        if (sent < 0 && errno == EINTR) continue;
-        if (sent < 0) fail(end());
-        done += size_t(sent);
-    }
+    if (input_.write(rgba.data(), rgba.size())) fail(end());
 }
 
 void FilmFile::finish() {
-    const int status = end();
+    const platform::ProcessEnd ended = end();
     std::error_code error;
-    if (status != 0 || fs::file_size(made_, error) == 0 || error) fail(status);
+    if (ended.code() != 0 || fs::file_size(made_, error) == 0 || error) fail(ended);
     std::ifstream made(made_, std::ios::binary);
     core::AtomicFile kept(file_);
     std::vector<char> part(1u << 20);

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes a film through the program ffmpeg.
 #pragma once
-#include <sys/types.h>
-
 #include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "core/folders.h"
+#include "platform/process.h"
 
 namespace ewa::image {
 
@@ -44,15 +43,14 @@ class FilmFile {
     void finish();
 
   private:
-    [[noreturn]] void fail(int status);  // wait status of ffmpeg
-    int end();                           // after the last frame; returns the wait status
-    int wait();
+    [[noreturn]] void fail(const platform::ProcessEnd& ended);
+    platform::ProcessEnd end();  // after the last frame
 
     std::filesystem::path file_;
     core::TemporaryFolder folder_;
     std::filesystem::path made_;  // in folder_
-    pid_t process_ = -1;
-    int input_ = -1;  // socket
+    platform::Process process_;
+    platform::PipeTo input_;
 };
 
 }  // namespace ewa::image

@@ -3,16 +3,9 @@
 // limited here.
 #include "live/server.h"
 
-#include <arpa/inet.h>
 #include <httplib.h>
-#include <sys/random.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <csignal>
-#include <cstring>
 #include <future>
 #include <list>
 #include <optional>
@@ -24,6 +17,8 @@
 #include "io/splats/formats.h"
 #include "io/splats/scene_page.h"
 #include "live/wire.h"
+#include "platform/socket.h"
+#include "platform/system.h"
 
 namespace ewa::live {
 namespace {
@@ -55,16 +50,15 @@ bool is_port(std::string_view text) {
 /// Whether "HOST[:PORT]" is an address in numbers or localhost. A web page whose name was made to lead here
 /// sends its own name.
 bool own_host(const std::string& text) {
-    unsigned char address[16];
     if (text.starts_with('[')) {
         const size_t end = text.find(']');
         return end != std::string::npos && is_port(text.substr(end + 1)) &&
-               inet_pton(AF_INET6, text.substr(1, end - 1).c_str(), address) == 1;
+               platform::is_ipv6(text.substr(1, end - 1));
     }
     const size_t end = std::min(text.find(':'), text.size());
     const std::string host = core::lower(text.substr(0, end));
     if (!is_port(text.substr(end))) return false;
-    return host == "localhost" || inet_pton(AF_INET, host.c_str(), address) == 1;
+    return host == "localhost" || platform::is_ipv4(host);
 }
 
 bool of_a_web_page(const Request& request) {
@@ -139,8 +133,7 @@ class AtOnce final : public httplib::TaskQueue {
 
 /// cpp-httplib's constructor makes the whole process ignore SIGPIPE, which Wire does not need.
 struct SigpipeBefore {
-    struct sigaction action {};
-    SigpipeBefore() { sigaction(SIGPIPE, nullptr, &action); }
+    platform::PipeSignal before;
 };
 
 /// Its threads answer several requests at a time.
@@ -148,12 +141,9 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
   public:
     Http(live::Server& server, const std::string& address, uint16_t port, std::chrono::milliseconds patience)
         : server_(server), patience_(patience) {
-        sigaction(SIGPIPE, &action, nullptr);
+        before.restore();
         // cpp-httplib's default would let a second server listen on the same port.
-        set_socket_options([](int socket) {
-            const int yes = 1;
-            setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
-        });
+        set_socket_options([](socket_t socket) { platform::reuse_port(std::intptr_t(socket)); });
         set_tcp_nodelay(true);
         set_default_headers({{"Server", "ewa/" EWA_VERSION},
                              {"Accept-Ranges", "none"},
@@ -165,11 +155,13 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
             answer(request, response);
             return HandlerResponse::Handled;
         });
-        errno = 0;
+        platform::clear_socket_error();
         const int bound = port == 0 ? bind_to_any_port(address) : bind_to_port(address, port) ? port : -1;
-        if (bound <= 0)
+        if (bound <= 0) {
+            const std::string reason = platform::socket_error();
             throw RunError("cannot listen on " + address + ":" + std::to_string(port) + ": " +
-                           (errno ? std::strerror(errno) : "there is no such address"));
+                           (reason.empty() ? "there is no such address" : reason));
+        }
         port_ = uint16_t(bound);
         new_task_queue = [this] {
             listening_.set_value();
@@ -186,7 +178,7 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
         {
             const std::lock_guard lock(mutex_);
             for (const Connection& connection : connections_)
-                if (!connection.done) ::shutdown(connection.socket, SHUT_RDWR);
+                if (!connection.done) platform::shut_down(std::intptr_t(connection.socket));
         }
         for (Connection& connection : connections_) connection.thread.join();
     }
@@ -195,17 +187,17 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
 
   private:
     struct Connection {
-        int socket = -1;
+        socket_t socket = INVALID_SOCKET;
         std::thread thread;
         bool asked = false;  // its request has come
         bool cut = false;    // another connection replaces it
         bool done = false;
     };
 
-    bool process_and_close_socket(int socket) override {
+    bool process_and_close_socket(socket_t socket) override {
         std::unique_lock lock(mutex_);
         if (!make_place(lock)) {
-            ::close(socket);
+            platform::close_socket(std::intptr_t(socket));
             return false;
         }
         Connection& connection = connections_.emplace_back();
@@ -213,7 +205,7 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
         try {
             connection.thread = std::thread([this, &connection] { serve(connection); });
         } catch (const std::system_error&) {  // the system has no more threads: the training continues
-            ::close(socket);
+            platform::close_socket(std::intptr_t(socket));
             connections_.pop_back();
         }
         return true;
@@ -229,7 +221,7 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
                                          [](const Connection& connection) { return !connection.asked; });
         if (silent == connections_.end()) return false;
         silent->cut = true;
-        if (!silent->done) ::shutdown(silent->socket, SHUT_RDWR);
+        if (!silent->done) platform::shut_down(std::intptr_t(silent->socket));
         lock.unlock();
         silent->thread.join();
         lock.lock();
@@ -252,8 +244,8 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
             // Out of memory, for one client: its connection ends, the training does not.
         }
         const std::lock_guard lock(mutex_);
-        ::shutdown(connection.socket, SHUT_RDWR);
-        ::close(connection.socket);
+        platform::shut_down(std::intptr_t(connection.socket));
+        platform::close_socket(std::intptr_t(connection.socket));
         connection.done = true;
     }
 
@@ -456,7 +448,7 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
 
 std::string random_token() {
     unsigned char bytes[16] = {};
-    if (getrandom(bytes, sizeof(bytes), 0) != ssize_t(sizeof(bytes)))
+    if (!platform::random_bytes(bytes, sizeof(bytes)))
         throw RunError("the system gives no random numbers for a token");
     std::string text;
     for (const unsigned char byte : bytes) {

@@ -2,11 +2,9 @@
 #include "live/watcher.h"
 
 #include <httplib.h>
-#include <sys/mman.h>
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -22,6 +20,7 @@
 #include "io/splats/formats.h"
 #include "io/splats/ply_table.h"
 #include "live/wire.h"
+#include "platform/file.h"
 
 namespace ewa::live {
 namespace {
@@ -37,15 +36,6 @@ constexpr auto kPause = std::chrono::milliseconds(250);  // between looks
 constexpr std::uintmax_t kLargestMetrics = 256u << 20;   // bytes
 constexpr size_t kLargestLiveFile = 4096;                // bytes
 constexpr std::uintmax_t kLargestConfig = 1u << 20;      // bytes
-
-/// A nameless file in memory, which readers open by path.
-struct MemoryFile {
-    std::unique_ptr<std::FILE, int (*)(std::FILE*)> file;
-    MemoryFile() : file(fdopen(memfd_create("splats", MFD_CLOEXEC), "wb"), std::fclose) {
-        if (!file) throw RunError("out of memory for the trainer's splats");
-    }
-    std::string path() const { return "/proc/self/fd/" + std::to_string(fileno(file.get())); }
-};
 
 std::string start_of(const fs::path& path, size_t most) {
     std::ifstream file(path, std::ios::binary);
@@ -172,19 +162,18 @@ Status Client::status(size_t first_line) {
 }
 
 std::optional<TaggedSplats> Client::splats(const std::string& tag) {
-    MemoryFile memory;
-    const auto answer = http_->get("/splats", {{"If-None-Match", tag.empty() ? "\"none\"" : tag}},
-                                   kMostSplats, [&](const char* bytes, size_t count) {
-                                       return std::fwrite(bytes, 1, count, memory.file.get()) == count;
-                                   });
+    platform::PassingFile passing;
+    if (passing.error()) throw RunError("out of memory for the trainer's splats");
+    const auto answer =
+        http_->get("/splats", {{"If-None-Match", tag.empty() ? "\"none\"" : tag}}, kMostSplats,
+                   [&](const char* bytes, size_t count) { return !passing.file().write(bytes, count); });
     if (answer.status == 304) return std::nullopt;
-    if (std::fflush(memory.file.get()) != 0) throw RunError("out of memory for the trainer's splats");
     TaggedSplats splats;
     splats.step = std::max(0, core::parse_integer<int>(answer.get_header_value("Ewa-Step")).value_or(0));
     splats.tag = answer.get_header_value("ETag");
     try {
-        splats.gaussians = io::read_ply(memory.path()).gaussians;
-        splats.frozen = frozen_in(memory.path());
+        splats.gaussians = io::read_ply(passing.path()).gaussians;
+        splats.frozen = frozen_in(passing.path());
     } catch (const InputError& error) {
         throw InputError("the trainer's splats cannot be read: " + std::string(error.what()));
     }

@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "live/wire.h"
 
-#include <linux/sockios.h>
-#include <poll.h>
-#include <sys/ioctl.h>
-#include <sys/socket.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <climits>
+#include <cstdint>
+
+#include "platform/socket.h"
 
 namespace ewa::live {
 namespace {
@@ -18,13 +14,9 @@ using std::chrono::milliseconds;
 constexpr milliseconds kNap(100);    // between looks at `stop`
 constexpr uint64_t kLeastRate = 16;  // bytes a millisecond that a reader must take
 
-bool try_again() {
-    return errno == EINTR || errno == EAGAIN || errno == EWOULDBLOCK;
-}
-
 }  // namespace
 
-Wire::Wire(int socket, uint64_t bytes, milliseconds patience, const std::atomic<bool>* stop,
+Wire::Wire(socket_t socket, uint64_t bytes, milliseconds patience, const std::atomic<bool>* stop,
            milliseconds write_grace)
     : socket_(socket),
       left_(bytes),
@@ -38,15 +30,14 @@ void Wire::allow(uint64_t bytes) {
     each_wait_ = true;
 }
 
-bool Wire::ready(short events, Clock::time_point due) const {
+bool Wire::ready(bool to_write, Clock::time_point due) const {
     for (;;) {
         if (stop_ && *stop_) return false;
         const auto left = std::max(milliseconds(0), std::chrono::ceil<milliseconds>(due - Clock::now()));
         const auto nap = stop_ ? std::min(left, kNap) : left;
-        pollfd waiting{socket_, events, 0};
-        const int result = poll(&waiting, 1, int(nap.count()));
-        if (result > 0) return true;
-        if (result < 0 && errno != EINTR) return false;
+        const auto wait = to_write ? platform::wait_to_write : platform::wait_to_read;
+        const platform::Waiting result = wait(std::intptr_t(socket_), nap);
+        if (result != platform::Waiting::timeout) return result == platform::Waiting::ready;
         if (Clock::now() >= due) return false;
     }
 }
@@ -55,9 +46,9 @@ ssize_t Wire::read(char* to, size_t size) {
     size = size_t(std::min<uint64_t>(size, left_));
     if (size == 0) return -1;
     for (;;) {
-        if (!ready(POLLIN, each_wait_ ? Clock::now() + patience_ : due_)) return -1;
-        const ssize_t got = ::recv(socket_, to, size, MSG_DONTWAIT);
-        if (got < 0 && try_again()) continue;
+        if (!ready(false, each_wait_ ? Clock::now() + patience_ : due_)) return -1;
+        const std::ptrdiff_t got = platform::receive_now(std::intptr_t(socket_), to, size);
+        if (got == platform::kAgain) continue;
         if (got > 0) left_ -= uint64_t(got);
         return got;
     }
@@ -65,18 +56,17 @@ ssize_t Wire::read(char* to, size_t size) {
 
 bool Wire::writable() {
     Clock::time_point moved = Clock::now();  // when the other side last took something
-    int waiting = INT_MAX;                   // bytes that it has not taken
+    uint64_t waiting = UINT64_MAX;           // bytes that it has not taken
     for (;;) {
         const Clock::time_point now = Clock::now();
-        int left = 0;
-        if (ioctl(socket_, SIOCOUTQ, &left) != 0) left = 0;
+        const uint64_t left = platform::not_taken(std::intptr_t(socket_));
         if (left < waiting) moved = now;
         waiting = left;
-        const uint64_t taken = written_ - std::min(written_, uint64_t(left));
+        const uint64_t taken = written_ - std::min(written_, left);
         const Clock::time_point due = std::min(
             moved + write_grace_ / 2, first_write_ + write_grace_ + milliseconds(taken / kLeastRate));
         if (now >= due || (stop_ && *stop_)) return false;
-        if (ready(POLLOUT, std::min(due, now + kNap))) return true;
+        if (ready(true, std::min(due, now + kNap))) return true;
     }
 }
 
@@ -85,8 +75,8 @@ ssize_t Wire::write(const char* from, size_t size) {
     size_t sent = 0;
     while (sent < size) {
         if (!writable()) return -1;
-        const ssize_t now = ::send(socket_, from + sent, size - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
-        if (now < 0 && try_again()) continue;
+        const std::ptrdiff_t now = platform::send_now(std::intptr_t(socket_), from + sent, size - sent);
+        if (now == platform::kAgain) continue;
         if (now <= 0) return -1;
         sent += size_t(now);
         written_ += uint64_t(now);

@@ -13,7 +13,7 @@ class Wire final : public httplib::Stream {
   public:
     /// socket: not owned. bytes: how many may come, all within `patience`. stop: may be null. Once it is true,
     /// every wait ends as if the other side had gone.
-    Wire(int socket, uint64_t bytes, std::chrono::milliseconds patience,
+    Wire(socket_t socket, uint64_t bytes, std::chrono::milliseconds patience,
          const std::atomic<bool>* stop = nullptr,
          std::chrono::milliseconds write_grace = std::chrono::seconds(30));
 
@@ -29,14 +29,14 @@ class Wire final : public httplib::Stream {
     ssize_t write(const char* from, size_t size) override;
     void get_remote_ip_and_port(std::string&, int&) const override {}
     void get_local_ip_and_port(std::string&, int&) const override {}
-    int socket() const override { return socket_; }
+    socket_t socket() const override { return socket_; }
 
   private:
     using Clock = std::chrono::steady_clock;
-    bool ready(short events, Clock::time_point due) const;
+    bool ready(bool to_write, Clock::time_point due) const;
     bool writable();
 
-    const int socket_;
+    const socket_t socket_;
     uint64_t left_;  // bytes that may come
     uint64_t written_ = 0;
     const std::chrono::milliseconds patience_, write_grace_;

@@ -2,7 +2,6 @@
 #include "mesh/scene_mesh.h"
 
 #include <spdlog/fmt/fmt.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <glm/common.hpp>
@@ -16,6 +15,7 @@
 #include "mesh/depth_cache.h"
 #include "mesh/meshing.h"
 #include "mesh/parts.h"
+#include "platform/system.h"
 #include "scene/framing.h"
 #include "scene/splat_shape.h"
 
@@ -40,7 +40,7 @@ Image solid_mean_depth(const Rendering& seen) {
 
 /// Half of the machine's memory.
 uint64_t memory_for_volume() {
-    return uint64_t(sysconf(_SC_PHYS_PAGES)) * uint64_t(sysconf(_SC_PAGESIZE)) / 2;
+    return platform::installed_memory() / 2;
 }
 
 FusionOptions fusion_options(const SceneMeshOptions& asked) {

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ranks/node.h"
 
-#include <sched.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <fstream>
 #include <functional>
 #include <string>
+
+#include "platform/system.h"
 
 namespace ewa::ranks {
 namespace {
@@ -20,23 +17,8 @@ bool may_use(const Allowed& one, size_t core) {
     return core / 64 < one.cores.size() && (one.cores[core / 64] >> (core % 64) & 1) != 0;
 }
 
-/// Containers on one machine have names of their own, but share its boot.
-uint64_t this_machine() {
-    std::string text;
-    std::ifstream("/proc/sys/kernel/random/boot_id") >> text;
-    if (text.empty()) {
-        char name[256] = "";
-        gethostname(name, sizeof name - 1);
-        text = name;
-    }
-    return std::hash<std::string>{}(text);
-}
-
 Allowed this_process() {
-    Allowed own{this_machine(), std::vector<uint64_t>(kWords)};
-    if (sched_getaffinity(0, sizeof(uint64_t) * kWords, reinterpret_cast<cpu_set_t*>(own.cores.data())) != 0)
-        own.cores[0] = 1;
-    return own;
+    return {std::hash<std::string>{}(platform::machine_name()), platform::usable_cores(kWords)};
 }
 
 }  // namespace
@@ -71,7 +53,7 @@ Place find_place(Ranks& ranks) {
 }
 
 void limit_lavapipe(int cores) {
-    setenv("LP_NUM_THREADS", std::to_string(cores).c_str(), 0);
+    platform::set_if_absent("LP_NUM_THREADS", std::to_string(cores));
 }
 
 }  // namespace ewa::ranks

@@ -159,7 +159,7 @@ MetricsLog::MetricsLog(const std::filesystem::path& path, const std::vector<Metr
 void MetricsLog::append(const MetricsLine& line) {
     // Device and driver names and paths may hold bytes that are not UTF-8; those become U+FFFD.
     file_ << to_json(line).dump(-1, ' ', false, Json::error_handler_t::replace) << '\n' << std::flush;
-    if (!file_) core::fail_to_write(path_, "cannot be written", errno);
+    if (!file_) core::fail_to_write(path_, "cannot be written", {errno, std::generic_category()});
 }
 
 }  // namespace ewa::report

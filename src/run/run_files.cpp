@@ -2,7 +2,6 @@
 #include "run/run_files.h"
 
 #include <spdlog/fmt/fmt.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <fstream>
@@ -17,6 +16,8 @@
 #include "folders/run_folder.h"
 #include "io/datasets/image_records.h"
 #include "io/datasets/refined_cameras.h"
+#include "platform/file.h"
+#include "platform/system.h"
 #include "report/summary.h"
 #include "report/tensorboard.h"
 #include "run/run_input.h"
@@ -135,7 +136,7 @@ void RunWriter::save_cameras(const Dataset& dataset, const Split& split, const s
     const fs::path folder = folder_of_images(dataset.frames.front()),
                    link = folder_ / folders::kCamerasFolder / "images";
     if (fs::is_symlink(link, ignored)) fs::remove(link, ignored);
-    if (!folder.empty()) fs::create_directory_symlink(folder, link, ignored);
+    if (!folder.empty()) platform::link_folder(folder, link);
 }
 
 void RunWriter::save_report(const report::ReportData& report) const {
@@ -144,9 +145,7 @@ void RunWriter::save_report(const report::ReportData& report) const {
 }
 
 uint64_t peak_host_bytes(const gpu::Device& device) {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    const uint64_t resident = static_cast<uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in KiB
+    const uint64_t resident = platform::peak_memory();
     const uint64_t on_device = device_info(device).type == "cpu" ? peak_device_bytes(device) : 0;
     return resident - std::min(resident, on_device);
 }

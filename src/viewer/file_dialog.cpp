@@ -8,6 +8,7 @@
 
 #include "core/process.h"
 #include "ewa/error.h"
+#include "platform/desktop.h"
 
 namespace ewa::viewer {
 namespace {
@@ -37,7 +38,7 @@ fs::path ask_program(Wanted wanted, const fs::path& proposed, const std::atomic<
             (wanted == Wanted::save ? "type the path" : "drop the file on the window"));
     std::string text;
     // The toolkits' warnings do not concern the user.
-    const core::Program program{.command = std::move(command), .environment = {}, .log = "/dev/null"};
+    const core::Program program{.command = std::move(command), .environment = {}, .log = platform::kNullFile};
     const core::Ended ended = core::run_program(program, [&](std::string_view piece) {
         text += piece;
         return !stop;
@@ -56,6 +57,10 @@ void FileDialog::ask(Wanted wanted, const fs::path& proposed) {
     fs::path begin = proposed.empty() ? fs::path() : fs::absolute(proposed, unknown);
     answer_.start(wake_, [this, wanted, begin = std::move(begin)] {
         fs::path chosen;
+        const auto choice = wanted == Wanted::folder ? platform::Choice::folder
+                            : wanted == Wanted::save ? platform::Choice::save
+                                                     : platform::Choice::file;
+        if (platform::choose(choice, begin, stop_, chosen)) return chosen;
         return ask_portal(wanted, begin, stop_, chosen) ? chosen : ask_program(wanted, begin, stop_);
     });
 }

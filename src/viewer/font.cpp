@@ -3,13 +3,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <fstream>
 #include <iterator>
-#include <sstream>
-#include <string>
 
 #include "core/folders.h"
+#include "platform/folders.h"
 
 namespace ewa::viewer {
 namespace {
@@ -18,7 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr uintmax_t kMostFontBytes = 32u << 20;
 
-/// Below a folder of fonts. Debian's, Arch's and Fedora's places.
+/// Below a folder of fonts. Debian's, Arch's, Fedora's and Windows' places.
 constexpr std::array kFonts{"truetype/dejavu/DejaVuSans.ttf",
                             "TTF/DejaVuSans.ttf",
                             "dejavu-sans-fonts/DejaVuSans.ttf",
@@ -30,23 +28,16 @@ constexpr std::array kFonts{"truetype/dejavu/DejaVuSans.ttf",
                             "liberation/LiberationSans-Regular.ttf",
                             "liberation-sans/LiberationSans-Regular.ttf",
                             "truetype/freefont/FreeSans.ttf",
-                            "truetype/ubuntu/Ubuntu-R.ttf"};
-
-std::string variable(const char* name, const std::string& otherwise) {
-    const char* value = std::getenv(name);
-    return value && *value ? value : otherwise;
-}
+                            "truetype/ubuntu/Ubuntu-R.ttf",
+                            "segoeui.ttf",
+                            "arial.ttf"};
 
 }  // namespace
 
 fs::path find_font() {
-    std::istringstream folders(variable("XDG_DATA_HOME", variable("HOME", "") + "/.local/share") + ":" +
-                               variable("XDG_DATA_DIRS", "/usr/local/share:/usr/share"));
-    for (std::string folder; std::getline(folders, folder, ':');)
+    for (const fs::path& folder : platform::font_folders())
         for (const char* font : kFonts)
-            if (const fs::path file = fs::path(folder) / "fonts" / font;
-                file.is_absolute() && core::is_file(file))
-                return file;
+            if (const fs::path file = folder / font; file.is_absolute() && core::is_file(file)) return file;
     return {};
 }
 

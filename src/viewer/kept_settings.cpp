@@ -2,12 +2,12 @@
 #include "viewer/kept_settings.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "core/json.h"
 #include "core/json_field.h"
 #include "ewa/error.h"
+#include "platform/folders.h"
 
 namespace ewa::viewer {
 namespace {
@@ -28,15 +28,8 @@ void take(const Json& json, const char* name, T least, T most, T& value) {
 }  // namespace
 
 fs::path settings_file() {
-    // A relative path in the variable is to be ignored (XDG Base Directory Specification).
-    const auto folder = [](const char* name) {
-        const char* value = std::getenv(name);
-        const fs::path path = value ? value : "";
-        return path.is_absolute() ? path : fs::path();
-    };
-    if (const fs::path config = folder("XDG_CONFIG_HOME"); !config.empty()) return config / "ewa/view.json";
-    const fs::path home = folder("HOME");
-    return home.empty() ? home : home / ".config/ewa/view.json";
+    const fs::path folder = platform::settings_folder();
+    return folder.empty() ? folder : folder / "ewa/view.json";
 }
 
 KeptSettings read_settings(const fs::path& file) {

@@ -24,6 +24,8 @@
 #include "ewa/error.h"
 #include "folders/run.h"
 #include "options/command_options.h"
+#include "platform/desktop.h"
+#include "platform/terminal.h"
 #include "run/earlier_run.h"
 #include "scene/dataset_files.h"
 #include "scene/looks.h"
@@ -288,7 +290,7 @@ int run(const CLI::App& app, const Arguments& arguments) {
         startup.open_device = [options = arguments.device, first] {
             return *first ? std::exchange(*first, nullptr) : open_device(options);
         };
-        if (!startup.film.empty() || (!startup.picture.empty() && !has_desktop()))
+        if (!startup.film.empty() || (!startup.picture.empty() && !platform::has_desktop()))
             write_without_window(startup);
         else
             show(startup);
@@ -312,7 +314,7 @@ int run(const CLI::App& app, const Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    core::open_standard_streams();
+    platform::begin_program(argc, argv);
     core::print_warnings();
     CLI::App app{"Shows a 3D Gaussian splat scene in a window. F1 in the window lists the keys."};
     app.name("ewa-view");

@@ -11,12 +11,6 @@
 
 namespace ewa::viewer {
 
-bool has_desktop() {
-    for (const char* name : {"DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"})
-        if (const char* value = std::getenv(name); value && *value) return true;
-    return false;
-}
-
 void write_without_window(const Startup& startup) {
     if (!startup.picture.empty() && startup.settings.comparison != Comparison::none)
         throw InputError("--compare needs a desktop session; ewa render and ewa compare do not");

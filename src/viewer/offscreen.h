@@ -5,9 +5,6 @@
 
 namespace ewa::viewer {
 
-/// Whether the environment names a desktop session: X11 or Wayland.
-bool has_desktop();
-
 /// Writes the screenshot or the film that the command line asks for, as the window would. Throws InputError for
 /// --compare, which the window alone shows, and RunError.
 void write_without_window(const Startup& startup);

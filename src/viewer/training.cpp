@@ -1,18 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "viewer/training.h"
 
-#include <signal.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <cstring>
-
 #include "core/process.h"
 #include "core/text.h"
 #include "ewa/error.h"
-
-extern char** environ;
 
 namespace ewa::viewer {
 namespace fs = std::filesystem;
@@ -30,12 +21,10 @@ std::vector<std::string> command_of(const std::vector<std::string>& arguments, c
 }  // namespace
 
 TrainProcess::TrainProcess(const std::vector<std::string>& arguments, const fs::path& output) {
-    std::vector<std::string> words = command_of(arguments, output);
-    std::vector<char*> argv;
-    for (std::string& word : words) argv.push_back(word.data());
-    argv.push_back(nullptr);
-    const int reason = posix_spawn(&child_, argv[0], nullptr, nullptr, argv.data(), environ);
-    if (reason != 0) throw RunError("cannot start " + words[0] + ": " + std::strerror(reason));
+    const std::vector<std::string> words = command_of(arguments, output);
+    if (const auto error = child_.start(words, {}, {platform::kOwn, platform::kOwn, platform::kOwn},
+                                        platform::ProcessGroup::shared, platform::Orphan::continues))
+        throw RunError("cannot start " + words[0] + ": " + error.message());
 }
 
 bool TrainProcess::accepts(const std::vector<std::string>& arguments, const fs::path& output) {
@@ -47,15 +36,12 @@ bool TrainProcess::accepts(const std::vector<std::string>& arguments, const fs::
 
 TrainProcess::~TrainProcess() {
     if (status()) return;
-    kill(child_, SIGTERM);
-    int ended = 0;
-    waitpid(child_, &ended, 0);
+    child_.ask_to_end();
+    child_.wait();
 }
 
 std::optional<int> TrainProcess::status() {
-    int ended = 0;
-    if (!status_ && waitpid(child_, &ended, WNOHANG) == child_)
-        status_ = WIFEXITED(ended) ? WEXITSTATUS(ended) : 128 + WTERMSIG(ended);
+    if (!status_ && child_.has_ended()) status_ = child_.wait().code();
     return status_;
 }
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A training run that the window watches, and the trainer that the viewer starts.
 #pragma once
-#include <sys/types.h>
-
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -11,6 +9,7 @@
 #include <vector>
 
 #include "live/watcher.h"
+#include "platform/process.h"
 
 namespace ewa::viewer {
 
@@ -31,7 +30,7 @@ class TrainProcess {
     std::optional<int> status();
 
   private:
-    pid_t child_ = -1;
+    platform::Process child_;
     std::optional<int> status_;
 };
 

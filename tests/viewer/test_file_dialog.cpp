@@ -138,8 +138,8 @@ class FakePortal {
         stop_ = true;
         if (thread_.joinable()) thread_.join();
         sd_bus_unref(bus_);
-        kill(daemon_, SIGKILL);
-        waitpid(daemon_, nullptr, 0);
+        daemon_.kill();
+        daemon_.wait();
     }
     FakePortal(const FakePortal&) = delete;
     FakePortal& operator=(const FakePortal&) = delete;
@@ -192,7 +192,7 @@ class FakePortal {
     }
 
     std::string uri_, address_, proposed_;
-    pid_t daemon_ = -1;
+    platform::Process daemon_;
     sd_bus* bus_ = nullptr;
     bool ready_ = false;
     std::atomic<bool> stop_ = false, folder_ = false;

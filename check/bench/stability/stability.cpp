@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bench/stability/stability.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cfloat>
 #include <cmath>
@@ -17,6 +15,7 @@
 #include "core/random.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
+#include "platform/terminal.h"
 #include "reference/rays.h"
 #include "reference/render.h"
 #include "scene/readout.h"
@@ -496,7 +495,7 @@ int run_stability(const Options& options) {
     std::vector<StabilityResult> results;
     std::vector<StabilityTraining> trainings;
     // In a file, the rows alone tell how far it is.
-    const bool rows_alone = !isatty(STDOUT_FILENO);
+    const bool rows_alone = !platform::is_terminal(platform::Stream::output);
     {
         core::Progress progress("compared", int(cases.size()), "scenes", rows_alone);
         for (const StabilityCase& one : cases) {

@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/splats/zip_files.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include <unzip.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <optional>
 #include <set>
 
@@ -19,6 +14,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "folders/run_folder.h"
+#include "platform/file.h"
 
 namespace ewa::io {
 namespace {
@@ -32,6 +28,7 @@ constexpr std::ptrdiff_t kMostFolders = 64;  // folders in folders
 constexpr size_t kShownOfName = 200;         // of a wrong one
 constexpr size_t kZipPiece = size_t(1) << 18;
 constexpr uint64_t kEncryptedFlag = 1, kDeflated = 8;
+constexpr unsigned kUnixKind = 0170000, kUnixFile = 0100000, kUnixFolder = 0040000;
 
 /// Files that desktops add, and the record by which ewa knows its own datasets.
 bool is_left_out(const fs::path& name) {
@@ -54,34 +51,16 @@ std::string wrong_name(const std::string& name) {
 /// A file that is being written, without the cost of a flush to disk for each.
 class NewFile {
   public:
-    explicit NewFile(const fs::path& path)
-        : path_(path), descriptor_(open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666)) {
-        if (descriptor_ < 0) fail();
-    }
-    ~NewFile() {
-        if (descriptor_ >= 0) ::close(descriptor_);
-    }
-    NewFile(const NewFile&) = delete;
-    void write(std::string_view text) {
-        while (!text.empty()) {
-            const ssize_t n = ::write(descriptor_, text.data(), text.size());
-            if (n < 0 && errno == EINTR) continue;
-            if (n <= 0) fail();
-            text.remove_prefix(size_t(n));
-        }
-    }
-    void close() {
-        const int descriptor = descriptor_;
-        descriptor_ = -1;
-        if (::close(descriptor) != 0) fail();
-    }
+    explicit NewFile(const fs::path& path) : path_(path) { check(file_.open(path, platform::Open::create)); }
+    void write(std::string_view text) { check(file_.write(text.data(), text.size())); }
+    void close() { check(file_.close()); }
 
   private:
-    [[noreturn]] void fail() const {
-        throw RunError(core::one_line(path_.string()) + ": cannot be written: " + std::strerror(errno));
+    void check(const std::error_code& error) const {
+        if (error) throw RunError(core::one_line(path_.string()) + ": cannot be written: " + error.message());
     }
     fs::path path_;
-    int descriptor_;
+    platform::File file_;
 };
 
 }  // namespace
@@ -109,10 +88,11 @@ void ZipFiles::State::add(const std::string& entry, const unz_file_info64& info)
     const std::string plain = entry.substr(0, entry.size() - (folder ? 1 : 0));
     if (const std::string wrong = wrong_name(plain); !wrong.empty())
         fail(entry.substr(0, kShownOfName), wrong);
-    const auto kind = mode_t(info.external_fa >> 16) & S_IFMT;
-    if (kind != 0 && kind != S_IFREG && kind != S_IFDIR) fail(entry, "is a link or a device, not a file");
+    const unsigned kind = unsigned(info.external_fa >> 16) & kUnixKind;
+    if (kind != 0 && kind != kUnixFile && kind != kUnixFolder)
+        fail(entry, "is a link or a device, not a file");
     const fs::path inside = *core::name_inside(plain);
-    if (folder || kind == S_IFDIR || is_left_out(inside)) return;
+    if (folder || kind == kUnixFolder || is_left_out(inside)) return;
     if (info.flag & kEncryptedFlag) fail(entry, "is encrypted");
     if (info.compression_method != 0 && info.compression_method != kDeflated)
         fail(entry, "is packed with method " + std::to_string(info.compression_method) +

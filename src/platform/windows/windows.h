@@ -26,9 +26,13 @@ inline std::intptr_t value_of(HANDLE handle) {
     return reinterpret_cast<std::intptr_t>(handle);
 }
 
-/// The error of the last call of the system.
+/// The system's error, in the words that POSIX has for it where it has some, so that it compares with std::errc.
+std::error_code error_of(DWORD error);
 inline std::error_code last_error() {
-    return {int(GetLastError()), std::system_category()};
+    return error_of(GetLastError());
+}
+inline std::error_code error_unless(bool success) {
+    return success ? std::error_code() : last_error();
 }
 
 /// A text in UTF-8 as Windows' functions take it, and back. What is not valid becomes U+FFFD.

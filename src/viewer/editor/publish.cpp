@@ -8,6 +8,7 @@
 #include "edit/edited_splats.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "platform/desktop.h"
 
 namespace ewa::viewer {
 namespace {
@@ -57,15 +58,8 @@ std::optional<float> share_of_line(std::string_view line) {
 }
 
 void open_outside(const fs::path& path) {
-    // The shell ends at once. A program that ends with this one would close the user's browser.
-    const core::Program program{.command = {"/bin/sh", "-c", "xdg-open \"$1\" < /dev/null > /dev/null 2>&1 &",
-                                            "sh", fs::absolute(path).string()},
-                                .environment = {},
-                                .log = {}};
-    if (core::find_program("xdg-open").empty())
-        throw RunError("there is no xdg-open here (Debian: xdg-utils); open " +
-                       core::one_line(path.string()));
-    core::run_program(program, [](std::string_view) { return true; });
+    if (const std::string reason = platform::open_outside(path); !reason.empty())
+        throw RunError(reason + "; open " + core::one_line(path.string()));
 }
 
 Publisher::Publisher(fs::path program, std::function<void()> wake)

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where the system keeps what is the user's.
+#pragma once
+#include <filesystem>
+#include <vector>
+
+namespace ewa::platform {
+
+/// The user's home folder; empty without one. POSIX: $HOME. Windows: the profile.
+std::filesystem::path home_folder();
+
+/// Where programs keep the user's settings, each in a folder of its own; empty if the user has no such place.
+/// POSIX: $XDG_CONFIG_HOME, or .config in the home folder; relative ones are ignored (XDG Base Directory Specification).
+std::filesystem::path settings_folder();
+
+/// Where programs keep what they can make again. POSIX: $XDG_CACHE_HOME, or .cache in the home folder.
+std::filesystem::path cache_folder();
+
+/// The folders of fonts, the user's own first. Some may not exist.
+std::vector<std::filesystem::path> font_folders();
+
+}  // namespace ewa::platform
