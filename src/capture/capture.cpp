@@ -48,7 +48,7 @@ std::vector<fs::path> photos_of(const fs::path& photos, const fs::path& folder) 
     const bool of_run =
         folder.filename() == folders::kMadeDataset && is_file(folder.parent_path() / folders::kConfigFile);
     const fs::path results = fs::weakly_canonical(fs::absolute(of_run ? folder.parent_path() : folder));
-    const std::string below = results.lexically_relative(fs::canonical(photos)).string() + "/";
+    const std::string below = core::inside(results, fs::canonical(photos)).string() + "/";
     std::vector<fs::path> names = capture::photos_in(photos);
     std::erase_if(names, [&](const fs::path& name) { return name.string().starts_with(below); });
     return names;
@@ -201,7 +201,7 @@ Capture make_of_video(Making& now) {
     const fs::path above = is_folder(now.input) ? now.input : now.input.parent_path();
     now.record["files"] = Json::array();
     for (const fs::path& video : now.videos)
-        now.record["files"].push_back(capture::line_of(above, video.lexically_relative(above)));
+        now.record["files"].push_back(capture::line_of(above, core::inside(video, above)));
     check_same_file(now.folder, now.before, now.record, "video");
     require_programs(now.folder, true);
     now.begin();

@@ -89,7 +89,7 @@ class FeatureDatabase::Statement {
 FeatureDatabase::FeatureDatabase(const std::filesystem::path& file)
     : name_(core::one_line(file.string())), database_(nullptr, sqlite3_close) {
     sqlite3* database = nullptr;
-    const int result = sqlite3_open_v2(file.c_str(), &database, SQLITE_OPEN_READWRITE, nullptr);
+    const int result = sqlite3_open_v2(file.string().c_str(), &database, SQLITE_OPEN_READWRITE, nullptr);
     database_.reset(database);
     if (result != SQLITE_OK) throw RunError(name_ + ": " + sqlite3_errstr(result));
     sqlite3_busy_timeout(database, kWait);

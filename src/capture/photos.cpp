@@ -142,7 +142,7 @@ std::vector<fs::path> films_in(const fs::path& folder) try {
     std::vector<fs::path> films;
     std::map<fs::path, bool> made;
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
-        const fs::path inside = entry.path().lexically_relative(folder);
+        const fs::path inside = core::inside(entry.path(), folder);
         if (entry.is_regular_file() && is_film(inside) && !core::is_of_desktop(inside) &&
             !below_made(folder, inside, made))
             films.push_back(inside);

@@ -19,12 +19,16 @@ bool is_folder(const std::filesystem::path& path) {
     return std::filesystem::is_directory(path, ignored);
 }
 
-bool is_of_desktop(const std::filesystem::path& inside) {
-    for (const std::filesystem::path& part : inside)
-        if (const std::string name = part.string();
-            (name.starts_with('.') && name != "." && name != "..") || name == "__MACOSX" || name == "@eaDir")
+bool is_of_desktop(const std::filesystem::path& name) {
+    for (const std::filesystem::path& each : name)
+        if (const std::string part = each.string();
+            (part.starts_with('.') && part != "." && part != "..") || part == "__MACOSX" || part == "@eaDir")
             return true;
-    return inside.filename() == "Thumbs.db" || inside.filename() == "desktop.ini";
+    return name.filename() == "Thumbs.db" || name.filename() == "desktop.ini";
+}
+
+std::filesystem::path inside(const std::filesystem::path& path, const std::filesystem::path& folder) {
+    return path.lexically_relative(folder).generic_string();
 }
 
 std::string with_home(const std::string& word) {

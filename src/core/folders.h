@@ -13,8 +13,11 @@ bool is_file(const std::filesystem::path& path);
 bool is_folder(const std::filesystem::path& path);
 
 /// Whether a desktop or a server has made the file, or a folder above it. Their names begin with a dot, or are __MACOSX, @eaDir,
-/// Thumbs.db or desktop.ini. inside: the file's path relative to the user's folder.
-bool is_of_desktop(const std::filesystem::path& inside);
+/// Thumbs.db or desktop.ini. name: the file's path relative to the user's folder.
+bool is_of_desktop(const std::filesystem::path& name);
+
+/// The path relative to the folder, with / between its parts on every system: as names inside files are written.
+std::filesystem::path inside(const std::filesystem::path& path, const std::filesystem::path& folder);
 
 /// Creates the folder and its parents. An empty path names no folder. Throws RunError if the folder cannot be
 /// created, or if the path names something else.

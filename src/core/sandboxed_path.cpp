@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <string>
 
+#include "platform/file.h"
+
 namespace ewa::core {
 
 namespace fs = std::filesystem;
@@ -26,8 +28,9 @@ std::optional<fs::path> name_inside(std::string_view name) {
     std::string slashes(name);
     std::replace(slashes.begin(), slashes.end(), '\\', '/');
     const bool drive = slashes.size() > 1 && slashes[1] == ':';
-    const fs::path path = fs::path(slashes).lexically_normal();
-    if (slashes.find('\0') != std::string::npos || drive || path.is_absolute()) return std::nullopt;
+    const fs::path path = fs::path(slashes).lexically_normal().generic_string();
+    if (slashes.find('\0') != std::string::npos || drive || path.has_root_path()) return std::nullopt;
+    if (!platform::can_name_files(path)) return std::nullopt;
     if (path.empty() || !path.has_filename() || path == "." || *path.begin() == "..") return std::nullopt;
     return path;
 }

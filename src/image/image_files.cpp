@@ -17,6 +17,7 @@
 #include "core/system_limits.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "platform/file.h"
 
 namespace ewa {
 
@@ -57,7 +58,7 @@ File open_file(const fs::path& path) {
     const fs::file_status status = fs::status(path, error);
     if (!fs::exists(status)) throw std::runtime_error("there is no such file");
     if (!fs::is_regular_file(status)) throw std::runtime_error("it is not a regular file");
-    File file(std::fopen(path.c_str(), "rbe"));
+    File file(platform::open_stream(path));
     if (!file) throw std::runtime_error(std::strerror(errno));
     return file;
 }
@@ -370,8 +371,7 @@ Image decode(std::span<const unsigned char> bytes, const std::string& what, int 
     const Format* format = image::format_of(text);
     if (!format || !format->read) throw InputError(core::one_line(what + ": is neither PNG nor JPEG"));
     return with_name(what, [&] {
-        // fmemopen takes a pointer to non-const, and does not write through it in mode r.
-        const File file(fmemopen(const_cast<unsigned char*>(bytes.data()), bytes.size(), "r"));
+        const File file(platform::stream_of(bytes.data(), bytes.size()));
         if (!file) throw std::bad_alloc();
         const ImageSize size = format->read(file.get(), bytes.size(), false).size;
         if (size.width > largest || size.height > largest)
@@ -439,7 +439,7 @@ std::vector<fs::path> images_below(const fs::path& folder) try {
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
         if (const std::string extension = core::lower(entry.path().extension().string());
             entry.is_regular_file() && std::ranges::find(kExtensions, extension) != std::end(kExtensions))
-            found.push_back(entry.path().lexically_relative(folder));  // of links: their own names
+            found.push_back(core::inside(entry.path(), folder));  // of links: their own names
     std::erase_if(found, core::is_of_desktop);
     std::ranges::sort(found);
     return found;

@@ -3,6 +3,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <optional>
 #include <system_error>
@@ -96,9 +97,17 @@ enum class Elsewhere { refused, copied };
 std::error_code link_folder(const std::filesystem::path& target, const std::filesystem::path& link,
                             Elsewhere elsewhere = Elsewhere::refused);
 
+/// Whether the system can have files of this name, and takes it for nothing else. Windows: names such as NUL are devices, a colon
+/// begins a stream, and dots and blanks at the end are lost.
+bool can_name_files(const std::filesystem::path& name);
+
 /// A new folder, for this user alone, in the system's folder for temporary files. Its name begins with `prefix`. path: where it is,
 /// or would have been.
 std::error_code make_temporary_folder(const char* prefix, std::filesystem::path& path);
+
+/// A stream of C that reads the file, or bytes that live as long. Its bytes are as they are. Null, and errno, if it cannot.
+std::FILE* open_stream(const std::filesystem::path& path);
+std::FILE* stream_of(const void* bytes, size_t size);
 
 /// Whether the error means a full disk, a quota, or the limit of a file's size.
 bool is_full(const std::error_code& error);

@@ -104,7 +104,7 @@ io::ImageRecord refined_record(const Frame& frame, const Camera& given) {
 
 /// The folder that an image's name is relative to; empty if its path does not end with its name.
 fs::path folder_of_images(const Frame& frame) {
-    const std::string path = fs::absolute(frame.image_path).string();
+    const std::string path = fs::absolute(frame.image_path).generic_string();
     if (!path.ends_with("/" + frame.name)) return {};
     return path.substr(0, path.size() - frame.name.size() - 1);
 }

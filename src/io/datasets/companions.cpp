@@ -78,7 +78,7 @@ std::string without_word(const std::string& key, std::span<const std::string_vie
 /// The first of the folders that the path is below, and the path relative to it. Its own folder if it is below none.
 std::pair<fs::path, fs::path> split_below(const fs::path& path, std::initializer_list<fs::path> folders) {
     for (const fs::path& folder : folders)
-        if (fs::path inside = path.lexically_relative(folder); !inside.empty() && *inside.begin() != "..")
+        if (fs::path inside = core::inside(path, folder); !inside.empty() && *inside.begin() != "..")
             return {folder, std::move(inside)};
     return {path.parent_path(), path.filename()};
 }
@@ -104,7 +104,7 @@ Companions::Companions(Kind kind, const ImageRecords& images, const fs::path& da
     for (const ImageRecord& image : images.images)
         for (fs::path folder = image.path.parent_path();
              of_photos_.insert(folder).second && folder != folder_; folder = folder.parent_path())
-            if (const fs::path inside = folder.lexically_relative(folder_);
+            if (const fs::path inside = core::inside(folder, folder_);
                 inside.empty() || *inside.begin() == "..") {
                 of_photos_.erase(folder);
                 break;
@@ -144,7 +144,7 @@ void Companions::list_folders(int downscale) {
     // As cam0/masks of cam0 or of cam0/images.
     for (const fs::path& folder : of_photos_)
         for (const std::string_view name : names.folders)
-            list(entry_in(folder, std::string(name)), kOfFolder, folder.lexically_relative(folder_));
+            list(entry_in(folder, std::string(name)), kOfFolder, core::inside(folder, folder_));
     if (kind_ != Kind::masks) return;
     for (const fs::path& root : {root_, folder_})
         for (const std::string_view name : kOtherFolders)
@@ -296,7 +296,7 @@ fs::path Companions::of_all() {
 }
 
 std::string Companions::shown(const fs::path& path) const {
-    const fs::path inside = path.lexically_relative(root_);
+    const fs::path inside = core::inside(path, root_);
     return core::one_line((inside.empty() || *inside.begin() == ".." ? path : inside).string());
 }
 
@@ -374,7 +374,7 @@ bool belongs_to(const std::string& key, const std::set<std::string>& photos) {
     for (size_t at = key.find_first_of(kBetween); at != key.npos; at = key.find_first_of(kBetween, at + 1)) {
         const std::string before = key.substr(0, at), after = key.substr(at + 1);
         const bool known = photos.contains(before) ||
-                           (is_named_as_image(before) && photos.contains(fs::path(before).stem()));
+                           (is_named_as_image(before) && photos.contains(fs::path(before).stem().string()));
         if (known &&
             std::ranges::any_of(kOthers, [&](std::string_view word) { return after.starts_with(word); }))
             return true;
@@ -387,7 +387,7 @@ bool belongs_to(const std::string& key, const std::set<std::string>& photos) {
 UsedOf used_photos(const ImageRecords& model, const Dataset& dataset) {
     UsedOf result{.what = "photo"};
     const auto shown = [&](const fs::path& path) {
-        const fs::path inside = path.lexically_relative(dataset.root);
+        const fs::path inside = core::inside(path, dataset.root);
         return core::one_line(
             (inside.empty() || *inside.begin() == ".." ? path.filename() : inside).string());
     };
@@ -408,7 +408,7 @@ UsedOf used_photos(const ImageRecords& model, const Dataset& dataset) {
         if (!frame.image_exists) continue;
         known.insert({frame.mask_path, frame.depth_path});
         if (result.used++ > 0) continue;
-        const std::string path = frame.image_path.string();
+        const std::string path = frame.image_path.generic_string();
         if (!path.ends_with("/" + frame.name)) continue;
         const fs::path place =
             fs::path(path.substr(0, path.size() - frame.name.size() - 1)).lexically_relative(dataset.root);
@@ -418,7 +418,7 @@ UsedOf used_photos(const ImageRecords& model, const Dataset& dataset) {
     result.found = model.images.size();
     std::set<fs::path> files;
     const bool whole = std::ranges::any_of(folders, [&](const fs::path& folder) {
-        const fs::path inside = folder.lexically_relative(model.folder);
+        const fs::path inside = core::inside(folder, model.folder);
         return !inside.empty() && *inside.begin() != "..";
     });
     if (whole) folders.insert(model.folder);

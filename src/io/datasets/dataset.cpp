@@ -53,7 +53,7 @@ struct ImageFile {
 
 ImageFile find_image(const io::ImageRecord& image, const fs::path& folder, int downscale) {
     if (downscale > 1) {
-        const fs::path inside = image.path.lexically_relative(folder);
+        const fs::path inside = core::inside(image.path, folder);
         const fs::path copies =
             folder.parent_path() / (folder.filename().string() + "_" + std::to_string(downscale));
         if (!inside.empty() && *inside.begin() != ".." && has_file(copies, inside))

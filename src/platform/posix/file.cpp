@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <cstdlib>
 #include <string>
 
@@ -156,11 +155,24 @@ std::error_code link_folder(const fs::path& target, const fs::path& link, Elsewh
     return symlink(target.c_str(), link.c_str()) != 0 ? reason() : std::error_code();
 }
 
+bool can_name_files(const fs::path&) {
+    return true;
+}
+
 std::error_code make_temporary_folder(const char* prefix, fs::path& path) {
     std::string name = (fs::temp_directory_path() / prefix).string() + "XXXXXX";
     const bool made = mkdtemp(name.data()) != nullptr;
     path = name;
     return made ? std::error_code() : reason();
+}
+
+std::FILE* open_stream(const fs::path& path) {
+    return std::fopen(path.c_str(), "rbe");
+}
+
+// fmemopen takes a pointer to non-const, and does not write through it in mode r.
+std::FILE* stream_of(const void* bytes, size_t size) {
+    return fmemopen(const_cast<void*>(bytes), size, "r");
 }
 
 bool is_full(const std::error_code& error) {

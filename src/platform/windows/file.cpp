@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cwctype>
 #include <string>
 
 #include "platform/process.h"
@@ -63,6 +64,21 @@ std::wstring passing_name(std::wstring_view prefix) {
     QueryPerformanceCounter(&now);
     return std::wstring(prefix) + std::to_wstring(process_id()) + L"-" + std::to_wstring(counter++) + L"-" +
            std::to_wstring(now.QuadPart & 0xffffff);
+}
+
+/// Whether Windows takes this part of a path for something else.
+bool is_special(const fs::path& part) {
+    const std::wstring& text = part.native();
+    if (text == L"." || text == L"..") return false;
+    std::wstring stem = text.substr(0, text.find(L'.'));
+    while (stem.ends_with(L' ')) stem.pop_back();
+    for (wchar_t& c : stem) c = wchar_t(std::towupper(c));
+    const bool numbered = stem.size() == 4 && stem[3] >= L'0' && stem[3] <= L'9' &&
+                          (stem.starts_with(L"COM") || stem.starts_with(L"LPT"));
+    return numbered || stem == L"NUL" || stem == L"CON" || stem == L"PRN" || stem == L"AUX" ||
+           text.ends_with(L'.') || text.ends_with(L' ') ||
+           text.find_first_of(L"<>:\"|?*") != std::wstring::npos ||
+           std::ranges::any_of(text, [](wchar_t c) { return c < 0x20; });
 }
 
 }  // namespace
@@ -219,9 +235,28 @@ std::error_code link_folder(const fs::path& target, const fs::path& link, Elsewh
     return error;
 }
 
+bool can_name_files(const fs::path& name) {
+    return std::ranges::none_of(name, is_special);
+}
+
 std::error_code make_temporary_folder(const char* prefix, fs::path& path) {
     path = fs::temp_directory_path() / passing_name(wide(prefix));
     return error_unless(CreateDirectoryW(long_path(path).c_str(), nullptr));
+}
+
+std::FILE* open_stream(const fs::path& path) {
+    return _wfopen(long_path(path).c_str(), L"rbN");
+}
+
+// Windows has no streams over memory. T: it keeps a file in memory while there is enough of it; D: it goes with the stream.
+std::FILE* stream_of(const void* bytes, size_t size) {
+    std::FILE* stream = _wfopen((fs::temp_directory_path() / passing_name(L"ewa-stream-")).c_str(), L"w+bTD");
+    if (stream && std::fwrite(bytes, 1, size, stream) != size) {
+        std::fclose(stream);
+        return nullptr;
+    }
+    if (stream) std::rewind(stream);
+    return stream;
 }
 
 bool is_full(const std::error_code& error) {

@@ -119,7 +119,7 @@ bool is_named_as_image(const fs::path& file) {
 }
 
 std::string name_key(const fs::path& name) {
-    return core::lower(core::composed(name.string()));
+    return core::lower(core::composed(name.generic_string()));
 }
 
 fs::path named_path(const std::string& name) {
@@ -129,8 +129,8 @@ fs::path named_path(const std::string& name) {
     if (text.size() > 1 && text[1] == ':') text.erase(0, 2);
     fs::path path;
     for (const fs::path& part : fs::path(text).lexically_normal())
-        if (part != "/" && part != ".." && part != ".") path /= part;
-    return path.has_filename() ? path : fs::path();
+        if (!part.has_root_path() && part != ".." && part != ".") path /= part;
+    return path.has_filename() ? fs::path(path.generic_string()) : fs::path();
 }
 
 std::vector<fs::path> list_images(const fs::path& folder, bool below, bool (*named)(const fs::path&)) {
@@ -143,7 +143,7 @@ std::vector<fs::path> list_images(const fs::path& folder, bool below, bool (*nam
         if (++files > kMostFiles || names.size() > kMostImages)
             throw InputError(core::one_line(folder.string()) + ": holds more than 200000 images");
         if (at->is_directory(error) && (!below || is_of_others(at->path()))) at.disable_recursion_pending();
-        if (fs::path name = at->path().lexically_relative(folder);
+        if (fs::path name = core::inside(at->path(), folder);
             named(name) && !core::is_of_desktop(name) && core::is_file(at->path()))
             names.push_back(std::move(name));
     }
