@@ -243,12 +243,13 @@ std::vector<std::string> remarks_on_others(const fs::path& photos) {
 /// Converts what COLMAP does not read. The names become those of images/.
 void convert(Making& now, const fs::path& photos, const fs::path& link, capture::Chosen& chosen) {
     const fs::path images = now.folder / "images";
+    const fs::path target = link.empty() ? fs::absolute(photos) : link;  // empty: on another disk of Windows
     if (!fs::exists(fs::symlink_status(images))) {
         if (std::ranges::any_of(chosen.names, capture::is_heif))
             capture::convert_photos(photos, chosen.names, images, now.folder / "colmap/log.txt",
                                     now.progress);
-        else if (const auto error = platform::link_folder(link, images, platform::Elsewhere::copied))
-            throw fs::filesystem_error("cannot create directory symlink", link, images, error);
+        else if (const auto error = platform::link_folder(target, images, platform::Elsewhere::copied))
+            throw fs::filesystem_error("cannot create directory symlink", target, images, error);
     }
     std::vector<capture::Skipped> skipped;
     std::set<std::string> gone;

@@ -115,7 +115,7 @@ bool is_full(const std::error_code& error);
 /// What discards everything that is written to it: /dev/null or NUL.
 extern const char* const kNullFile;
 
-/// A file that readers open by its path while the object lives. Linux: in memory, without a name in any folder.
+/// A file that a File reads by its path while the object lives. Linux: in memory, without a name in any folder.
 class PassingFile {
   public:
     PassingFile();

@@ -81,6 +81,14 @@ bool is_special(const fs::path& part) {
            std::ranges::any_of(text, [](wchar_t c) { return c < 0x20; });
 }
 
+/// Makes `link` the same file as `file`, or its copy.
+std::error_code show(const fs::path& file, const fs::path& link, Elsewhere elsewhere) {
+    if (CreateHardLinkW(long_path(link).c_str(), long_path(file).c_str(), nullptr)) return {};
+    std::error_code error = last_error();
+    if (elsewhere == Elsewhere::copied) fs::copy_file(file, link, error);
+    return error;
+}
+
 }  // namespace
 
 const char* const kNullFile = "NUL";
@@ -214,21 +222,22 @@ std::error_code refuses_files(const fs::path& folder) {
 }
 
 std::error_code link_folder(const fs::path& target, const fs::path& link, Elsewhere elsewhere) {
+    if (target.empty()) return std::make_error_code(std::errc::no_such_file_or_directory);
     const fs::path source = target.is_absolute() ? target : link.parent_path() / target;
     std::error_code error;
+    const fs::path own = fs::weakly_canonical(link.parent_path(), error);  // may be in the target
     if (!fs::create_directory(link, error))
         return error ? error : std::make_error_code(std::errc::file_exists);
-    for (fs::recursive_directory_iterator entry(source, error), end; !error && entry != end;
-         entry.increment(error)) {
+    for (fs::recursive_directory_iterator entry(source, error), end; !error && entry != end;) {
         const fs::path made = link / entry->path().lexically_relative(source);
-        if (entry->is_directory(error)) {
+        if (!entry->is_directory(error)) {
+            if (!error) error = show(entry->path(), made, elsewhere);
+        } else if (fs::weakly_canonical(entry->path(), error) == own) {
+            entry.disable_recursion_pending();
+        } else {
             fs::create_directory(made, error);
-        } else if (!error &&
-                   !CreateHardLinkW(long_path(made).c_str(), long_path(entry->path()).c_str(), nullptr)) {
-            error = last_error();
-            if (elsewhere == Elsewhere::copied) fs::copy_file(entry->path(), made, error);
         }
-        if (error) break;
+        if (!error) entry.increment(error);
     }
     std::error_code ignored;
     if (error) fs::remove_all(link, ignored);
