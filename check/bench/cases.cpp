@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bench/cases.h"
 
-#include <fnmatch.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +8,7 @@
 #include <glm/matrix.hpp>
 #include <numbers>
 #include <sstream>
+#include <string_view>
 
 #include "core/random.h"
 #include "ewa/error.h"
@@ -35,9 +34,18 @@ Case frame_case(Kind kind, Layout layout, uint32_t splats, int width, int height
     return {name, kind, layout, splats, width, height, sh_degree, large};
 }
 
+/// In the pattern, * stands for any characters, and ? for one.
+bool fits(std::string_view name, std::string_view pattern) {
+    if (pattern.empty()) return name.empty();
+    if (pattern[0] == '*')
+        return fits(name, pattern.substr(1)) || (!name.empty() && fits(name.substr(1), pattern));
+    return !name.empty() && (pattern[0] == '?' || pattern[0] == name[0]) &&
+           fits(name.substr(1), pattern.substr(1));
+}
+
 bool matches(const std::string& name, const std::string& pattern) {
     if (pattern.find_first_of("*?") == std::string::npos) return name.find(pattern) != std::string::npos;
-    return fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
+    return fits(name, pattern);
 }
 
 /// The parameters of a layout.

@@ -68,7 +68,8 @@ bool is_locked(const std::filesystem::path& path);
 /// Locks a folder until `held` is closed. Nothing is left on disk. Windows: processes of other machines do not see the lock.
 Lock lock_folder(const std::filesystem::path& folder, File& held);
 
-/// Renames a file. A file of the new name is replaced in one step.
+/// Renames a file. A file of the new name is replaced in one step. Windows: where others have it open, on NTFS alone, elsewhere an
+/// error.
 std::error_code replace(const std::filesystem::path& from, const std::filesystem::path& to);
 
 /// Flushes the names in a folder to the disk, where the system can. Failures are ignored.

@@ -40,7 +40,7 @@ TEST(Platform, FilesAreReadAndWrittenAtPlaces) {
     EXPECT_EQ(test::file_bytes(folder / "a"), "0123456789x");
 }
 
-TEST(Platform, AnOpenFileIsLockedReplacedAndRemoved) {
+TEST(Platform, FilesAreLockedReplacedAndRemoved) {
     const test::TempFolder folder;
     platform::File first, second;
     ASSERT_FALSE(first.open(folder / "a", Open::edit));
@@ -53,10 +53,10 @@ TEST(Platform, AnOpenFileIsLockedReplacedAndRemoved) {
     EXPECT_EQ(test::file_bytes(folder / "a"), "locked");  // a lock keeps nobody from reading
     first.close();
     EXPECT_EQ(second.try_lock(), platform::Lock::locked);
+    second.close();
     folder.write("b", "new");
     ASSERT_FALSE(platform::replace(folder / "b", folder / "a"));
     EXPECT_EQ(test::file_bytes(folder / "a"), "new");
-    second.close();
     platform::remove_now((folder / "a").c_str());
     EXPECT_EQ(test::files_in(folder.path()), 0u);
 }

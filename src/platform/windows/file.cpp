@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cwctype>
+#include <new>
 #include <string>
+#include <vector>
 
 #include "platform/process.h"
 #include "platform/windows/windows.h"
@@ -79,6 +81,26 @@ bool is_special(const fs::path& part) {
            text.ends_with(L'.') || text.ends_with(L' ') ||
            text.find_first_of(L"<>:\"|?*") != std::wstring::npos ||
            std::ranges::any_of(text, [](wchar_t c) { return c < 0x20; });
+}
+
+/// Renames over a file that others have open, as Windows 10 can on its own file systems.
+bool replace_open(const std::wstring& from, const std::wstring& to) {
+    struct Renaming {  // FILE_RENAME_INFO with flags, which older headers lack
+        DWORD flags;
+        HANDLE folder;
+        DWORD bytes;
+        wchar_t name[1];
+    };
+    constexpr auto kRenameInfoEx = FILE_INFO_BY_HANDLE_CLASS(22);
+    constexpr DWORD kReplace = 1, kPosix = 2;
+    const File file(value_of(open_handle(from, DELETE | SYNCHRONIZE, OPEN_EXISTING)));
+    if (!file.is_open()) return false;
+    std::vector<std::byte> memory(sizeof(Renaming) + to.size() * sizeof(wchar_t));
+    auto* renaming =
+        new (memory.data()) Renaming{kReplace | kPosix, nullptr, DWORD(to.size() * sizeof(wchar_t)), {}};
+    std::copy_n(to.c_str(), to.size() + 1, renaming->name);
+    return SetFileInformationByHandle(handle_of(file.handle()), kRenameInfoEx, renaming,
+                                      DWORD(memory.size())) != 0;
 }
 
 /// Makes `link` the same file as `file`, or its copy.
@@ -190,6 +212,7 @@ std::error_code replace(const fs::path& from, const fs::path& to) {
     const std::wstring before = long_path(from), after = long_path(to);
     std::error_code error;
     for (int i = 0; i < kTries; ++i) {
+        if (replace_open(before, fs::absolute(after).make_preferred().native())) return {};
         error = error_unless(
             MoveFileExW(before.c_str(), after.c_str(), MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH));
         if (error != std::errc::permission_denied && error != std::errc::device_or_resource_busy) break;

@@ -120,7 +120,7 @@ void PublishDialog::draw_done() {
     modal_text(wrote_);
     if (ImGui::Button(texts::files::kShowFolder)) open(out_.parent_path());
     ImGui::SameLine();
-    if (ImGui::Button(texts::files::kCopyPath)) ImGui::SetClipboardText(out_.c_str());
+    if (ImGui::Button(texts::files::kCopyPath)) ImGui::SetClipboardText(out_.string().c_str());
     if (ImGui::TreeNode(texts::files::kDetails)) {
         modal_box("done", text_, kPublishLines);
         ImGui::TreePop();
