@@ -46,7 +46,8 @@ bool random_bytes(void* bytes, size_t size);
 
 /// The value of an environment variable, in UTF-8. Empty if it is not set, or empty.
 std::string variable(const char* name);
-/// Sets an environment variable that is not set, for libraries and for programs that are started.
+/// Sets an environment variable, or one that is not set, for libraries and for programs that are started.
+void set_variable(const char* name, const std::string& value);
 void set_if_absent(const char* name, const std::string& value);
 
 }  // namespace ewa::platform

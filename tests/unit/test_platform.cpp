@@ -155,6 +155,15 @@ TEST(Platform, TheMachineIsDescribed) {
                 platform::is_ipv6("::1"));
 }
 
+TEST(Platform, VariablesAreSet) {
+    platform::set_if_absent("EWA_TEST_PLATFORM", "first");
+    platform::set_if_absent("EWA_TEST_PLATFORM", "second");
+    EXPECT_EQ(platform::variable("EWA_TEST_PLATFORM"), "first");
+    platform::set_variable("EWA_TEST_PLATFORM", "\xc3\xa4");
+    EXPECT_EQ(platform::variable("EWA_TEST_PLATFORM"), "\xc3\xa4");
+    EXPECT_EQ(platform::variable("EWA_TEST_PLATFORM_ABSENT"), "");
+}
+
 TEST(Platform, LibrariesTellWhyTheyAreNotLoaded) {
     const test::TempFolder folder;
     platform::Library absent(folder / "libabsent.so");

@@ -92,6 +92,10 @@ std::string variable(const char* name) {
     return value ? value : "";
 }
 
+void set_variable(const char* name, const std::string& value) {
+    setenv(name, value.c_str(), 1);
+}
+
 void set_if_absent(const char* name, const std::string& value) {
     setenv(name, value.c_str(), 0);
 }

@@ -85,10 +85,12 @@ std::string variable(const char* name) {
     return narrow(value);
 }
 
+void set_variable(const char* name, const std::string& value) {
+    _wputenv_s(wide(name).c_str(), wide(value).c_str());
+}
+
 void set_if_absent(const char* name, const std::string& value) {
-    const std::wstring wanted = wide(name);
-    if (GetEnvironmentVariableW(wanted.c_str(), nullptr, 0) == 0)
-        _wputenv_s(wanted.c_str(), wide(value).c_str());
+    if (GetEnvironmentVariableW(wide(name).c_str(), nullptr, 0) == 0) set_variable(name, value);
 }
 
 }  // namespace ewa::platform
