@@ -5,6 +5,7 @@
 #include <openvdb/tools/VolumeToMesh.h>
 
 #include "mesh/meshing.h"
+#include "platform/exported.h"
 
 namespace ewa::mesh {
 namespace {
@@ -81,5 +82,5 @@ std::vector<Corners> simplify(std::span<const glm::vec3> positions, std::span<co
 }  // namespace
 }  // namespace ewa::mesh
 
-extern "C" __attribute__((visibility("default"))) const ewa::mesh::Meshing ewa_meshing_layout_1;
+extern "C" EWA_EXPORTED const ewa::mesh::Meshing ewa_meshing_layout_1;
 const ewa::mesh::Meshing ewa_meshing_layout_1 = {EWA_VERSION, ewa::mesh::make_volume, ewa::mesh::simplify};

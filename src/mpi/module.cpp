@@ -17,6 +17,7 @@
 
 #include "ewa/error.h"
 #include "mpi/pause.h"
+#include "platform/exported.h"
 #include "ranks/plugin.h"
 
 namespace {
@@ -302,5 +303,5 @@ std::shared_ptr<ewa::Ranks> open(const MpiOptions& options) {
 
 }  // namespace
 
-extern "C" [[gnu::visibility("default")]] const ewa::ranks::Mpi ewa_mpi_layout_2;
+extern "C" EWA_EXPORTED const ewa::ranks::Mpi ewa_mpi_layout_2;
 const ewa::ranks::Mpi ewa_mpi_layout_2 = {EWA_VERSION, open};

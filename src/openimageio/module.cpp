@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "image/image_files.h"
+#include "platform/exported.h"
 
 namespace {
 
@@ -116,5 +117,5 @@ void jpeg_of_heif(const std::string& heif, const std::string& jpeg,
 
 }  // namespace
 
-extern "C" __attribute__((visibility("default"))) const OpenImageIO ewa_openimageio_layout_2;
+extern "C" EWA_EXPORTED const OpenImageIO ewa_openimageio_layout_2;
 const OpenImageIO ewa_openimageio_layout_2 = {EWA_VERSION, limit, read, encode_exr, reads_heif, jpeg_of_heif};
