@@ -173,7 +173,7 @@ std::optional<TaggedSplats> Client::splats(const std::string& tag) {
     splats.tag = answer.get_header_value("ETag");
     try {
         splats.gaussians = io::read_ply(passing.path()).gaussians;
-        splats.frozen = frozen_in(passing.path());
+        splats.frozen = frozen_in(passing.path().string());
     } catch (const InputError& error) {
         throw InputError("the trainer's splats cannot be read: " + std::string(error.what()));
     }
