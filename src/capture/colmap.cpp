@@ -149,8 +149,9 @@ void extract_features(const Colmap& colmap, const Photos& photos, const Panorama
                    });
         before += int(group.photos.size());
     }
-    if (FeatureDatabase database(work / "database.db");
-        photos.names.size() <= kSameEachTime && database.is_known() && database.has_plain_images()) {
+    if (FeatureDatabase database(work / "database.db"); photos.names.size() <= kSameEachTime &&
+                                                        database.is_known() && database.has_cameras() &&
+                                                        !database.has_rigs()) {
         database.clear_unwritten_descriptors();
         database.number_by_name();
         database.commit();

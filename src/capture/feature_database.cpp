@@ -233,11 +233,15 @@ std::int64_t FeatureDatabase::count(const char* sql) const {
     return row.step() ? row.integer(0) : 0;
 }
 
-bool FeatureDatabase::has_plain_images() const {
+bool FeatureDatabase::has_cameras() const {
     return count("SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name = 'cameras'") == 1 &&
-           count("SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name IN ('rigs', 'frames')") ==
-               0 &&
            count("SELECT COUNT(*) FROM pragma_table_info('images') WHERE name = 'camera_id'") == 1;
+}
+
+bool FeatureDatabase::has_rigs() const {
+    return count(
+               "SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name IN ('rigs', 'frames', "
+               "'frame_data')") > 0;
 }
 
 void FeatureDatabase::number_by_name() {
@@ -277,6 +281,7 @@ bool FeatureDatabase::has_shared_cameras() const {
 
 void FeatureDatabase::give_own_cameras() {
     const std::map<std::string, std::int64_t> numbers = images();
+    const bool rigs = has_rigs();
     const std::scoped_lock lock(mutex_);
     std::int64_t next = 1;
     if (Statement last(*this, "SELECT MAX(camera_id) FROM cameras"); last.step()) next += last.integer(0);
@@ -289,10 +294,28 @@ void FeatureDatabase::give_own_cameras() {
             .bind(2, number)
             .step();
         Statement(*this, "UPDATE images SET camera_id = ?1 WHERE image_id = ?2")
-            .bind(1, next++)
+            .bind(1, next)
             .bind(2, number)
             .step();
+        if (rigs) give_own_rig(number, next);
+        ++next;
     }
+}
+
+void FeatureDatabase::give_own_rig(std::int64_t image, std::int64_t camera) {
+    // A sensor of type 0 is a camera.
+    Statement(*this, "INSERT INTO rigs (ref_sensor_id, ref_sensor_type) VALUES (?, 0)")
+        .bind(1, camera)
+        .step();
+    Statement(*this,
+              "UPDATE frames SET rig_id = (SELECT MAX(rig_id) FROM rigs) WHERE frame_id = "
+              "(SELECT frame_id FROM frame_data WHERE data_id = ? AND sensor_type = 0)")
+        .bind(1, image)
+        .step();
+    Statement(*this, "UPDATE frame_data SET sensor_id = ?1 WHERE data_id = ?2 AND sensor_type = 0")
+        .bind(1, camera)
+        .bind(2, image)
+        .step();
 }
 
 void FeatureDatabase::visit_verified(

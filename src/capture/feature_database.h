@@ -31,7 +31,7 @@ class FeatureDatabase {
     /// The descriptors of an image, in the order of its features; empty if it has none.
     Descriptors descriptors(std::int64_t image) const;
     /// Sets descriptors to zero, which match nothing, for features so near the right or lower border that VLFeat computes none.
-    /// COLMAP stores uninitialised memory for these, which differs from run to run. Requires has_plain_images().
+    /// COLMAP stores uninitialised memory for these, which differs from run to run. Requires has_cameras().
     void clear_unwritten_descriptors();
     /// The descriptors of the image's features with the largest scales, at most `most`.
     Descriptors prominent(std::int64_t image, size_t most) const;
@@ -43,14 +43,16 @@ class FeatureDatabase {
     /// Marks two images so that COLMAP does not compare them, until write() gives their matches.
     void pass_over(std::int64_t first, std::int64_t second);
 
-    /// Whether the table of images states each image's camera, as up to COLMAP 3.11. Later versions have rigs and frames.
-    bool has_plain_images() const;
+    /// Whether the table of images states each image's camera.
+    bool has_cameras() const;
+    /// Whether each image belongs to a frame of a rig, as from COLMAP 3.12 on.
+    bool has_rigs() const;
     /// Numbers the images in the order of their names. COLMAP numbers them in the order in which its threads finish. Call it before
-    /// the first matches. Requires has_plain_images().
+    /// the first matches. Requires has_cameras() without has_rigs().
     void number_by_name();
     /// The focal lengths that EXIF gives, px, by image name. It has no entry for images without one.
     std::map<std::string, double> expected_focal_lengths() const;
-    /// Gives each image a camera of its own, a copy of its shared one. Requires has_plain_images().
+    /// Gives each image a camera of its own, a copy of its shared one, and a rig of its own where there are rigs. Requires has_cameras().
     void give_own_cameras();
     /// Whether images share a camera.
     bool has_shared_cameras() const;
@@ -74,6 +76,7 @@ class FeatureDatabase {
     /// The features of an image with `count` descriptors.
     std::vector<Feature> features(std::int64_t image, size_t count) const;
     std::int64_t count(const char* sql) const;
+    void give_own_rig(std::int64_t image, std::int64_t camera);
     void execute(const char* sql) const;
 
     mutable std::mutex mutex_;

@@ -94,7 +94,7 @@ bool is_same(const Way& first, const Way& second) {
 Mapping::Mapping(const Colmap& colmap, const Photos& photos, const PanoramaViews* views, fs::path work)
     : colmap_(colmap), photos_(photos), views_(views), work_(std::move(work)) {
     const FeatureDatabase database(work_ / "database.db");
-    if (views_ || !database.is_known() || !database.has_plain_images()) return;
+    if (views_ || !database.is_known() || !database.has_cameras()) return;
     expected_ = database.expected_focal_lengths();
     facts_.exif = 2 * expected_.size() > photos_.names.size();
     facts_.shared = database.has_shared_cameras();

@@ -358,7 +358,8 @@ TEST(DatabaseOfPhotos, NumbersThemByNameAndPartsTheirLenses) {
     const std::string file = folder / "database.db";
     write_shared_camera(file);
     capture::FeatureDatabase database(file);
-    ASSERT_TRUE(database.has_plain_images());
+    ASSERT_TRUE(database.has_cameras());
+    EXPECT_FALSE(database.has_rigs());
     EXPECT_EQ(database.expected_focal_lengths(),
               (std::map<std::string, double>{{"a.jpg", 800}, {"c.jpg", 800}}));
     EXPECT_TRUE(database.has_shared_cameras());
@@ -387,6 +388,45 @@ TEST(DatabaseOfPhotos, NumbersThemByNameAndPartsTheirLenses) {
               (std::map<std::string, double>{{"a.jpg", 800}, {"c.jpg", 800}}));
     database.remove_descriptors();
     EXPECT_TRUE(database.descriptors(3).empty());
+}
+
+/// As COLMAP 3.12 and later write it: each image is a frame of its camera's rig.
+TEST(DatabaseOfPhotos, GivesEachARigOfItsOwn) {
+    const TempFolder folder;
+    const std::string file = folder / "database.db";
+    write_shared_camera(file);
+    sqlite3* database = nullptr;
+    ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
+    const char* sql =
+        "CREATE TABLE rigs (rig_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, ref_sensor_id INTEGER NOT "
+        "NULL, ref_sensor_type INTEGER NOT NULL);"
+        "CREATE TABLE frames (frame_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, rig_id INTEGER NOT NULL);"
+        "CREATE TABLE frame_data (frame_id INTEGER NOT NULL, data_id INTEGER NOT NULL, sensor_id INTEGER NOT "
+        "NULL, sensor_type INTEGER NOT NULL);"
+        "INSERT INTO rigs VALUES (1, 4, 0), (2, 5, 0);"
+        "INSERT INTO frames VALUES (11, 1), (12, 1), (17, 2);"
+        "INSERT INTO frame_data VALUES (11, 1, 4, 0), (12, 2, 4, 0), (17, 7, 5, 0);";
+    ASSERT_EQ(sqlite3_exec(database, sql, nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(database);
+    capture::FeatureDatabase found(file);
+    ASSERT_TRUE(found.has_cameras() && found.has_rigs());
+    EXPECT_EQ(found.expected_focal_lengths(),
+              (std::map<std::string, double>{{"a.jpg", 800}, {"c.jpg", 800}}));
+    found.give_own_cameras();
+    found.commit();
+    EXPECT_FALSE(found.has_shared_cameras());
+    // Each image's camera is that of its frame, and of its frame's rig, which no other frame has.
+    sqlite3_stmt* row = nullptr;
+    ASSERT_EQ(sqlite3_prepare_v2(database,
+                                 "SELECT COUNT(DISTINCT rig_id) FROM images JOIN frame_data ON data_id = "
+                                 "image_id AND sensor_id = camera_id JOIN frames USING (frame_id) JOIN rigs "
+                                 "USING (rig_id) WHERE ref_sensor_id = camera_id AND ref_sensor_type = 0",
+                                 -1, &row, nullptr),
+              SQLITE_OK)
+        << sqlite3_errmsg(database);
+    ASSERT_EQ(sqlite3_step(row), SQLITE_ROW);
+    EXPECT_EQ(sqlite3_column_int(row, 0), 3);
+    sqlite3_finalize(row);
+    sqlite3_close(database);
 }
 
 TEST(DatabaseOfPhotos, ClearsDescriptorsThatWereNeverWritten) {
