@@ -27,7 +27,8 @@ struct CaptureOptions {
     int frames =
         300;  // of a video, about: it is divided into as many equal parts, and each gives its sharpest frame
     Matching matching = Matching::automatic;
-    bool level = true;  // false: the world keeps COLMAP's axes
+    bool level = true;                  // false: the world keeps COLMAP's axes
+    std::filesystem::path python = {};  // that is first asked for pycolmap, where there is no program colmap
 };
 
 /// The phases of make_dataset, in this order. The phase `frames` occurs only with videos.

@@ -56,6 +56,12 @@ class Watch {
     std::exception_ptr raised_;
 };
 
+/// The Python that runs this. Its environment may have pycolmap, and is not always in PATH.
+fs::path python_program() {
+    const nb::object program = nb::module_::import_("sys").attr("executable");
+    return nb::isinstance<nb::str>(program) ? nb::cast<std::string>(program) : std::string();
+}
+
 LoadedDataset find_cameras(const fs::path& photos, const fs::path& output, int frames,
                            const std::string& matching, bool level, nb::handle progress) {
     if (frames < kFewestVideoFrames || frames > kMostVideoFrames)
@@ -64,7 +70,8 @@ LoadedDataset find_cameras(const fs::path& photos, const fs::path& output, int f
     const CaptureOptions options{
         .frames = frames,
         .matching = of_argument("matching", [&] { return core::value_of(kMatchings, matching); }),
-        .level = level};
+        .level = level,
+        .python = python_program()};
     Watch watch(progress);
     Capture capture;
     {
@@ -90,7 +97,8 @@ void bind_capture(nb::module_& module) {
                 "= True, progress: "
                 "collections.abc.Callable[[str, int, int], object] | None = None) -> Dataset"),
         "Finds the cameras of a folder of photos, a zip archive of them or a video by COLMAP and ffmpeg, "
-        "which must be installed. The dataset is written to the folder output, where an interrupted search "
+        "which must be installed; the package pycolmap does for COLMAP. The dataset is written to the folder "
+        "output, where an interrupted search "
         "continues. frames: of a video. level: false "
         "keeps COLMAP's axes. progress: called with what is done, how many and of how many. Photos "
         "that cannot be placed are warnings. Ctrl-C ends it. Raises InputError, or DeviceError where a "

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "capture/found_colmap.h"
 #include "capture/inputs.h"
 #include "capture/steps.h"
 #include "capture/times.h"
@@ -120,11 +121,6 @@ Capture result_of(const fs::path& folder, const std::vector<fs::path>& names) {
     return result;
 }
 
-void require_programs(const fs::path& folder, bool video) {
-    if (video && !is_folder(folder / "images")) capture::require_ffmpeg();
-    if (!is_folder(folder / "sparse/0")) capture::require_colmap();
-}
-
 /// What COLMAP gets of a folder of photos. before: the record of a search that has begun; null: none. Completes `record`.
 capture::Chosen choose(const fs::path& photos, const fs::path& folder, const Json& before, Json& record,
                        const capture::ProgressFunction& progress) {
@@ -164,10 +160,10 @@ Capture search(const fs::path& folder, const capture::Chosen& chosen, const Capt
         capture::require_photos(folder / "images", chosen.names.size(), {});
         core::make_folder(model.parent_path());
         const fs::path masks = is_folder(folder / "masks") ? folder / "masks" : fs::path();
-        found =
-            capture::place_photos({folder / "images", chosen.names,
-                                   pairing_of(options.matching, chosen.names.size()), masks, options.level},
-                                  folder / "colmap", model, folder / io::kPlaceFile, progress);
+        found = capture::place_photos(
+            {folder / "images", chosen.names, pairing_of(options.matching, chosen.names.size()), masks,
+             options.level, options.python},
+            folder / "colmap", model, folder / io::kPlaceFile, progress);
     }
     if (!chosen.gone.empty()) capture::remove_views(model, chosen.gone);
     Capture result = result_of(folder, chosen.names);
@@ -194,6 +190,10 @@ struct Making {
         }
         if (before.is_null()) core::write_json(folder / folders::kCaptureFile, record);
     }
+    void require_programs() const {
+        if (!videos.empty() && !is_folder(folder / "images")) capture::require_ffmpeg();
+        if (!is_folder(folder / "sparse/0")) capture::require_colmap(options.python);
+    }
 };
 
 Capture make_of_video(Making& now) {
@@ -203,7 +203,7 @@ Capture make_of_video(Making& now) {
     for (const fs::path& video : now.videos)
         now.record["files"].push_back(capture::line_of(above, core::inside(video, above)));
     check_same_file(now.folder, now.before, now.record, "video");
-    require_programs(now.folder, true);
+    now.require_programs();
     now.begin();
     core::make_folder(work);
     if (const size_t count = now.proxies.size(); count > 0)
@@ -268,7 +268,7 @@ void convert(Making& now, const fs::path& photos, const fs::path& link, capture:
 /// link: what images/ refers to.
 Capture make_of_photos(Making& now, const fs::path& photos, const fs::path& link) {
     capture::Chosen chosen = choose(photos, now.folder, now.before, now.record, now.progress);
-    require_programs(now.folder, false);
+    now.require_programs();
     if (now.before.is_null()) say(remarks_on_others(photos), now.progress);
     say(chosen.remarks, now.progress);
     now.begin();
@@ -298,7 +298,7 @@ Capture make_of_archive(Making& now) {
     const fs::path unpacked = now.folder / "unpacked", partial = now.folder / "unpacked.partial";
     now.record["archive"] = Json::array({capture::line_of(now.input.parent_path(), now.input.filename())});
     const bool cameras = archive_has_cameras(now.input);
-    if (!cameras) require_programs(now.folder, false);
+    if (!cameras) now.require_programs();
     if (is_file(now.folder / folders::kCaptureFile))
         check_same_file(now.folder, core::read_json_file<Json>(now.folder / folders::kCaptureFile),
                         now.record, "archive");

@@ -19,7 +19,6 @@
 #include "core/atomic_file.h"
 #include "core/file_reader.h"
 #include "core/folders.h"
-#include "core/process.h"
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
@@ -181,11 +180,13 @@ void verify(const Colmap& colmap, const Photos& photos, const std::vector<ImageP
         words.insert(words.end(),
                      {"--match_list_path", argument(work / "pairs.txt"), "--match_type", "pairs"});
     }
-    static const std::regex pattern(R"(Matching block \[(\d+)/(\d+)\])");
+    // COLMAP says the first at the end of a block, and COLMAP 4 the second at its start.
+    static const std::regex pattern(R"(Matching block \[(\d+)/|Processing block \[(\d+)/)");
     colmap.run(std::move(words), {CapturePhase::matches, "verified", "pairs", 0, int(pairs.size()), {}},
                [](const std::string& line) -> std::optional<int> {
                    const auto numbers = numbers_in(line, pattern);
-                   return numbers ? std::optional(numbers->first * kBlock) : std::nullopt;
+                   return numbers ? std::optional(std::max(numbers->first, numbers->second - 1) * kBlock)
+                                  : std::nullopt;
                });
 }
 
@@ -404,15 +405,9 @@ std::vector<std::string> complete(const Colmap& colmap, const Mapping& mapping, 
 
 }  // namespace
 
-void require_colmap() {
-    if (core::find_program("colmap").empty())
-        throw RunError(
-            "photos without cameras need COLMAP, which is not installed (Debian: apt install colmap)");
-}
-
 Found place_photos(const Photos& given, const fs::path& work, const fs::path& model, const fs::path& place,
                    const ProgressFunction& progress) {
-    const Colmap colmap(work, progress);
+    const Colmap colmap(work, given.python, progress);
     const fs::path views_folder = work / "views";
     // A search that has begun continues with the same images.
     std::optional<PanoramaViews> cut;

@@ -20,9 +20,11 @@ std::string Colmap::log_name() const {
 }
 
 bool Colmap::has_option(const std::string& command, const std::string& option) const {
-    const core::Answer help = core::ask_program(
-        {.command = {"colmap", command, "--help"}, .environment = {kNoDisplay}, .log = log()},
-        [&] { return progress_({}); });
+    std::vector<std::string> words = words_;
+    words.insert(words.end(), {command, "--help"});
+    const core::Answer help =
+        core::ask_program({.command = std::move(words), .environment = {kNoDisplay}, .log = log()},
+                          [&] { return progress_({}); });
     if (help.ended == core::Ended::stopped) throw Stopped();
     if (help.cut && help.text.empty()) throw RunError("colmap " + command + " --help gives no answer");
     return help.text.find("--" + option + " ") != std::string::npos;
@@ -36,7 +38,12 @@ void Colmap::run(std::vector<std::string> command, const CaptureProgress& start,
                  const std::function<std::optional<int>(const std::string&)>& done) const {
     CaptureProgress now = start;
     std::string rest;
-    const std::string name = command[0] + (command[0] == "colmap" ? " " + command[1] : "");
+    std::string name = command[0];
+    if (name == "colmap") {
+        name += " " + command[1];
+        command.erase(command.begin());
+        command.insert(command.begin(), words_.begin(), words_.end());
+    }
     const core::Ended ended = core::run_program(
         {.command = std::move(command),
          .environment = {kNoDisplay},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs the programs COLMAP and GLOMAP: their log, their options, and the progress that their output states.
+// Runs COLMAP and GLOMAP: their log, their options, and the progress that their output states.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "capture/found_colmap.h"
 #include "capture/steps.h"
 
 namespace ewa::capture {
@@ -16,8 +17,9 @@ namespace ewa::capture {
 /// Runs COLMAP, writes its log, and reports its progress.
 class Colmap {
   public:
-    Colmap(std::filesystem::path work, const ProgressFunction& progress)
-        : work_(std::move(work)), progress_(progress) {}
+    /// python: as CaptureOptions::python. Throws RunError if there is no COLMAP.
+    Colmap(std::filesystem::path work, const std::filesystem::path& python, const ProgressFunction& progress)
+        : words_(require_colmap(python).words), work_(std::move(work)), progress_(progress) {}
 
     std::filesystem::path log() const { return work_ / "log.txt"; }
     std::string log_name() const;
@@ -28,8 +30,8 @@ class Colmap {
     /// The prefix in the names of a matcher's options. COLMAP 3.13 has another than earlier releases.
     std::string options_of_matching(const std::string& command) const;
 
-    /// Runs a program. done(line): the number of finished units that a line of the output states, or nothing. Throws RunError,
-    /// Stopped.
+    /// Runs a program, where "colmap" is the COLMAP that was found. done(line): the number of finished units that a line of the output
+    /// states, or nothing. Throws RunError, Stopped.
     void run(std::vector<std::string> command, const CaptureProgress& start,
              const std::function<std::optional<int>(const std::string&)>& done) const;
 
@@ -37,6 +39,7 @@ class Colmap {
     void say(const std::string& line) const;
 
   private:
+    std::vector<std::string> words_;
     std::filesystem::path work_;
     const ProgressFunction& progress_;
 };

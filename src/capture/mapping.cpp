@@ -22,7 +22,8 @@ namespace fs = std::filesystem;
 // COLMAP adjusts all cameras and points after each growth to 1.4 times, not to 1.1 times. The last adjustment gives as small
 // errors: docs/capture.md has the figures. Models of few images count.
 constexpr const char* kGlobalRatio = "1.4";
-constexpr const char* kImagesRatio = "Mapper.ba_global_images_ratio";  // COLMAP 3.12 has frames
+constexpr std::array kRatioOfImages{"Mapper.ba_global_images_ratio",   // until COLMAP 3.11
+                                    "Mapper.ba_global_frames_ratio"};  // later
 constexpr std::array kMapping{"--Mapper.min_model_size",
                               "3",
                               "--Mapper.ba_global_points_ratio",
@@ -149,8 +150,10 @@ void Mapping::map(const Way& way, const fs::path& folder, const std::vector<std:
                                    argument(folder)};
     if (!glomap) {
         words.insert(words.end(), kMapping.begin(), kMapping.end());
-        if (colmap_.has_option("mapper", kImagesRatio))
-            words.insert(words.end(), {"--" + std::string(kImagesRatio), kGlobalRatio});
+        const auto* ratio = std::ranges::find_if(
+            kRatioOfImages, [&](const char* name) { return colmap_.has_option("mapper", name); });
+        if (ratio != kRatioOfImages.end())
+            words.insert(words.end(), {"--" + std::string(*ratio), kGlobalRatio});
         if (!views_ && photos_.names.size() <= kSameEachTime)
             words.insert(words.end(), {"--Mapper.num_threads", "1"});
         if (views_) words.insert(words.end(), kLensOfExif.begin(), kLensOfExif.end());

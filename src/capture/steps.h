@@ -59,7 +59,6 @@ class PgmStream {
 
 /// Throws RunError with the package to install if the program is missing.
 void require_ffmpeg();
-void require_colmap();
 
 /// Arguments with which ffmpeg and ffprobe read a video. They read a name that begins with a dash, or has a colon, as a file too.
 /// They refuse playlists, whatever the name, because a playlist would make them read other files.
@@ -187,8 +186,9 @@ struct Photos {
     std::filesystem::path folder;              // of the images
     std::vector<std::filesystem::path> names;  // relative to it
     Pairing pairing = Pairing::all;
-    std::filesystem::path masks = {};  // NAME.png of each name; empty: none
-    bool level = true;                 // as CaptureOptions::level
+    std::filesystem::path masks = {};   // NAME.png of each name; empty: none
+    bool level = true;                  // as CaptureOptions::level
+    std::filesystem::path python = {};  // as CaptureOptions::python
 };
 
 /// The lines for the user about the cameras that were found.

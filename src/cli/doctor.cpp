@@ -13,6 +13,7 @@
 #include <string_view>
 #include <vector>
 
+#include "capture/found_colmap.h"
 #include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/output.h"
@@ -188,8 +189,10 @@ std::vector<Check> all_checks(const DoctorArguments& arguments) {
     checks.push_back(checked("videos and films", false, get("ffmpeg", "ffmpeg"), [] {
         return program_path({"ffmpeg", "ffprobe"});
     }));
-    checks.push_back(checked("cameras of photos", false, get("colmap", "COLMAP"),
-                             [] { return program_path({"colmap"}); }));
+    checks.push_back(checked("cameras of photos", false, capture::how_to_install_colmap(), [] {
+        if (const auto colmap = capture::find_colmap()) return colmap->name;
+        throw RunError("there is neither the program colmap nor Python's package pycolmap");
+    }));
     checks.push_back(checked("other image formats", false,
                              get("libopenimageio-dev", "OpenImageIO") + ", and ewa's module", [] {
                                  image::openimageio();

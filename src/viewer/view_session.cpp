@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "core/process.h"
+#include "capture/found_colmap.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "folders/run.h"
@@ -106,7 +106,7 @@ void ViewSession::take_found() {
         if (train && !training()) start_training(later->options, later->folder);
     } catch (const std::exception& error) {
         search_failure_ = error.what();
-        if (core::find_program("colmap").empty())
+        if (!capture::find_colmap())
             search_failure_ += "; or run ewa cameras where it is, and open the dataset that it makes";
         state_.say(search_failure_);
     }

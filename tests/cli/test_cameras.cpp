@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "capture/feature_database.h"
+#include "capture/found_colmap.h"
 #include "cli/cameras_test.h"
 #include "core/process.h"
 #include "ewa/image.h"
@@ -451,15 +452,15 @@ TEST_F(Cameras, WhatIsNoPhotosIsNamed) {
 
 TEST_F(Cameras, WhatIsMissingIsNamed) {
     fs::remove(folder_ / "bin/colmap");
-    const Circumstances bare{.environment = {{"PATH", folder_ / "bin"}}};
+    const Circumstances bare{.environment = {{"PATH", folder_ / "bin"}, {"VIRTUAL_ENV", ""}}};
     expect_failure(run_ewa({"cameras", folder_ / "photos", "-o", folder_ / "dataset"}, bare), 1,
-                   "apt install colmap");
+                   ewa::capture::how_to_install_colmap());
     write_file(folder_ / "film.mp4", "no film");
     expect_failure(run_ewa({"cameras", folder_ / "film.mp4", "-o", folder_ / "film"}, bare), 1,
                    "apt install ffmpeg");
     make_program(folder_ / "bin/ffmpeg", "exit 1");
     expect_failure(run_ewa({"cameras", folder_ / "film.mp4", "-o", folder_ / "film"}, bare), 1,
-                   "apt install colmap");
+                   ewa::capture::how_to_install_colmap());
     // Nothing is left of the attempts.
     for (const char* made : {"dataset", "film"}) EXPECT_FALSE(fs::exists(folder_ / made)) << made;
     expect_failure(run_ewa({"cameras", folder_ / "nowhere", "-o", folder_ / "x"}), 2,

@@ -42,14 +42,16 @@ TEST(Doctor, FindsThatTrainingWorks) {
 TEST(Doctor, NamesMissingProgramsAndTrainsWithoutThem) {
     const Folder folder;
     std::filesystem::create_directory(folder / "empty");
-    const Outcome outcome = doctor(folder, {.environment = {{"PATH", folder / "empty"}}});
+    const Outcome outcome =
+        doctor(folder, {.environment = {{"PATH", folder / "empty"}, {"VIRTUAL_ENV", ""}}});
     expect_success(outcome);
     const auto json = nlohmann::json::parse(outcome.out);
-    for (const auto& [name, package] :
-         {std::pair("videos and films", "ffmpeg"), {"cameras of photos", "colmap"}}) {
+    for (const auto& [name, detail] :
+         {std::pair("videos and films", "the program ffmpeg is not there"),
+          {"cameras of photos", "there is neither the program colmap nor Python's package pycolmap"}}) {
         const auto check = check_named(json, name);
         EXPECT_FALSE(check["works"].get<bool>()) << name;
-        EXPECT_EQ(check["detail"], std::string("the program ") + package + " is not there");
+        EXPECT_EQ(check["detail"], detail);
         EXPECT_NE(check["remedy"].get<std::string>().find("install"), std::string::npos) << check;
     }
     for (const char* name : {"several processes", "Python package"})
