@@ -34,6 +34,11 @@ std::string Colmap::options_of_matching(const std::string& command) const {
     return has_option(command, "FeatureMatching.use_gpu") ? "--FeatureMatching." : "--SiftMatching.";
 }
 
+std::string Colmap::options_of_solver() const {
+    const std::string own = "BundleAdjustmentCeres.";
+    return has_option("bundle_adjuster", own + "max_num_iterations") ? "--" + own : "--BundleAdjustment.";
+}
+
 void Colmap::run(std::vector<std::string> command, const CaptureProgress& start,
                  const std::function<std::optional<int>(const std::string&)>& done) const {
     CaptureProgress now = start;

@@ -30,6 +30,9 @@ class Colmap {
     /// The prefix in the names of a matcher's options. COLMAP 3.13 has another than earlier releases.
     std::string options_of_matching(const std::string& command) const;
 
+    /// The prefix in the names of the solver's options of bundle_adjuster. COLMAP 4 has another than earlier releases.
+    std::string options_of_solver() const;
+
     /// Runs a program, where "colmap" is the COLMAP that was found. done(line): the number of finished units that a line of the output
     /// states, or nothing. Throws RunError, Stopped.
     void run(std::vector<std::string> command, const CaptureProgress& start,

@@ -27,8 +27,9 @@ bool is_held_out(uint32_t image, uint32_t feature) {
     return core::pcg4d({image, feature, 0, 0})[0] % kHeldOutOf == 0;
 }
 
-/// Moves cameras, points and lenses of a model to the least errors.
-SparseModel adjusted(const Colmap& colmap, const SparseModel& model, const fs::path& work, int step) {
+/// Moves cameras, points and lenses of a model to the least errors. solver: Colmap::options_of_solver().
+SparseModel adjusted(const Colmap& colmap, const std::string& solver, const SparseModel& model,
+                     const fs::path& work, int step) {
     constexpr int kSteps = 4;
     const fs::path from = work / "adjusted_from", to = work / "adjusted";
     for (const fs::path& folder : {from, to}) {
@@ -36,11 +37,10 @@ SparseModel adjusted(const Colmap& colmap, const SparseModel& model, const fs::p
         fs::create_directories(folder);
     }
     write_sparse(model, from);
-    colmap.run(
-        {"colmap", "bundle_adjuster", "--input_path", argument(from), "--output_path", argument(to),
-         "--BundleAdjustment.max_num_iterations", "40", "--BundleAdjustment.function_tolerance", "1e-6"},
-        {CapturePhase::cameras, "adjusted", "times", step, kSteps, {}},
-        [](const std::string&) { return std::nullopt; });
+    colmap.run({"colmap", "bundle_adjuster", "--input_path", argument(from), "--output_path", argument(to),
+                solver + "max_num_iterations", "40", solver + "function_tolerance", "1e-6"},
+               {CapturePhase::cameras, "adjusted", "times", step, kSteps, {}},
+               [](const std::string&) { return std::nullopt; });
     return read_sparse(to);
 }
 
@@ -123,19 +123,20 @@ std::string refine_lens(const Colmap& colmap, const fs::path& folder,
     if (observations.size() < kLeastHeldOut) return {};
     if (SparseModel trial = whole; give_lens(trial, kOpenCv) == 0) return {};
     int step = 0;
-    const SparseModel simple = adjusted(colmap, part, work, step++);
+    const std::string solver = colmap.options_of_solver();
+    const SparseModel simple = adjusted(colmap, solver, part, work, step++);
     const std::vector<double> before = errors_of(simple, observations);
     const std::array kLenses{std::pair(kOpenCv, "OPENCV"), std::pair(kRadial, "RADIAL")};
     for (const auto& [lens, name] : kLenses) {
         SparseModel freed = simple;
         give_lens(freed, lens);
-        freed = adjusted(colmap, freed, work, step++);
+        freed = adjusted(colmap, solver, freed, work, step++);
         // Photos that do not determine a whole lens bend it; a part of its terms would hide that.
         if (!stays_sound(whole, freed, expected)) return {};
         if (!have_fallen(before, errors_of(freed, observations))) continue;
         SparseModel result = whole;
         give_lens(result, lens);
-        result = adjusted(colmap, result, work, step++);
+        result = adjusted(colmap, solver, result, work, step++);
         if (!stays_sound(whole, result, expected)) continue;
         write_sparse(result, folder);
         return name;

@@ -2,6 +2,7 @@
 // ewa cameras where COLMAP is a Python package, with a module in its place. The last test runs the real one.
 #include <cstdlib>
 
+#include "capture/colmap_program.h"
 #include "cli/cameras_test.h"
 #include "core/process.h"
 
@@ -208,6 +209,22 @@ TEST_F(Pycolmap, IsNamedByTheDoctor) {
             EXPECT_TRUE(check["works"].get<bool>());
             EXPECT_EQ(check["detail"], "pycolmap 4.2.1 of " + folder_ / "bin/python3");
         }
+}
+
+/// Options of COLMAP have other names from some release on.
+TEST(ColmapOptions, AreThoseOfTheRelease) {
+    const Folder folder;
+    fs::create_directories(folder / "bin");
+    const std::string path = std::getenv("PATH");
+    setenv("PATH", (folder / "bin" + ":" + path).c_str(), 1);
+    const ewa::capture::ProgressFunction progress = [](const ewa::CaptureProgress&) { return true; };
+    const auto solver = [&](const std::string& option) {
+        make_program(folder / "bin/colmap", "echo '  --" + option + " arg (=100)'\n");
+        return ewa::capture::Colmap(folder / "bin", {}, progress).options_of_solver();
+    };
+    EXPECT_EQ(solver("BundleAdjustment.max_num_iterations"), "--BundleAdjustment.");
+    EXPECT_EQ(solver("BundleAdjustmentCeres.max_num_iterations"), "--BundleAdjustmentCeres.");
+    setenv("PATH", path.c_str(), 1);
 }
 
 /// Real photos, where pycolmap and the photos are on this machine.
