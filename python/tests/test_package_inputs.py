@@ -282,6 +282,17 @@ def test_searches_that_fail(photos, tmp_path, monkeypatch):
         ewa.find_cameras(photos, tmp_path / "out")
 
 
+def test_pycolmap_of_the_running_python_is_found(photos, tmp_path, monkeypatch):
+    names = "match_image_pairs = ImageReaderOptions = FeatureExtractionOptions"
+    (tmp_path / "pycolmap.py").write_text(f"__version__ = '4.2.1'\n{names} = type('Options', (), {{}})\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("PATH", str(tmp_path / "nothing"))
+    monkeypatch.delenv("VIRTUAL_ENV", raising=False)
+    # It is no whole package.
+    with pytest.raises(ewa.DeviceError, match="colmap feature_extractor failed"):
+        ewa.find_cameras(photos, tmp_path / "out")
+
+
 def copy_of_still_life(folder):
     shutil.copytree(STILL_LIFE, folder, symlinks=True)
     return folder
