@@ -32,7 +32,7 @@ if(NOT EWA_SANITIZE AND NOT EWA_COVERAGE AND NOT EWA_FUZZ)
     target_compile_options(ewa_compiler INTERFACE
         "$<${ewa_hardened}:-U_FORTIFY_SOURCE;-D_FORTIFY_SOURCE=2;-fstack-protector-strong>")
     # Functions of libraries are bound at the start, and their table is read-only from then on.
-    add_link_options($<$<CONFIG:Release>:-Wl,-z,relro,-z,now>)
+    add_link_options($<$<AND:$<CONFIG:Release>,$<NOT:$<PLATFORM_ID:Windows>>>:-Wl,-z,relro,-z,now>)
 endif()
 if(EWA_SANITIZE)
     # The tests too: if a test and a module both have an inline function, the linker takes the test's.

@@ -22,7 +22,7 @@ set_target_properties(ewa_library PROPERTIES OUTPUT_NAME ewa EXPORT_NAME ewa LIN
     LINK_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/libewa.map)
 target_link_options(ewa_library PRIVATE -Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/libewa.map -Wl,--as-needed
                                         -Wl,--no-undefined)
-target_link_libraries(ewa_library PRIVATE Vulkan::Vulkan PNG::PNG JPEG::JPEG spdlog::spdlog ZLIB::ZLIB zstd::libzstd_shared
+target_link_libraries(ewa_library PRIVATE Vulkan::Vulkan PNG::PNG JPEG::JPEG spdlog::spdlog ZLIB::ZLIB ${ewa_zstd}
                                           PkgConfig::WEBP PkgConfig::MINIZIP pugixml::pugixml SQLite::SQLite3
                                           ${CMAKE_DL_LIBS})
 target_compile_features(ewa_library INTERFACE cxx_std_20)
@@ -43,7 +43,7 @@ endif()
 set(ewa_manual_folder ${PROJECT_BINARY_DIR}/manual)
 set(ewa_manual_stamps "")
 foreach(program ewa ewa-view)
-    if(TARGET ${program})
+    if(TARGET ${program} AND NOT CMAKE_CROSSCOMPILING) # they are the same for every system
         add_custom_command(OUTPUT ${PROJECT_BINARY_DIR}/${program}.manual
             COMMAND ${PROJECT_SOURCE_DIR}/cmake/write-manual $<TARGET_FILE:${program}> ${ewa_manual_folder} ${HELP2MAN}
             COMMAND ${CMAKE_COMMAND} -E touch ${PROJECT_BINARY_DIR}/${program}.manual
@@ -80,7 +80,7 @@ add_custom_target(product DEPENDS ${ewa_programs} ewa_library manual)
 install(TARGETS ${ewa_programs} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS ewa_library EXPORT ewaTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY include/ewa DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
-install(DIRECTORY ${ewa_manual_folder}/ DESTINATION ${CMAKE_INSTALL_DATADIR})
+install(DIRECTORY ${ewa_manual_folder}/ DESTINATION ${CMAKE_INSTALL_DATADIR} OPTIONAL)
 install(FILES README.md CHANGELOG.md CONTRIBUTING.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright) # where Debian looks for it
 install(DIRECTORY docs examples DESTINATION ${CMAKE_INSTALL_DOCDIR})

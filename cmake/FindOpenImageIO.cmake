@@ -13,5 +13,14 @@ if(OpenImageIO_FOUND AND NOT TARGET OpenImageIO::OpenImageIO)
         IMPORTED_LOCATION "${OpenImageIO_LIBRARY}"
         INTERFACE_INCLUDE_DIRECTORIES "${OpenImageIO_INCLUDE_DIR}"
         INTERFACE_LINK_LIBRARIES "${OpenImageIO_UTIL_LIBRARY}")
+    if(OpenImageIO_LIBRARY MATCHES "\\.a$") # which brings none of the libraries that it calls
+        find_package(OpenEXR CONFIG REQUIRED)
+        find_package(TIFF REQUIRED)
+        find_package(WebP CONFIG REQUIRED)
+        find_package(fmt CONFIG REQUIRED)
+        target_compile_definitions(OpenImageIO::OpenImageIO INTERFACE OIIO_STATIC_DEFINE)
+        target_link_libraries(OpenImageIO::OpenImageIO INTERFACE OpenEXR::OpenEXR TIFF::TIFF WebP::webpdemux WebP::webp JPEG::JPEG
+                                                                 ZLIB::ZLIB pugixml::pugixml fmt::fmt)
+    endif()
 endif()
 mark_as_advanced(OpenImageIO_INCLUDE_DIR OpenImageIO_LIBRARY OpenImageIO_UTIL_LIBRARY)
