@@ -22,7 +22,7 @@ set_target_properties(ewa_library PROPERTIES OUTPUT_NAME ewa EXPORT_NAME ewa LIN
     LINK_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/libewa.map)
 target_link_options(ewa_library PRIVATE -Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/libewa.map -Wl,--as-needed
                                         -Wl,--no-undefined)
-target_link_libraries(ewa_library PRIVATE Vulkan::Vulkan PNG::PNG JPEG::JPEG spdlog::spdlog ZLIB::ZLIB ${ewa_zstd}
+target_link_libraries(ewa_library PRIVATE Vulkan::Vulkan PNG::PNG JPEG::JPEG spdlog::spdlog ZLIB::ZLIB zstd::libzstd_shared
                                           PkgConfig::WEBP PkgConfig::MINIZIP pugixml::pugixml SQLite::SQLite3
                                           ${CMAKE_DL_LIBS})
 target_compile_features(ewa_library INTERFACE cxx_std_20)

@@ -11,7 +11,8 @@ build_zlib() {
 build_libpng() { with_cmake -DPNG_SHARED=OFF -DPNG_TESTS=OFF -DPNG_EXECUTABLES=OFF; }
 build_libjpeg_turbo() { with_cmake -DENABLE_SHARED=OFF -DWITH_TURBOJPEG=OFF -DWITH_SIMD=1 -DREQUIRE_SIMD=1 -DWITH_JAVA=0; }
 build_zstd() {
-    with_cmake build/cmake -DZSTD_BUILD_SHARED=OFF -DZSTD_BUILD_PROGRAMS=OFF -DZSTD_BUILD_TESTS=OFF -DZSTD_MULTITHREAD_SUPPORT=ON
+    with_cmake build/cmake -DZSTD_BUILD_SHARED=OFF -DZSTD_BUILD_PROGRAMS=OFF -DZSTD_BUILD_TESTS=OFF \
+        -DZSTD_LEGACY_SUPPORT=OFF -DZSTD_BUILD_DICTBUILDER=OFF
 }
 build_webp() {
     local off=() part
@@ -90,7 +91,7 @@ build_tbb() { with_cmake -DTBB_TEST=OFF -DTBBMALLOC_BUILD=OFF -DTBB_STRICT=OFF; 
 build_openvdb() {
     with_cmake -DOPENVDB_CORE_SHARED=OFF -DOPENVDB_CORE_STATIC=ON -DOPENVDB_BUILD_BINARIES=OFF -DUSE_BLOSC=OFF -DUSE_ZLIB=OFF \
         -DUSE_IMATH_HALF=ON -DOPENVDB_USE_DELAYED_LOADING=OFF -DUSE_EXPLICIT_INSTANTIATION=OFF -DUSE_CCACHE=OFF -DUSE_PKGCONFIG=OFF \
-        -DUSE_STATIC_DEPENDENCIES=ON -DOPENVDB_INSTALL_CMAKE_MODULES=OFF
+        -DUSE_STATIC_DEPENDENCIES=ON -DOPENVDB_INSTALL_CMAKE_MODULES=OFF -DOPENVDB_DISABLE_BOOST_IMPLICIT_LINKING=OFF
 }
 build_openexr() { with_cmake -DOPENEXR_BUILD_TOOLS=OFF -DOPENEXR_INSTALL_EXAMPLES=OFF; }
 build_tiff() {
@@ -101,7 +102,7 @@ build_tiff() {
 }
 build_openimageio() {
     local off=() part
-    for part in iff cineon dds dicom dpx ffmpeg fits gif heif ico jpeg2000 null openvdb psd ptex r3d raw rla sgi softimage targa term zfile png \
+    for part in iff cineon dds dicom dpx ffmpeg fits gif heif ico jpeg2000 null openvdb psd ptex r3d raw rla sgi softimage targa term zfile png jpeg \
         iconvert idiff igrep iinfo iv maketx oiiotool testtex; do off+=("-DENABLE_$part=OFF"); done
     for part in Freetype OpenColorIO OpenCV TBB DCMTK FFmpeg GIF Libheif LibRaw OpenJPEG OpenVDB Ptex R3DSDK Nuke PYTHON QT; do off+=("-DUSE_$part=OFF"); done
     # Boost has libraries for two things: what a thread owns, which packaging/thread_owned.h replaces, and the number of cores.
@@ -110,7 +111,7 @@ build_openimageio() {
     sed -i 's/^using boost::thread_specific_ptr;//; s/<boost\/thread\/tss.hpp>/"thread_owned.h"/' \
         src/libOpenImageIO/image{in,out}put.cpp src/libtexture/imagecache_pvt.h
     cp "$here/thread_owned.h" src/include/
-    with_cmake "${off[@]}" -DUSE_STD_FILESYSTEM=ON -DOIIO_BUILD_TOOLS=OFF -DOIIO_BUILD_TESTS=OFF -DBUILD_DOCS=OFF -DINSTALL_DOCS=OFF \
+    with_cmake "${off[@]}" -DCMAKE_CXX_STANDARD=17 -DUSE_STD_FILESYSTEM=ON -DOIIO_BUILD_TOOLS=OFF -DOIIO_BUILD_TESTS=OFF -DBUILD_DOCS=OFF -DINSTALL_DOCS=OFF \
         -DINSTALL_FONTS=OFF -DSTOP_ON_WARNING=OFF -DUSE_EXTERNAL_PUGIXML=ON -DBUILD_MISSING_FMT=OFF -DBUILD_MISSING_ROBINMAP=OFF \
         -DINTERNALIZE_FMT=OFF -DUSE_CCACHE=OFF -DUSE_SIMD=0 -DOIIO_DISABLE_BOOST_STACKTRACE=ON -DLINKSTATIC=ON
 }
