@@ -77,7 +77,7 @@ set_target_properties(glfw PROPERTIES IMPORTED_LOCATION $prefix/lib/libglfw3.a I
 CONFIG
 }
 build_imgui() {
-    archive imgui -I. '-DIMGUI_STB_RECT_PACK_FILENAME=<stb/stb_rect_pack.h>' '-DIMGUI_STB_TRUETYPE_FILENAME=<stb/stb_truetype.h>' \
+    archive imgui -I. -DGLFW_INCLUDE_NONE '-DIMGUI_STB_RECT_PACK_FILENAME=<stb/stb_rect_pack.h>' '-DIMGUI_STB_TRUETYPE_FILENAME=<stb/stb_truetype.h>' \
         -DIMGUI_DISABLE_STB_RECT_PACK_IMPLEMENTATION -DIMGUI_DISABLE_STB_TRUETYPE_IMPLEMENTATION -- \
         imgui.cpp imgui_draw.cpp imgui_tables.cpp imgui_widgets.cpp backends/imgui_impl_{glfw,vulkan}.cpp
     mkdir -p "$prefix/include/imgui/backends"
