@@ -9,7 +9,7 @@ set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS ${CMAKE_INSTALL_DEFAULT_DIRECTOR
 
 # libewa: the modules below the command line and the viewer, in one shared object. A program that links it needs none of the
 # libraries behind it. ewa's own programs link the modules themselves and run without it.
-set(ewa_library_modules core image scene folders io capture gpu passes pipeline operators pathtracer report ranks portions prepare train run)
+set(ewa_library_modules platform core image scene folders io capture gpu passes pipeline operators pathtracer report ranks portions prepare train run)
 set(ewa_objects $<TARGET_OBJECTS:ewa_shader_code> $<TARGET_OBJECTS:ewa_page>)
 foreach(module ${ewa_library_modules})
     if(TARGET ewa_${module})
