@@ -104,9 +104,9 @@ TEST_F(EditWork, LocksWhatATrainingHasFrozen) {
     editor_->enter("a.ply", "", splats, {}, false, frozen);
     settle(*editor_);
     EXPECT_EQ(editor_->snapshot().locked, 100u);
-    ASSERT_TRUE(editor_->marks());
-    EXPECT_EQ((*editor_->marks())[4], kMarkLocked);
-    EXPECT_EQ((*editor_->marks())[5], 0);
+    ASSERT_TRUE(editor_->snapshot().marks);
+    EXPECT_EQ((*editor_->snapshot().marks)[4], kMarkLocked);
+    EXPECT_EQ((*editor_->snapshot().marks)[5], 0);
     EXPECT_FALSE(editor_->unsaved());
     undo();
     EXPECT_EQ(editor_->snapshot().locked, 100u) << "it was undone";
