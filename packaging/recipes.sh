@@ -43,7 +43,7 @@ build_spdlog() {
 build_httplib() {
     local system='-pthread' options=(-DCPPHTTPLIB_USE_POLL)
     if $windows; then system='-lws2_32 -lcrypt32' options=(); fi
-    python3 split.py --out split
+    python3 ./split.py --out split
     archive cpp-httplib -Isplit -DCPPHTTPLIB_ZLIB_SUPPORT "${options[@]}" -- split/httplib.cc
     cp split/httplib.h "$prefix/include/"
     describe cpp-httplib 0.11.4 "-lcpp-httplib -lz $system" -DCPPHTTPLIB_ZLIB_SUPPORT
