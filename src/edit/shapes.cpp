@@ -225,7 +225,7 @@ Shape parse_shape(const std::string& text, const std::string& what) {
                                  (floods ? ", or flood=x,y,z,T,o with a least opacity o from 0 to 1" : "");
         const auto n = numbers_of(what, text, value, 4, form, floods);
         const auto opacity = n.size() > 4 ? std::optional(n[4]) : std::nullopt;
-        if (n[3] < 0 || opacity < 0.0 || opacity > 1.0) refuse_shape(what, text, form);
+        if (n[3] < 0 || opacity.value_or(0) < 0 || opacity.value_or(0) > 1) refuse_shape(what, text, form);
         const glm::dvec3 at(n[0], n[1], n[2]);
         return floods ? flood(at, n[3], opacity) : shape_of_color(at, n[3]);
     }
