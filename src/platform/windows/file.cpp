@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "platform/process.h"
 #include "platform/windows/windows.h"
 
 namespace ewa::platform {
@@ -64,8 +63,8 @@ std::wstring passing_name(std::wstring_view prefix) {
     static std::atomic<unsigned> counter{0};
     LARGE_INTEGER now{};
     QueryPerformanceCounter(&now);
-    return std::wstring(prefix) + std::to_wstring(process_id()) + L"-" + std::to_wstring(counter++) + L"-" +
-           std::to_wstring(now.QuadPart & 0xffffff);
+    return std::wstring(prefix) + std::to_wstring(GetCurrentProcessId()) + L"-" + std::to_wstring(counter++) +
+           L"-" + std::to_wstring(now.QuadPart & 0xffffff);
 }
 
 /// Whether Windows takes this part of a path for something else.
