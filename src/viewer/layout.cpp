@@ -70,4 +70,10 @@ Image part_of(const Image& image, const Rectangle& part) {
     return result;
 }
 
+BarSizes bar_sizes(double text_height) {
+    constexpr double kTopBar = 2.6, kStrip = 2.6, kStatusLine = 1.7;  // in heights of the text
+    const auto pixels = [&](double heights) { return int(std::lround(heights * text_height)); };
+    return {pixels(kTopBar), pixels(kStrip), pixels(kStatusLine)};
+}
+
 }  // namespace ewa::viewer

@@ -31,6 +31,12 @@ double monitor_scale(Size pixels, Size millimetres);
 /// The width of the panel in a window of this width. It is less than usual where that leaves the bars of the editor room.
 int panel_width(int window, double text_height);
 
+/// In px of the framebuffer: what the bars take of the window.
+struct BarSizes {
+    int top = 0, left = 0, bottom = 0;
+};
+BarSizes bar_sizes(double text_height);
+
 /// The part of the window that the panel does not cover. A panel wider than kMostPanel of the window lies over the picture, so
 /// this part is the whole window. panel: the panel's width; 0: it is hidden.
 Rectangle free_area(Size window, int panel);

@@ -10,7 +10,6 @@
 
 #include "ewa/error.h"
 #include "viewer/editor/film.h"
-#include "viewer/panel.h"
 
 namespace ewa::viewer {
 namespace {
@@ -197,6 +196,12 @@ void Navigation::write_views() {
     } catch (const RunError& error) {
         state_.say(error.what());
     }
+}
+
+glm::dvec3 next_up(const glm::dvec3& up) {
+    for (size_t i = 0; i < kAxes.size(); ++i)
+        if (kAxes[i].axis == up) return kAxes[(i + 1) % kAxes.size()].axis;
+    return kAxes[0].axis;
 }
 
 }  // namespace ewa::viewer

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The camera of the window, the keys that move it, and saved views.
 #pragma once
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,16 @@
 namespace ewa::viewer {
 
 inline constexpr float kStillPixels = 4;  // a shorter drag is a click
+
+/// An axis that can point up.
+struct Axis {
+    const char* name;
+    glm::dvec3 axis;
+};
+inline const std::array kAxes{Axis{"-y", {0, -1, 0}}, Axis{"+y", {0, 1, 0}}, Axis{"+z", {0, 0, 1}},
+                              Axis{"-z", {0, 0, -1}}, Axis{"+x", {1, 0, 0}}, Axis{"-x", {-1, 0, 0}}};
+/// The next of the six axes; the first one if `up` is not an axis.
+glm::dvec3 next_up(const glm::dvec3& up);
 
 class Navigation {
   public:

@@ -14,19 +14,12 @@
 #include "viewer/editor/texts.h"
 #include "viewer/editor/theme.h"
 #include "viewer/overlay.h"
+#include "viewer/panel_rows.h"
 
 namespace ewa::viewer {
 namespace {
 
-struct Axis {
-    const char* name;
-    glm::dvec3 axis;
-};
 constexpr int kNoteLines = 3;
-constexpr float kLabelColumn = 6.2f;  // in heights of the text
-
-const std::array kAxes{Axis{"-y", {0, -1, 0}}, Axis{"+y", {0, 1, 0}}, Axis{"+z", {0, 0, 1}},
-                       Axis{"-z", {0, 0, -1}}, Axis{"+x", {1, 0, 0}}, Axis{"-x", {-1, 0, 0}}};
 
 /// What is open, in two lines.
 void show_title(const WindowParts& parts) {
@@ -305,46 +298,6 @@ void keep_rows(PanelTab tab) {
 }
 
 }  // namespace
-
-void label_field(const char* label) {
-    ImGui::AlignTextToFramePadding();
-    ImGui::TextUnformatted(label);
-    const float needed = ImGui::CalcTextSize(label).x + ImGui::GetStyle().ItemInnerSpacing.x;
-    ImGui::SameLine(std::max(kLabelColumn * ImGui::GetTextLineHeight(), needed));
-    ImGui::SetNextItemWidth(-FLT_MIN);
-}
-
-bool draw_section(const char* name, bool open, bool open_now) {
-    ImGui::Separator();
-    if (open_now) ImGui::SetNextItemOpen(true);
-    ImGui::PushStyleColor(ImGuiCol_Header, ImU32(0));
-    const bool shown = ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : 0);
-    ImGui::PopStyleColor();
-    return shown;
-}
-
-int text_lines(const std::string& text, int most) {
-    if (text.empty()) return 0;
-    const float height =
-        ImGui::CalcTextSize(text.c_str(), nullptr, false, ImGui::GetContentRegionAvail().x).y;
-    return std::min(most, int(std::lround(height / ImGui::GetTextLineHeight())));
-}
-
-void draw_text_box(const char* name, const std::string& text, int least, int most) {
-    const int lines = std::max(least, text_lines(text, most));
-    if (lines == 0) return;
-    ImGui::BeginChild(name, ImVec2(0, float(lines) * ImGui::GetTextLineHeight()));
-    ImGui::PushTextWrapPos(0);
-    ImGui::TextUnformatted(text.c_str());
-    ImGui::PopTextWrapPos();
-    ImGui::EndChild();
-}
-
-glm::dvec3 next_up(const glm::dvec3& up) {
-    for (size_t i = 0; i < kAxes.size(); ++i)
-        if (kAxes[i].axis == up) return kAxes[(i + 1) % kAxes.size()].axis;
-    return kAxes[0].axis;
-}
 
 void draw_panel(const WindowParts& parts) {
     ViewState& state = parts.state;

@@ -12,6 +12,7 @@
 #include "viewer/editor/modal.h"
 #include "viewer/editor/offers.h"
 #include "viewer/panel.h"
+#include "viewer/panel_rows.h"
 
 namespace ewa::viewer {
 namespace {

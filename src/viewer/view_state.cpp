@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "viewer/view_state.h"
 
-#include "viewer/editor/toolbar.h"
-
 #include <cmath>
 
 namespace ewa::viewer {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "viewer/editor/theme.h"
-#include "viewer/panel.h"
+#include "viewer/panel_rows.h"
 
 namespace ewa::viewer::ui {
 namespace {

@@ -21,7 +21,6 @@ namespace ewa::viewer {
 namespace {
 
 // In heights of the text.
-constexpr double kTopBar = 2.6, kStrip = 2.6, kStatusLine = 1.7;
 constexpr float kButtonSide = 2.1f, kSmall = 0.8f;
 // In sides of a button.
 constexpr float kButtonGap = 0.1f, kGroupGap = 0.3f, kDot = 0.1f;
@@ -287,11 +286,6 @@ void draw_status(const Editor& editor, const std::string& device, const BarArea&
 }
 
 }  // namespace
-
-BarSizes bar_sizes(double text_height) {
-    const auto pixels = [&](double heights) { return int(std::lround(heights * text_height)); };
-    return {pixels(kTopBar), pixels(kStrip), pixels(kStatusLine)};
-}
 
 void draw_bars(const WindowParts& parts) {
     const BarArea area = bar_area(parts.state.frame_area());

@@ -5,12 +5,6 @@
 
 namespace ewa::viewer {
 
-/// In px of the framebuffer: what the bars take of the window.
-struct BarSizes {
-    int top = 0, left = 0, bottom = 0;
-};
-BarSizes bar_sizes(double text_height);
-
 void draw_bars(const WindowParts& parts);
 
 }  // namespace ewa::viewer
