@@ -169,20 +169,33 @@ def test_options_are_spelled_as_arguments(text, expected):
 
 # Options in errors that only runs of the command line meet.
 COMMAND_LINE = {
+    "adjust",
+    "codec",
+    "delete",
     "depth",
+    "duplicate",
+    "edits",
     "force",
     "frames",
+    "hide",
     "inria",
     "keep",
+    "lock",
     "metrics",
     "output",
+    "remove",
+    "remove-contradicted",
+    "reset",
     "resume",
     "rolling-shutter",
     "save-every",
     "scale-to",
+    "select",
     "serve",
     "test-every",
     "transform",
+    "unhide",
+    "unlock",
 }
 
 
@@ -216,7 +229,7 @@ def test_every_option_in_an_error_of_libewa_is_an_argument():
         option: place
         for option, place in found.items()
         if option not in COMMAND_LINE
-        and option not in ("ratio", "width")  # of style sheets
+        and option not in ("ratio", "width", "un")  # of style sheets; the beginning of others
         and spelled(f"--{option}").removesuffix("=") not in known
     }
     assert not strangers
