@@ -24,7 +24,7 @@ except ImportError:
 EWA = SOURCE = None  # set by test_page.py
 CHROMEDRIVER = shutil.which("chromedriver")
 WIDTH, HEIGHT = 192, 144
-PATIENCE = 60  # seconds
+PATIENCE = 180  # seconds; only a machine with no time to spare needs them
 
 
 def browser(*more, offline=True):
@@ -92,6 +92,7 @@ class BrowserTest(unittest.TestCase):
     def open_browser(cls, **options):
         cls.driver = browser(**options)
         cls.addClassCleanup(cls.driver.quit)
+        cls.driver.set_script_timeout(PATIENCE)
 
     @classmethod
     def serve(cls, folder):
