@@ -71,7 +71,7 @@ class EditWork : public testing::Test {
     }
     bool noted(const std::string& text) const { return note_.find(text) != std::string::npos; }
 
-    const Folder folder_;
+    Folder folder_;
     const std::string scene_ = folder_ / "a.ply";
     std::string note_;
     std::unique_ptr<viewer::Editor> editor_;

@@ -28,7 +28,7 @@ class RecentFiles : public testing::Test {
         fs::create_directories(folder_ / "ewa");
         write_file(json_, text);
     }
-    const Folder folder_;
+    Folder folder_;
     const Variable config_{"XDG_CONFIG_HOME", folder_ / "."};
     const std::string json_ = folder_ / "ewa/recent.json";
 };
