@@ -383,8 +383,8 @@ TEST(ViewQuality, IsThatOfTheEvaluation) {
     const double before = measured(1);
     renders.set_scene(red_splat());
     quality.measure(renders, 1, dataset.frames[1], look);
-    EXPECT_EQ(quality.psnr(1), before) << "until that of the new splats is known";
-    const double after = expected(*red_splat(), 1);
+    const double present = quality.psnr(1).value_or(0), after = expected(*red_splat(), 1);
+    EXPECT_TRUE(present == before || std::abs(present - after) < 1e-3) << present << " is of neither splats";
     EXPECT_TRUE(soon([&] { return std::abs(quality.psnr(1).value_or(0) - after) < 1e-3; }));
     const Exposure bright{1.5f, 0, 0, 0.1f, 0, 1.2f, 0, 0, 0, 0, 1, 0};
     quality.forget();
