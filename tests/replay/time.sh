@@ -30,7 +30,7 @@ row_doctor_tells_what_works_and_how_to_get_the_rest() {
     says "yes  training"
     mkdir empty
     PATH=$build:$PWD/empty run 0 "$build/ewa" doctor
-    says "the program colmap is not there"
+    says "there is neither the program colmap nor"
     VK_ICD_FILENAMES=/dev/null VK_DRIVER_FILES=/dev/null run 1 ewa doctor
     says "no   training"
     says "ewa cannot train on this machine"
