@@ -22,7 +22,7 @@ set_target_properties(ewa_library PROPERTIES OUTPUT_NAME ewa EXPORT_NAME ewa LIN
     LINK_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/libewa.map)
 target_link_options(ewa_library PRIVATE -Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/libewa.map -Wl,--as-needed
                                         -Wl,--no-undefined)
-target_link_libraries(ewa_library PRIVATE Vulkan::Vulkan PNG::PNG JPEG::JPEG spdlog::spdlog ZLIB::ZLIB zstd::libzstd_shared
+target_link_libraries(ewa_library PRIVATE PNG::PNG JPEG::JPEG spdlog::spdlog ZLIB::ZLIB zstd::libzstd_shared
                                           PkgConfig::WEBP PkgConfig::MINIZIP pugixml::pugixml SQLite::SQLite3
                                           ${CMAKE_DL_LIBS})
 target_compile_features(ewa_library INTERFACE cxx_std_20)
@@ -134,6 +134,8 @@ if(TARGET ewa_mpi)
     set(CPACK_DEBIAN_MPI_PACKAGE_RECOMMENDS "")
     set(CPACK_DEBIAN_MPI_PACKAGE_SUGGESTS "")
 endif()
+# The loader is opened at run time, so no program names it.
+set(CPACK_DEBIAN_PACKAGE_DEPENDS libvulkan1)
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "mesa-vulkan-drivers, fonts-dejavu-core")
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "libglm-dev, vulkan-validationlayers, ewa-mpi")
 include(CPack)

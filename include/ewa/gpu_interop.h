@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // libewa on the Vulkan device of another program, and renders that stay on it. Only this header needs Vulkan's headers, which the
-// program must provide. Handles come from the system's loader (libvulkan.so.1), which libewa is linked to; a program may load that
-// library at run time. examples/interop is an example.
+// program must provide. Handles come from the system's loader (libvulkan.so.1), which libewa loads at run time; a program may link
+// it or load it. examples/interop is an example.
 #pragma once
 #include <vulkan/vulkan_core.h>
 

@@ -15,7 +15,6 @@
 #include "bindings.h"
 #include "ewa/error.h"
 #include "platform/process.h"
-#include "vulkan_loader.h"
 
 namespace ewa::python {
 namespace {
@@ -53,17 +52,8 @@ void end_use() {
     while (one.present > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
 }
 
-void check_loader() {
-    if (has_vulkan_loader()) return;
-    throw RunError(
-        "there is no Vulkan loader (libvulkan.so.1), which rendering and training need; a CPU device comes "
-        "with Mesa "
-        "(Debian: apt install mesa-vulkan-drivers), that of a GPU with its vendor's driver");
-}
-
 std::vector<DeviceInfo> devices() {
     const DeviceWork work;
-    check_loader();
     return list_devices();
 }
 
@@ -131,7 +121,6 @@ void DeviceWork::stay_while_python_ends() {
 std::shared_ptr<gpu::Device> DeviceWork::device() const {
     DefaultDevice& one = default_device();
     if (!one.device) {
-        check_loader();
         try {
             one.device = open_device({.selector = one.selector});
         } catch (const InputError& error) {

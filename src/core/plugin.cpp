@@ -12,26 +12,38 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Where the library is, from the folder of the program or libewa: installed, for programs and for libewa; in
-/// a build tree, for programs, tests and the Python package. LD_LIBRARY_PATH and the working folder do not count.
+/// Where plugins are, from the folder of the program or libewa: installed, for programs and for libewa; in a build tree, for
+/// programs, tests and the Python package.
 constexpr const char* kFolders[] = {EWA_MODULES_FROM_PROGRAMS, "ewa", "modules", "../modules",
                                     "../../modules"};
 
-fs::path file_of(const Plugin& plugin) {
+fs::path own_file() {
     std::error_code unknown;
-    const fs::path own = platform::own_file(unknown), folder = own.parent_path();
+    fs::path own = platform::own_file(unknown);
     if (unknown) throw RunError("cannot find where this program is: " + unknown.message());
-    for (const char* place : kFolders) {
-        const fs::path file = folder / place / file_name(plugin);
-        std::error_code absent;
-        if (fs::exists(file, absent)) return file;
-    }
+    return own;
+}
+
+fs::path file_of(const Plugin& plugin) {
+    fs::path file = file_beside(file_name(plugin));
+    if (!file.empty()) return file;
+    const fs::path own = own_file();
     cannot_load(plugin, "it is neither in " +
-                            (folder / EWA_MODULES_FROM_PROGRAMS).lexically_normal().string() +
+                            (own.parent_path() / EWA_MODULES_FROM_PROGRAMS).lexically_normal().string() +
                             " nor in the folders ewa and modules beside " + own.string());
 }
 
 }  // namespace
+
+fs::path file_beside(const std::string& name) {
+    const fs::path folder = own_file().parent_path();
+    for (const char* place : kFolders) {
+        fs::path file = folder / place / name;
+        std::error_code absent;
+        if (fs::exists(file, absent)) return file;
+    }
+    return {};
+}
 
 std::string file_name(const Plugin& plugin) {
     return std::string(plugin.name) + platform::kLibrarySuffix;

@@ -2,6 +2,7 @@
 // Loads ewa's plugins, when they are needed. A plugin is a small library of ewa that links a large one, such as MPI, so that the
 // programs need not link it.
 #pragma once
+#include <filesystem>
 #include <functional>
 #include <string>
 
@@ -13,6 +14,10 @@ struct Plugin {
     const char* purpose;  // for messages: "which lets processes train together"
     const char* help;     // for messages: what to install
 };
+
+/// Where plugins are beside the program or libewa: the file of this name there, or an empty path. LD_LIBRARY_PATH and the working
+/// folder do not count.
+std::filesystem::path file_beside(const std::string& name);
 
 /// The name of the library's file: "libewa_mpi.so".
 std::string file_name(const Plugin& plugin);

@@ -16,6 +16,7 @@
 #include "gpu/capabilities.h"
 #include "gpu/choose.h"
 #include "gpu/pipeline.h"
+#include "gpu/vulkan_loader.h"
 #include "platform/system.h"
 
 namespace ewa {
@@ -42,11 +43,19 @@ vk::UniqueInstance make_instance(const std::vector<const char*>& layers,
     return vk::createInstanceUnique(create);
 }
 
-/// Drivers that the environment names for the loader, where it looks (its LoaderDriverInterface document), and what to install.
+/// Variables of the environment that name drivers for the loader (its LoaderDriverInterface document).
+constexpr const char* kDriverVariables[] = {"VK_DRIVER_FILES", "VK_ICD_FILENAMES"};
+
+bool names_drivers() {
+    return std::ranges::any_of(kDriverVariables, [](const char* name) { return std::getenv(name); });
+}
+
+/// Drivers that the environment names, where else the loader looks, and what to install.
 std::string what_would_help() {
     constexpr const char* kInstall =
-        "a CPU device comes with Mesa (Debian: mesa-vulkan-drivers), that of a GPU with its vendor's driver";
-    for (const char* variable : {"VK_DRIVER_FILES", "VK_ICD_FILENAMES"})
+        "a CPU device comes with Mesa (Debian: apt install mesa-vulkan-drivers), that of a GPU with its "
+        "vendor's driver";
+    for (const char* variable : kDriverVariables)
         if (const char* files = std::getenv(variable))
             return std::string(variable) + " names " + core::one_line(files) + " alone; " + kInstall;
     const char* home = std::getenv("HOME");
@@ -177,7 +186,9 @@ void Device::create_instance(bool validation) {
     if (validation) {
         layers.push_back("VK_LAYER_KHRONOS_validation");
         extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
-        const auto available = vk::enumerateInstanceLayerProperties();
+        // The driver inside ewa knows of no layers.
+        const auto available =
+            uses_own_driver() ? std::vector<vk::LayerProperties>() : vk::enumerateInstanceLayerProperties();
         if (std::none_of(available.begin(), available.end(), [](const vk::LayerProperties& layer) {
                 return std::string(layer.layerName.data()) == "VK_LAYER_KHRONOS_validation";
             }))
@@ -358,19 +369,41 @@ struct Found {
     std::vector<DeviceInfo> devices;
 };
 
-Found find_devices() {
-    try {
-        Found found{gpu::make_instance({}, {}), {}};
-        int index = 0;
-        for (const auto& device : found.instance->enumeratePhysicalDevices())
-            found.devices.push_back(gpu::describe(device, index++));
-        if (found.devices.empty())
-            throw RunError("no Vulkan device; " + core::address_limit_text() + gpu::what_would_help());
-        return found;
-    } catch (const vk::SystemError& error) {
-        throw RunError("no Vulkan driver works (" + vk::to_string(vk::Result(error.code().value())) + "); " +
-                       core::address_limit_text() + gpu::what_would_help());
+Found devices_of_source() {
+    Found found{gpu::make_instance({}, {}), {}};
+    int index = 0;
+    for (const auto& device : found.instance->enumeratePhysicalDevices()) {
+        found.devices.push_back(gpu::describe(device, index++));
+        if (gpu::uses_own_driver()) found.devices.back().name += " inside ewa";
     }
+    return found;
+}
+
+/// Returns the reason if there is no device.
+std::string find_in_source(gpu::VulkanSource source, Found& found) {
+    std::string reason = gpu::use_vulkan(source);
+    if (!reason.empty()) return reason;
+    try {
+        found = devices_of_source();
+        return found.devices.empty() ? "no Vulkan device" : "";
+    } catch (const vk::SystemError& error) {
+        return "no Vulkan driver works (" + vk::to_string(vk::Result(error.code().value())) + ")";
+    }
+}
+
+/// The system's devices. Where it has none, and the environment names no drivers, those of the driver inside ewa.
+Found find_devices() {
+    static std::mutex mutex;
+    const std::lock_guard lock(mutex);
+    Found found;
+    std::string reason;
+    if (!gpu::uses_own_driver()) {
+        reason = find_in_source(gpu::VulkanSource::system, found);
+        if (reason.empty()) return found;
+        found = {};  // no handle of the loader may outlive the change
+    }
+    if (!gpu::names_drivers() && find_in_source(gpu::VulkanSource::own, found).empty()) return found;
+    throw RunError(reason + "; " + core::address_limit_text() + gpu::what_would_help());
 }
 
 }  // namespace

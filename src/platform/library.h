@@ -27,6 +27,9 @@ class Library {
 /// What the names of shared libraries end with here: ".so" or ".dll".
 extern const char* const kLibrarySuffix;
 
+/// The file of the system's Vulkan loader.
+extern const char* const kVulkanLoader;
+
 /// The file of the program that runs. Linux: without symbolic links, and without /proc, which a bare chroot does not have.
 std::filesystem::path own_program(std::error_code& error);
 

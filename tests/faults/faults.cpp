@@ -37,9 +37,27 @@
 
 namespace {
 
+using FindSymbol = void* (*)(void*, const char*);
+
+/// The function of the system, in whose place this library has one.
+FindSymbol system_dlsym() {
+    // The versions of glibc 2.34 and of those before it.
+    static const auto found = [] {
+        void* symbol = dlvsym(RTLD_NEXT, "dlsym", "GLIBC_2.34");
+        return reinterpret_cast<FindSymbol>(symbol ? symbol : dlvsym(RTLD_NEXT, "dlsym", "GLIBC_2.2.5"));
+    }();
+    return found;
+}
+
 template <class Function>
 Function next(const char* name) {
-    return reinterpret_cast<Function>(dlsym(RTLD_NEXT, name));
+    return reinterpret_cast<Function>(system_dlsym()(RTLD_NEXT, name));
+}
+
+bool is_of_this_library(void* symbol) {
+    Dl_info its{}, own{};
+    return dladdr(symbol, &its) && dladdr(reinterpret_cast<void*>(&is_of_this_library), &own) &&
+           its.dli_fbase == own.dli_fbase;
 }
 
 /// Whether this call of those that `variable` counts is to fail.
@@ -133,6 +151,15 @@ void* operator new(std::size_t size) {
 }
 
 extern "C" {
+
+/// Programs load Vulkan at run time, and find this library's functions before the loader's.
+void* dlsym(void* library, const char* name) {
+    if (library != RTLD_NEXT && name[0] == 'v' && name[1] == 'k') {
+        void* own = system_dlsym()(RTLD_DEFAULT, name);
+        if (own && is_of_this_library(own)) return own;
+    }
+    return system_dlsym()(library, name);
+}
 
 VkResult vkAllocateMemory(VkDevice device, const VkMemoryAllocateInfo* info,
                           const VkAllocationCallbacks* callbacks, VkDeviceMemory* memory) {

@@ -10,6 +10,7 @@
 namespace ewa::platform {
 
 const char* const kLibrarySuffix = ".so";
+const char* const kVulkanLoader = "libvulkan.so.1";
 
 Library::Library(const std::filesystem::path& file) : handle_(dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL)) {
     if (!handle_) error_ = dlerror();

@@ -20,6 +20,7 @@ std::filesystem::path file_of_module(HMODULE module, std::error_code& error) {
 }  // namespace
 
 const char* const kLibrarySuffix = ".dll";
+const char* const kVulkanLoader = "vulkan-1.dll";
 
 Library::Library(const std::filesystem::path& file) {
     // The libraries that a plugin needs are beside it, or beside the program.
