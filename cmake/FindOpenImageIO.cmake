@@ -18,7 +18,7 @@ if(OpenImageIO_FOUND AND NOT TARGET OpenImageIO::OpenImageIO)
         find_package(TIFF REQUIRED)
         find_package(WebP CONFIG REQUIRED)
         target_compile_definitions(OpenImageIO::OpenImageIO INTERFACE OIIO_STATIC_DEFINE)
-        target_link_libraries(OpenImageIO::OpenImageIO INTERFACE OpenEXR::OpenEXR TIFF::TIFF WebP::webpdemux WebP::webp JPEG::JPEG
+        target_link_libraries(OpenImageIO::OpenImageIO INTERFACE OpenEXR::OpenEXR OpenEXR::OpenEXRCore TIFF::TIFF WebP::webpdemux WebP::webp JPEG::JPEG
                                                                  ZLIB::ZLIB pugixml::pugixml ${CMAKE_DL_LIBS} $<$<PLATFORM_ID:Windows>:psapi>)
     endif()
 endif()
