@@ -38,6 +38,9 @@ uint64_t peak_memory();
 /// A text that tells this machine from others. Containers on one machine have names of their own, but share it.
 std::string machine_name();
 
+/// The text of the file os-release, which says what system this is (os-release(5)). Windows has none: "ID=windows".
+std::string system_release();
+
 /// A bit for each processor that this process may use; `words` numbers of 64. Windows: the 64 of the process's group.
 std::vector<uint64_t> usable_cores(size_t words);
 

@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <initializer_list>
+#include <iterator>
 
 namespace ewa::platform {
 namespace {
@@ -72,6 +73,15 @@ std::string machine_name() {
         char name[256] = "";
         gethostname(name, sizeof name - 1);
         text = name;
+    }
+    return text;
+}
+
+std::string system_release() {
+    std::string text;
+    for (const char* place : {"/etc/os-release", "/usr/lib/os-release"}) {
+        std::ifstream file(place);
+        if (text.empty()) text.assign(std::istreambuf_iterator<char>(file), {});
     }
     return text;
 }

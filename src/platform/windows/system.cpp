@@ -64,6 +64,10 @@ std::string machine_name() {
     return GetComputerNameExW(ComputerNamePhysicalDnsHostname, text, &length) ? narrow({text, length}) : "";
 }
 
+std::string system_release() {
+    return "ID=windows";
+}
+
 std::vector<uint64_t> usable_cores(size_t words) {
     std::vector<uint64_t> cores(words);
     DWORD_PTR own = 1, all = 0;
