@@ -8,6 +8,7 @@
 #include "capture/steps.h"
 #include "capture/what_is.h"
 #include "core/folders.h"
+#include "core/packages.h"
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/dataset.h"
@@ -66,11 +67,10 @@ std::string raw_photos_text(const fs::path& folder) {
     uint64_t count = 0;
     for (const fs::directory_entry& entry : fs::directory_iterator(folder_of_photos(folder)))
         count += std::ranges::find(kRaw, extension_of(entry.path())) != kRaw.end();
-    return count == 0
-               ? std::string()
-               : ": " + core::counted(count, "raw photo") +
-                     ", which ewa does not develop; convert to JPEG, as darktable-cli does (Debian: apt "
-                     "install darktable)";
+    return count == 0 ? std::string()
+                      : ": " + core::counted(count, "raw photo") +
+                            ", which ewa does not develop; convert to JPEG, as darktable-cli does (" +
+                            core::how_to_install(core::Thing::raw) + ")";
 }
 
 }  // namespace

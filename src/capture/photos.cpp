@@ -11,6 +11,7 @@
 
 #include "capture/steps.h"
 #include "core/folders.h"
+#include "core/packages.h"
 #include "core/parallel.h"
 #include "core/sandboxed_path.h"
 #include "core/text.h"
@@ -160,8 +161,8 @@ std::vector<fs::path> photos_in(const fs::path& folder) {
     if (const auto heif = std::ranges::count_if(files, is_heif); heif > 0 && !converts_heif())
         throw InputError(name + ": " + core::counted(uint64_t(heif), "photo") + " " +
                          std::string(core::is_or_are(uint64_t(heif))) +
-                         " HEIC or AVIF, and nothing here reads them; heif-convert does "
-                         "(Debian: apt install libheif-examples)");
+                         " HEIC or AVIF, and no program here reads them (" +
+                         core::how_to_install(core::Thing::heif) + ")");
     for (const fs::path& file : files)
         if (!core::links_stay_inside(folder, file))
             throw InputError(core::one_line((folder / file).string()) +

@@ -13,6 +13,7 @@
 #include "capture/steps.h"
 #include "core/atomic_file.h"
 #include "core/folders.h"
+#include "core/packages.h"
 #include "core/process.h"
 #include "core/text.h"
 #include "core/typing.h"
@@ -264,7 +265,8 @@ bool PgmStream::take_one() {
 
 void require_ffmpeg() {
     if (core::find_program("ffmpeg").empty())
-        throw RunError("a video needs ffmpeg, which is not installed (Debian: apt install ffmpeg)");
+        throw RunError("a video needs ffmpeg, which is not installed (" +
+                       core::how_to_install(core::Thing::ffmpeg) + ")");
 }
 
 std::vector<std::string> film_input(const fs::path& video) {

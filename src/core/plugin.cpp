@@ -51,7 +51,7 @@ std::string file_name(const Plugin& plugin) {
 
 void cannot_load(const Plugin& plugin, const std::string& reason) {
     throw RunError(file_name(plugin) + ", " + plugin.purpose + ", cannot be loaded: " + reason + "; " +
-                   plugin.help);
+                   how_to_install_module(plugin.library) + plugin.otherwise);
 }
 
 const void* load_plugin(const Plugin& plugin, const std::function<void()>& check_room) {

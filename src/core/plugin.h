@@ -6,13 +6,16 @@
 #include <functional>
 #include <string>
 
+#include "core/packages.h"
+
 namespace ewa::core {
 
 struct Plugin {
-    const char* name;     // of its file, without the system's ending: "libewa_mpi"
-    const char* entry;    // the name of the table of functions that it exports
-    const char* purpose;  // for messages: "which lets processes train together"
-    const char* help;     // for messages: what to install
+    const char* name;            // of its file, without the system's ending: "libewa_mpi"
+    const char* entry;           // the name of the table of functions that it exports
+    const char* purpose;         // for messages: "which lets processes train together"
+    Thing library;               // that it links
+    const char* otherwise = "";  // for messages: ", or what helps without it"
 };
 
 /// Where plugins are beside the program or libewa: the file of this name there, or an empty path. LD_LIBRARY_PATH and the working

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "core/atomic_file.h"
+#include "core/packages.h"
 #include "core/process.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -98,9 +99,9 @@ bool is_film_name(const fs::path& path) {
 fs::path find_ffmpeg() {
     fs::path program = core::find_program("ffmpeg");
     if (!program.empty()) return program;
-    throw RunError(
-        "a film needs the program ffmpeg, which is not installed (Debian: apt install ffmpeg); with a folder "
-        "as -o, its frames are written as PNG files");
+    throw RunError("a film needs the program ffmpeg, which is not installed (" +
+                   core::how_to_install(core::Thing::ffmpeg) +
+                   "); with a folder as -o, its frames are written as PNG files");
 }
 
 std::string find_encoder(const std::string& codec, const fs::path& file) {

@@ -7,9 +7,9 @@
 namespace ewa::image {
 namespace {
 
-constexpr core::Plugin kPlugin{
-    kModuleName, kModuleEntry, "which reads and writes all image formats but PNG and JPEG",
-    "install ewa's module and OpenImageIO (Debian: libopenimageio-dev), or convert the image to PNG"};
+constexpr core::Plugin kPlugin{kModuleName, kModuleEntry,
+                               "which reads and writes all image formats but PNG and JPEG",
+                               core::Thing::openimageio, ", or convert the image to PNG"};
 
 // Some of OpenImageIO's libraries start threads when they are loaded. Where they cannot, the process hangs or
 // ends. With its threads it takes 300 MB of address space on two processors.

@@ -7,7 +7,7 @@ namespace ewa::mesh {
 
 const Meshing& meshing() {
     static constexpr core::Plugin plugin{"libewa_meshing", kMeshingEntry, "which makes meshes",
-                                         "install ewa's module and OpenVDB (Debian: libopenvdb-dev)"};
+                                         core::Thing::openvdb};
     static const auto& loaded = *static_cast<const Meshing*>(core::load_plugin(plugin));
     return loaded;
 }

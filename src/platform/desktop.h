@@ -11,7 +11,8 @@ namespace ewa::platform {
 bool has_desktop();
 
 /// Opens a file in the program that the desktop has for it, which lives on after this one. Returns why not; empty if it did.
-std::string open_outside(const std::filesystem::path& file);
+/// remedy: where xdg-open is missing, how to get it.
+std::string open_outside(const std::filesystem::path& file, const std::string& remedy);
 
 enum class Choice { file, folder, save };
 

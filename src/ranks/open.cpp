@@ -13,9 +13,8 @@ namespace ranks {
 
 const Mpi& load_mpi() {
     constexpr core::Plugin kPlugin{kMpiName, kMpiEntry,
-                                   "which lets the processes of a launcher train together",
-                                   "install ewa's module and Open MPI (Debian: openmpi-bin), or start ewa "
-                                   "without mpirun and srun"};
+                                   "which lets the processes of a launcher train together", core::Thing::mpi,
+                                   ", or start ewa without mpirun and srun"};
     return *static_cast<const Mpi*>(core::load_plugin(kPlugin));
 }
 

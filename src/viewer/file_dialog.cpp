@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/packages.h"
 #include "core/process.h"
 #include "ewa/error.h"
 #include "platform/desktop.h"
@@ -33,9 +34,8 @@ std::vector<std::string> dialog_command(Wanted wanted, const fs::path& proposed)
 fs::path ask_program(Wanted wanted, const fs::path& proposed, const std::atomic<bool>& stop) {
     std::vector<std::string> command = dialog_command(wanted, proposed);
     if (command.empty())
-        throw RunError(
-            std::string("there is no file dialog here: install zenity (Debian: apt install zenity), or ") +
-            (wanted == Wanted::save ? "type the path" : "drop the file on the window"));
+        throw RunError("there is no file dialog here: " + core::how_to_install(core::Thing::file_dialog) +
+                       ", or " + (wanted == Wanted::save ? "type the path" : "drop the file on the window"));
     std::string text;
     // The toolkits' warnings do not concern the user.
     const core::Program program{.command = std::move(command), .environment = {}, .log = platform::kNullFile};

@@ -194,9 +194,9 @@ TEST_F(PhotoFolders, InHeicAreConverted) {
     fs::copy_file(EWA_PROGRAM, folder_ / "bin/ewa");
     const Circumstances nothing{.program = folder_ / "bin/ewa",
                                 .environment = {{"PATH", folder_ / "bin"}, {"CALLS", folder_ / "calls"}}};
-    expect_failure(run_ewa({"cameras", folder_ / "photos", "-o", folder_ / "dataset"}, nothing), 2,
-                   "4 photos are HEIC or AVIF, and nothing here reads them; heif-convert does (Debian: apt "
-                   "install libheif-examples)");
+    expect_failure(
+        run_ewa({"cameras", folder_ / "photos", "-o", folder_ / "dataset"}, nothing), 2,
+        "4 photos are HEIC or AVIF, and no program here reads them (apt install libheif-examples)");
     make_program(folder_ / "bin/heif-dec", R"sh(
 [ "$1 $2" = "-q 95" ] || exit 2
 for jpeg in "$JPEGS"/*.jpg; do

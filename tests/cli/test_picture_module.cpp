@@ -91,7 +91,7 @@ TEST_F(PictureModule, IsNamedWhereItIsMissing) {
     expect_failure(outcome, 1, folder_ / "a.exr: " + kModule);
     expect_failure(outcome, 1, "it is neither in " + folder_ / "lib/");
     expect_failure(outcome, 1, "nor in the folders ewa and modules beside " + program_);
-    expect_failure(outcome, 1, "install ewa's module and OpenImageIO (Debian: libopenimageio-dev)");
+    expect_failure(outcome, 1, "install ewa's module and OpenImageIO (apt install libopenimageio-dev)");
     test::write_file(folder_ / "a.tif",
                      read_file(std::string(EWA_SOURCE_DIR) + "/tests/fuzz/seeds/read_picture/plain.tif"));
     expect_failure(run({"compare", folder_ / "a.tif", folder_ / "a.tif"}), 1, folder_ / "a.tif: " + kModule);

@@ -116,7 +116,7 @@ TEST_F(MpiModule, IsNamedWhereItIsMissing) {
                "loaded: it is ");
     expect_end(outcome, 1, "neither in ");
     expect_end(outcome, 1,
-               "; install ewa's module and Open MPI (Debian: openmpi-bin), or start ewa without mpirun");
+               "; install ewa's module and Open MPI (apt install openmpi-bin), or start ewa without mpirun");
     EXPECT_EQ(outcome.err.find('\n'), outcome.err.size() - 1) << outcome.err;
 }
 

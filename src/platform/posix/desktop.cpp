@@ -12,8 +12,8 @@ bool has_desktop() {
     return false;
 }
 
-std::string open_outside(const std::filesystem::path& file) {
-    if (find_program("xdg-open").empty()) return "there is no xdg-open here (Debian: xdg-utils)";
+std::string open_outside(const std::filesystem::path& file, const std::string& remedy) {
+    if (find_program("xdg-open").empty()) return "there is no xdg-open here (" + remedy + ")";
     // The shell ends at once. A program that ends with this one would close the user's browser.
     Process shell;
     const std::error_code error =

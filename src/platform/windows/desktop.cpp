@@ -63,7 +63,7 @@ bool has_desktop() {
     return true;
 }
 
-std::string open_outside(const fs::path& file) {
+std::string open_outside(const fs::path& file, const std::string& /*remedy*/) {
     const Apartment apartment;
     const fs::path whole = fs::absolute(file).make_preferred();
     const auto result = reinterpret_cast<INT_PTR>(

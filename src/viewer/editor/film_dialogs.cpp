@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/outputs.h"
+#include "core/packages.h"
 #include "core/process.h"
 #include "core/text.h"
 #include "viewer/editor/texts.h"
@@ -105,7 +106,10 @@ bool FilmStrip::draw_film_dialog() {
     }
     const int frames = path().frames(output_.rate);
     ImGui::Text(texts::film::kFrames, frames, double(frames) / output_.rate);
-    if (!ffmpeg_) modal_text(texts::film::kNoFfmpeg, true);
+    if (!ffmpeg_)
+        modal_text(texts::film::kNoFfmpeg + (" (" + core::how_to_install(core::Thing::ffmpeg) + ")") +
+                       texts::film::kPngFrames,
+                   true);
     return end_dialog(texts::film::kFilmNames, &FilmStrip::start_film);
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/folders.h"
+#include "core/packages.h"
 #include "core/text.h"
 #include "edit/edited_splats.h"
 #include "ewa/error.h"
@@ -58,7 +59,8 @@ std::optional<float> share_of_line(std::string_view line) {
 }
 
 void open_outside(const fs::path& path) {
-    if (const std::string reason = platform::open_outside(path); !reason.empty())
+    if (const std::string reason = platform::open_outside(path, core::how_to_install(core::Thing::opener));
+        !reason.empty())
         throw RunError(reason + "; open " + core::one_line(path.string()));
 }
 

@@ -355,10 +355,8 @@ inline constexpr const char *kFilmTitle = "Save film", *kPictureTitle = "Save pi
 inline constexpr const char
     *kFilmNames =
         "A film ends in .mp4, .mov, .mkv or .webm. Another name is that of a folder of PNG pictures.",
-    *kPictureNames = "A picture ends in .png, .jpg, .webp or .exr.",
-    *kNoFfmpeg =
-        "ffmpeg is not installed (Debian: apt install ffmpeg), so the frames become a folder of PNG "
-        "pictures.";
+    *kPictureNames = "A picture ends in .png, .jpg, .webp or .exr.", *kNoFfmpeg = "ffmpeg is not installed",
+    *kPngFrames = ", so the frames become a folder of PNG pictures.";
 
 }  // namespace film
 
