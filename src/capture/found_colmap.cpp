@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/found_colmap.h"
 
-#include <cstdlib>
-#include <fstream>
-
 #include "core/folders.h"
+#include "core/packages.h"
 #include "core/process.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -22,7 +20,7 @@ std::optional<FoundColmap> pycolmap_of(const fs::path& python) {
     version.emplace_back("version");
     try {
         const core::Answer answer =
-            core::ask_program({.command = version, .environment = {}, .log = "/dev/null"});
+            core::ask_program({.command = version, .environment = {}, .log = platform::kNullFile});
         if (answer.ended != core::Ended::done) return {};
         const std::string release(core::trim(answer.text));
         return FoundColmap{std::move(words), core::one_line(release + " of " + python.string())};
@@ -36,10 +34,9 @@ std::optional<FoundColmap> pycolmap_of(const fs::path& python) {
 std::optional<FoundColmap> find_colmap(const fs::path& python) {
     if (const fs::path colmap = core::find_program("colmap"); !colmap.empty())
         return FoundColmap{{colmap.string()}, core::one_line(colmap.string())};
-    const char* environment = std::getenv("VIRTUAL_ENV");
-    for (const fs::path& each :
-         {python, environment && *environment ? fs::path(environment) / "bin/python3" : fs::path(),
-          core::find_program("python3")})
+    std::vector<fs::path> pythons = platform::find_pythons();
+    pythons.insert(pythons.begin(), python);
+    for (const fs::path& each : pythons)
         if (core::is_file(each))
             if (const auto found = pycolmap_of(each)) return found;
     return {};
@@ -47,15 +44,8 @@ std::optional<FoundColmap> find_colmap(const fs::path& python) {
 
 FoundColmap require_colmap(const fs::path& python) {
     if (const auto found = find_colmap(python)) return *found;
-    throw RunError("photos without cameras need COLMAP, which is not installed (" + how_to_install_colmap() +
-                   ")");
-}
-
-std::string how_to_install_colmap() {
-    std::ifstream file("/etc/os-release");
-    for (std::string line; std::getline(file, line);)
-        if (line.starts_with("ID") && line.find("debian") != std::string::npos) return "apt install colmap";
-    return "pip install pycolmap";
+    throw RunError("photos without cameras need COLMAP, which is not installed (" +
+                   core::how_to_install(core::Thing::colmap) + ")");
 }
 
 }  // namespace ewa::capture

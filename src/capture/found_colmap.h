@@ -20,7 +20,4 @@ std::optional<FoundColmap> find_colmap(const std::filesystem::path& python = {})
 /// As find_colmap(). Throws RunError with the command that installs COLMAP if there is none.
 FoundColmap require_colmap(const std::filesystem::path& python);
 
-/// The command that installs COLMAP on this system.
-std::string how_to_install_colmap();
-
 }  // namespace ewa::capture

@@ -5,9 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -18,7 +16,9 @@
 #include "cli/command.h"
 #include "cli/output.h"
 #include "cli/status.h"
+#include "core/folders.h"
 #include "core/messages.h"
+#include "core/packages.h"
 #include "core/process.h"
 #include "core/text.h"
 #include "ewa/device.h"
@@ -34,6 +34,7 @@ namespace ewa::cli {
 namespace {
 
 namespace fs = std::filesystem;
+using core::Thing;
 
 struct DoctorArguments {
     DeviceOptions device;
@@ -46,19 +47,6 @@ struct Check {
     bool works = false, needed = false;  // needed: for training
     std::string detail, remedy;          // remedy: empty where it works
 };
-
-bool is_debian() {
-    std::ifstream file("/etc/os-release");
-    for (std::string line; std::getline(file, line);)
-        if (line.starts_with("ID") && line.find("debian") != std::string::npos) return true;
-    return false;
-}
-
-/// How to get something: by a package of Debian and its derivatives, or in general words.
-std::string get(const std::string& package, const std::string& otherwise) {
-    static const bool debian = is_debian();
-    return debian ? "apt install " + package : "install " + otherwise;
-}
 
 /// Carries out the work, which returns the detail.
 template <class Work>
@@ -82,10 +70,8 @@ std::string device_text(const DeviceInfo& device) {
 
 /// One check for each device. The driver works if there is one.
 void add_devices_to(std::vector<Check>& checks) {
-    const std::string remedy =
-        get("mesa-vulkan-drivers", "Mesa's Vulkan drivers with lavapipe, or the driver of your GPU's vendor");
     std::vector<DeviceInfo> devices;
-    checks.push_back(checked("Vulkan driver", true, remedy, [&] {
+    checks.push_back(checked("Vulkan driver", true, core::how_to_install(Thing::driver), [&] {
         devices = list_devices();
         return core::counted(devices.size(), "device");
     }));
@@ -147,12 +133,6 @@ std::string folder_text(fs::path folder) {
     return text;
 }
 
-/// Where Mesa keeps compiled shaders.
-fs::path shader_cache() {
-    const std::string own = platform::variable("MESA_SHADER_CACHE_DIR");
-    return own.empty() ? platform::cache_folder() : fs::path(own);
-}
-
 std::string program_path(const std::vector<const char*>& names) {
     std::string found;
     for (const char* name : names) {
@@ -164,14 +144,20 @@ std::string program_path(const std::vector<const char*>& names) {
 }
 
 std::string python_version() {
-    const std::string python = program_path({"python3"});
-    // The current folder may hold another package of this name.
-    const core::Answer answer = core::ask_program(
-        {.command = {python, "-c", "import sys; sys.path.pop(0); import ewa; print(ewa.__version__)"},
-         .environment = {},
-         .log = platform::kNullFile});
-    if (answer.ended != core::Ended::done) throw RunError(python + " has no package ewa");
-    return core::one_line(core::trim(answer.text)) + ", " + python;
+    std::string without;
+    for (const fs::path& python : platform::find_pythons()) {
+        if (!core::is_file(python)) continue;
+        // The current folder may hold another package of this name.
+        const core::Answer answer =
+            core::ask_program({.command = {python.string(), "-c",
+                                           "import sys; sys.path.pop(0); import ewa; print(ewa.__version__)"},
+                               .environment = {},
+                               .log = platform::kNullFile});
+        const std::string name = core::one_line(python.string());
+        if (answer.ended == core::Ended::done) return core::one_line(core::trim(answer.text)) + ", " + name;
+        without = name;
+    }
+    throw RunError(without.empty() ? "there is no Python 3 here" : without + " has no package ewa");
 }
 
 std::vector<Check> all_checks(const DoctorArguments& arguments) {
@@ -184,26 +170,28 @@ std::vector<Check> all_checks(const DoctorArguments& arguments) {
         checked("memory", false, "close other programs, or train with a larger --downscale", memory_text));
     checks.push_back(checked("output folder", true, "name another folder with -o",
                              [&] { return folder_text(arguments.output); }));
-    checks.push_back(checked("shader cache", false, "set MESA_SHADER_CACHE_DIR to a folder with room",
-                             [] { return folder_text(shader_cache()); }));
-    checks.push_back(checked("videos and films", false, get("ffmpeg", "ffmpeg"), [] {
+    if (const fs::path cache = platform::shader_cache_folder(); !cache.empty())
+        checks.push_back(checked("shader cache", false, "set MESA_SHADER_CACHE_DIR to a folder with room",
+                                 [&] { return folder_text(cache); }));
+    checks.push_back(checked("videos and films", false, core::how_to_install(Thing::ffmpeg), [] {
         return program_path({"ffmpeg", "ffprobe"});
     }));
-    checks.push_back(checked("cameras of photos", false, capture::how_to_install_colmap(), [] {
+    checks.push_back(checked("cameras of photos", false, core::how_to_install(Thing::colmap), [] {
         if (const auto colmap = capture::find_colmap()) return colmap->name;
         throw RunError("there is neither the program colmap nor Python's package pycolmap");
     }));
-    checks.push_back(checked("other image formats", false,
-                             get("libopenimageio-dev", "OpenImageIO") + ", and ewa's module", [] {
-                                 image::openimageio();
-                                 return std::string("TIFF, EXR, WebP, BMP, HDR, PNM");
-                             }));
     checks.push_back(
-        checked("several processes", false, get("openmpi-bin", "Open MPI 4") + ", and ewa's module", [] {
+        checked("other image formats", false, core::how_to_install_module(Thing::openimageio), [] {
+            image::openimageio();
+            return std::string("TIFF, EXR, WebP, BMP, HDR, PNM");
+        }));
+    if (ranks::has_mpi())
+        checks.push_back(checked("several processes", false, core::how_to_install_module(Thing::mpi), [] {
             ranks::load_mpi();
             return program_path({"mpirun"});
         }));
-    checks.push_back(checked("Python package", false, "pip install . in a clone of ewa", python_version));
+    checks.push_back(checked("Python package", false, "pip install a wheel of ewa, or . in a clone of it",
+                             python_version));
     return checks;
 }
 

@@ -16,6 +16,9 @@ std::filesystem::path settings_folder();
 /// Where programs keep what they can make again. POSIX: $XDG_CACHE_HOME, or .cache in the home folder.
 std::filesystem::path cache_folder();
 
+/// Where Mesa's drivers keep compiled shaders. Windows, where most drivers are others: empty unless $MESA_SHADER_CACHE_DIR names it.
+std::filesystem::path shader_cache_folder();
+
 /// The folders of fonts, the user's own first. Some may not exist.
 std::vector<std::filesystem::path> font_folders();
 

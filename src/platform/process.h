@@ -17,6 +17,9 @@ namespace ewa::platform {
 /// Windows: `name` may lack its ".exe".
 std::filesystem::path find_program(const std::string& name);
 
+/// Where Python's interpreter is: that of the active virtual environment, then those in PATH. Some may not exist.
+std::vector<std::filesystem::path> find_pythons();
+
 /// The number of this process.
 int process_id();
 /// Whether a process of this number exists on this machine.

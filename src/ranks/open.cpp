@@ -11,6 +11,10 @@
 namespace ewa {
 namespace ranks {
 
+bool has_mpi() {
+    return EWA_HAS_MPI;
+}
+
 const Mpi& load_mpi() {
     constexpr core::Plugin kPlugin{kMpiName, kMpiEntry,
                                    "which lets the processes of a launcher train together", core::Thing::mpi,

@@ -27,6 +27,8 @@ constexpr const char* kMpiName = "libewa_mpi";
 /// then has no such entry, and is refused.
 constexpr const char* kMpiEntry = "ewa_mpi_layout_2";
 
+/// Whether this build of ewa has the module.
+bool has_mpi();
 /// Loads the module. Throws RunError.
 const Mpi& load_mpi();
 /// Loads the module and enters MPI. Throws RunError.

@@ -10,8 +10,8 @@
 #include <filesystem>
 
 #include "capture/feature_database.h"
-#include "capture/found_colmap.h"
 #include "cli/cameras_test.h"
+#include "core/packages.h"
 #include "core/process.h"
 #include "ewa/image.h"
 #include "io/splats/archive.h"
@@ -454,13 +454,13 @@ TEST_F(Cameras, WhatIsMissingIsNamed) {
     fs::remove(folder_ / "bin/colmap");
     const Circumstances bare{.environment = {{"PATH", folder_ / "bin"}, {"VIRTUAL_ENV", ""}}};
     expect_failure(run_ewa({"cameras", folder_ / "photos", "-o", folder_ / "dataset"}, bare), 1,
-                   ewa::capture::how_to_install_colmap());
+                   ewa::core::how_to_install(ewa::core::Thing::colmap));
     write_file(folder_ / "film.mp4", "no film");
     expect_failure(run_ewa({"cameras", folder_ / "film.mp4", "-o", folder_ / "film"}, bare), 1,
                    "apt install ffmpeg");
     make_program(folder_ / "bin/ffmpeg", "exit 1");
     expect_failure(run_ewa({"cameras", folder_ / "film.mp4", "-o", folder_ / "film"}, bare), 1,
-                   ewa::capture::how_to_install_colmap());
+                   ewa::core::how_to_install(ewa::core::Thing::colmap));
     // Nothing is left of the attempts.
     for (const char* made : {"dataset", "film"}) EXPECT_FALSE(fs::exists(folder_ / made)) << made;
     expect_failure(run_ewa({"cameras", folder_ / "nowhere", "-o", folder_ / "x"}), 2,

@@ -36,6 +36,10 @@ fs::path cache_folder() {
     return variable_or("XDG_CACHE_HOME", (fs::path(variable_or("HOME", "/")) / ".cache").string());
 }
 
+fs::path shader_cache_folder() {
+    return variable_or("MESA_SHADER_CACHE_DIR", cache_folder().string());
+}
+
 std::vector<fs::path> font_folders() {
     std::istringstream places(variable_or("XDG_DATA_HOME", variable("HOME") + "/.local/share") + ":" +
                               variable_or("XDG_DATA_DIRS", "/usr/local/share:/usr/share"));

@@ -14,6 +14,8 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "platform/system.h"
+
 extern char** environ;
 
 namespace ewa::platform {
@@ -92,6 +94,11 @@ std::filesystem::path find_program(const std::string& name) {
         rest.remove_prefix(std::min(colon + 1, rest.size()));
     }
     return {};
+}
+
+std::vector<std::filesystem::path> find_pythons() {
+    const std::filesystem::path environment = variable("VIRTUAL_ENV");
+    return {environment.empty() ? environment : environment / "bin/python3", find_program("python3")};
 }
 
 int process_id() {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "platform/folders.h"
 
+#include "platform/system.h"
 #include "platform/windows/windows.h"
 // After windows.h.
 #include <initguid.h>
@@ -31,6 +32,10 @@ std::filesystem::path settings_folder() {
 
 std::filesystem::path cache_folder() {
     return known_folder(FOLDERID_LocalAppData);
+}
+
+std::filesystem::path shader_cache_folder() {
+    return variable("MESA_SHADER_CACHE_DIR");
 }
 
 std::vector<std::filesystem::path> font_folders() {

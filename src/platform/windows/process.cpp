@@ -169,6 +169,12 @@ fs::path find_program(const std::string& name) {
     return {};
 }
 
+std::vector<fs::path> find_pythons() {
+    const fs::path environment = variable("VIRTUAL_ENV");
+    return {environment.empty() ? environment : environment / "Scripts" / "python.exe",
+            find_program("python"), find_program("py")};
+}
+
 int process_id() {
     return int(GetCurrentProcessId());
 }
