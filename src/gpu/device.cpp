@@ -9,6 +9,7 @@
 #include <thread>
 #include <utility>
 
+#include "core/packages.h"
 #include "core/system_limits.h"
 #include "core/text.h"
 #include "core/typing.h"
@@ -17,6 +18,7 @@
 #include "gpu/choose.h"
 #include "gpu/pipeline.h"
 #include "gpu/vulkan_loader.h"
+#include "platform/folders.h"
 #include "platform/system.h"
 
 namespace ewa {
@@ -52,23 +54,17 @@ bool names_drivers() {
 
 /// Drivers that the environment names, where else the loader looks, and what to install.
 std::string what_would_help() {
-    constexpr const char* kInstall =
-        "a CPU device comes with Mesa (Debian: apt install mesa-vulkan-drivers), that of a GPU with its "
-        "vendor's driver";
+    const std::string install = core::how_to_install(core::Thing::driver);
     for (const char* variable : kDriverVariables)
         if (const char* files = std::getenv(variable))
-            return std::string(variable) + " names " + core::one_line(files) + " alone; " + kInstall;
-    const char* home = std::getenv("HOME");
+            return std::string(variable) + " names " + core::one_line(files) + " alone; " + install;
     std::string found;
-    for (const std::string& folder :
-         {std::string("/usr/local/etc"), std::string("/usr/local/share"), std::string("/etc"),
-          std::string("/usr/share"), std::string(home ? home : "") + "/.local/share"}) {
+    for (const std::filesystem::path& folder : platform::driver_folders()) {
         std::error_code none;
-        for (const auto& entry : std::filesystem::directory_iterator(folder + "/vulkan/icd.d", none))
-            found += (found.empty() ? "" : ", ") + core::one_line(entry.path().string());
+        for (const auto& entry : std::filesystem::directory_iterator(folder, none))
+            found += (found.empty() ? "drivers: " : ", ") + core::one_line(entry.path().string());
     }
-    return (found.empty() ? "no driver is installed in the vulkan/icd.d folders" : "drivers: " + found) +
-           "; " + kInstall;
+    return (found.empty() ? "no driver is installed" : found) + "; " + install;
 }
 
 /// With NVIDIA's driver, the loader asks the layer for this function while it creates a device. ewa never does.
@@ -192,8 +188,8 @@ void Device::create_instance(bool validation) {
         if (std::none_of(available.begin(), available.end(), [](const vk::LayerProperties& layer) {
                 return std::string(layer.layerName.data()) == "VK_LAYER_KHRONOS_validation";
             }))
-            throw InputError(
-                "the Khronos validation layer is not installed (Debian: vulkan-validationlayers)");
+            throw InputError("the Khronos validation layer is not installed (" +
+                             core::how_to_install(core::Thing::validation) + ")");
     }
     instance_ = make_instance(layers, extensions);
     if (!validation) return;

@@ -22,4 +22,7 @@ std::filesystem::path shader_cache_folder();
 /// The folders of fonts, the user's own first. Some may not exist.
 std::vector<std::filesystem::path> font_folders();
 
+/// Where the Vulkan loader finds files that name drivers. Some may not exist. Windows: none, since they are in its registry.
+std::vector<std::filesystem::path> driver_folders();
+
 }  // namespace ewa::platform

@@ -48,4 +48,11 @@ std::vector<fs::path> font_folders() {
     return folders;
 }
 
+std::vector<fs::path> driver_folders() {
+    std::vector<fs::path> folders = {"/usr/local/etc", "/usr/local/share", "/etc", "/usr/share",
+                                     fs::path(variable("HOME")) / ".local/share"};
+    for (fs::path& folder : folders) folder /= "vulkan/icd.d";
+    return folders;
+}
+
 }  // namespace ewa::platform

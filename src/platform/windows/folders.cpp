@@ -43,4 +43,8 @@ std::vector<std::filesystem::path> font_folders() {
             known_folder(FOLDERID_Fonts)};
 }
 
+std::vector<std::filesystem::path> driver_folders() {
+    return {};
+}
+
 }  // namespace ewa::platform
