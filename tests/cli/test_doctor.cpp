@@ -63,7 +63,9 @@ TEST(Doctor, NamesMissingProgramsAndTrainsWithoutThem) {
     const bool shown = std::ranges::any_of(
         json["checks"], [](const auto& check) { return check["name"] == "several processes"; });
     EXPECT_EQ(shown, ewa::ranks::has_mpi());
-    if (shown) EXPECT_FALSE(check_named(json, "several processes")["works"].get<bool>());
+    if (shown) {
+        EXPECT_FALSE(check_named(json, "several processes")["works"].get<bool>());
+    }
 }
 
 TEST(Doctor, EndsWithOneWithoutADriver) {
