@@ -77,17 +77,22 @@ class Table(unittest.TestCase):
         for row in self.rows:
             self.assertEqual(len(row), 3, row)
             self.assertRegex(row[1], "^[0-9a-f]{64}$", row)
-            self.assertRegex(row[2], r"\.(deb|tar\.(gz|bz2|xz))$", row)
+            self.assertRegex(row[2], r"\.(deb|tar\.(gz|bz2|xz)|diff\.gz)$", row)
 
     def test_each_library_with_sources_has_a_recipe(self):
         recipes = set(re.findall(r"^build_(\w+)\(\)", (PACKAGING / "recipes.sh").read_text(), re.M))
         names = {name.replace("-", "_") for name, *_ in self.rows}
         self.assertEqual(recipes - names, set())
-        self.assertEqual({name.replace("-", "_") for name, _, archive in self.rows if ".orig.tar" in archive} - recipes, set())
+        self.assertEqual({name.replace("-", "_") for name, _, archive in self.rows if ".orig.tar" in archive} - recipes, {"lavapipe"})
 
     def test_the_scripts_are_bash(self):
-        for name in ("toolchain", "dependencies", "recipes.sh", "glibc-of"):
+        for name in ("toolchain", "dependencies", "recipes.sh", "glibc-of", "lavapipe"):
             subprocess.run(["bash", "-n", PACKAGING / name], check=True)
+
+    def test_the_driver_is_refused_where_llvm_is_not_in_the_table(self):
+        for target, status, words in (("linux-aarch64", 1, "no driver"), ("windows-x86_64", 1, "no driver"), ("", 2, "packaging/lavapipe")):
+            done = subprocess.run([PACKAGING / "lavapipe", target], capture_output=True, text=True)
+            self.assertEqual((done.returncode, words in done.stderr), (status, True), done)
 
 
 class Glibc(unittest.TestCase):
