@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
     CLI::App app{
         "Measures the time of each pass of ewa on a Vulkan device, and its error against the CPU reference."};
     app.name("ewa-bench");
+    app.allow_windows_style_options(false);  // paths may begin with a slash
     ewa::core::use_help_text<CLI::Formatter>(app);
     app.set_version_flag("--version", "ewa " EWA_VERSION);
     ewa::bench::Options options;

@@ -70,6 +70,7 @@ int run_arguments(int argc, char** argv) {
     CLI::App app{
         "Trains, renders and inspects 3D Gaussian splats on any Vulkan device, a plain CPU included."};
     app.name("ewa");
+    app.allow_windows_style_options(false);  // paths may begin with a slash
     app.set_version_flag("--version", "ewa " EWA_VERSION);
     app.require_subcommand(1);
     core::use_help_text<CLI::Formatter>(app);

@@ -318,6 +318,7 @@ int main(int argc, char** argv) {
     core::print_warnings();
     CLI::App app{"Shows a 3D Gaussian splat scene in a window. F1 in the window lists the keys."};
     app.name("ewa-view");
+    app.allow_windows_style_options(false);  // paths may begin with a slash
     app.set_version_flag("--version", "ewa-view " EWA_VERSION);
     core::use_help_text<CLI::Formatter>(app);
     Arguments arguments;
