@@ -24,7 +24,7 @@ target_link_options(ewa_library PRIVATE -Wl,--version-script=${PROJECT_SOURCE_DI
                                         -Wl,--no-undefined)
 target_link_libraries(ewa_library PRIVATE PNG::PNG JPEG::JPEG spdlog::spdlog ZLIB::ZLIB zstd::libzstd_shared
                                           PkgConfig::WEBP PkgConfig::MINIZIP pugixml::pugixml SQLite::SQLite3
-                                          ${CMAKE_DL_LIBS})
+                                          ${ewa_system_libraries})
 target_compile_features(ewa_library INTERFACE cxx_std_20)
 target_include_directories(ewa_library INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 if(EWA_SANITIZE)
@@ -78,7 +78,8 @@ endif()
 # All that an installation needs, and no test: scripts/build makes it.
 add_custom_target(product DEPENDS ${ewa_programs} ewa_library manual)
 install(TARGETS ${ewa_programs} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(TARGETS ewa_library EXPORT ewaTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(TARGETS ewa_library EXPORT ewaTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
+        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(DIRECTORY include/ewa DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
 install(DIRECTORY ${ewa_manual_folder}/ DESTINATION ${CMAKE_INSTALL_DATADIR} OPTIONAL)
 install(FILES README.md CHANGELOG.md CONTRIBUTING.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
