@@ -48,11 +48,6 @@ build_httplib() {
     cp split/httplib.h "$prefix/include/"
     describe cpp-httplib 0.11.4 "-lcpp-httplib -lz $system" -DCPPHTTPLIB_ZLIB_SUPPORT
 }
-# ewa opens the loader at run time. CMake's module wants a library all the same.
-build_vulkan() {
-    local empty
-    for empty in vulkan vulkan-1; do "$ar" rcsD "$prefix/lib/lib$empty.a"; done
-}
 build_stb() {
     printf '#define STB_RECT_PACK_IMPLEMENTATION\n#define STB_TRUETYPE_IMPLEMENTATION\n#include <stb/stb_rect_pack.h>\n#include <stb/stb_truetype.h>\n' > stb.c
     archive stb -- stb.c
