@@ -110,10 +110,11 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/ewaConfigVersion.cmake CO
 install(FILES ${PROJECT_BINARY_DIR}/ewaConfig.cmake ${PROJECT_BINARY_DIR}/ewaConfigVersion.cmake
         DESTINATION ${ewa_package})
 
-# cpack --config build/release/CPackConfig.cmake: a .deb whose dependencies are read from what was linked.
+# cpack --config build/release/CPackConfig.cmake: a .deb whose dependencies are read from what was linked. It has the files of the packages
+# of debian/ but for ewa-mpi, and replaces them (docs/packaging.md).
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME ewa)
-set(CPACK_PACKAGE_CONTACT "The authors of ewa <ewa@localhost>")
+set(CPACK_PACKAGE_CONTACT "The authors of ewa <ewa@ewa.invalid>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "trains, renders and inspects 3D Gaussian splats on any Vulkan device")
 set(CPACK_PACKAGE_DESCRIPTION "Programs ewa, ewa-view and ewa-bench, and libewa with its headers. Images with cameras
 become a 3D Gaussian splat scene, on any Vulkan device, a plain CPU included.")
@@ -134,9 +135,13 @@ if(TARGET ewa_mpi)
     set(CPACK_DEBIAN_MPI_PACKAGE_DEPENDS "ewa (= ${PROJECT_VERSION}), openmpi-bin")
     set(CPACK_DEBIAN_MPI_PACKAGE_RECOMMENDS "")
     set(CPACK_DEBIAN_MPI_PACKAGE_SUGGESTS "")
+    set(CPACK_DEBIAN_MPI_PACKAGE_CONFLICTS "")
+    set(CPACK_DEBIAN_MPI_PACKAGE_REPLACES "")
 endif()
 # The loader is opened at run time, so no program names it.
 set(CPACK_DEBIAN_PACKAGE_DEPENDS libvulkan1)
-set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "mesa-vulkan-drivers, fonts-dejavu-core")
-set(CPACK_DEBIAN_PACKAGE_SUGGESTS "libglm-dev, vulkan-validationlayers, ewa-mpi")
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "colmap, ffmpeg, fonts-dejavu-core, mesa-vulkan-drivers | vulkan-icd")
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "ewa-mpi, libglm-dev, vulkan-validationlayers, xdg-desktop-portal | zenity | kdialog")
+set(CPACK_DEBIAN_PACKAGE_CONFLICTS "ewa-modules, libewa0.1, libewa-dev")
+set(CPACK_DEBIAN_PACKAGE_REPLACES "ewa-modules, libewa0.1, libewa-dev")
 include(CPack)

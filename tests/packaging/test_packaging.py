@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The table of the downloads' libraries, and what makes programs run with an older glibc."""
+"""The table of the downloads' libraries, what makes programs run with an older glibc, and what debian/ repeats."""
 import pathlib, re, subprocess, tempfile, unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -138,6 +138,40 @@ class Glibc(unittest.TestCase):
 
     def test_each_thread_owns_its_value(self):
         self.runs("owned", OWNED)
+
+
+class Debian(unittest.TestCase):
+    def setUp(self):
+        self.control = (ROOT / "debian/control").read_text()
+        self.install = (ROOT / "cmake/EwaInstall.cmake").read_text()
+
+    def list_of(self, field, package="ewa"):
+        stanza = re.search(rf"^(?:Source|Package): {package}\n.*?^{field}:(.*?)^(?=\S|\Z)", self.control, re.M | re.S)
+        return {re.sub(r" \(.*?\)", "", name).strip() for name in stanza.group(1).split(",")}
+
+    def set_in_cmake(self, name):
+        return re.search(rf'^ *set\({name} "?(.*?)"?\)$', self.install, re.M).group(1)
+
+    def test_the_build_has_the_packages_of_the_scripts(self):
+        scripts = set(re.search(r"\[build\]='(.*?)'", (ROOT / "scripts/install-packages").read_text(), re.S).group(1).split())
+        # Of each package that builds, of the developer, and of the tests. libopenmpi-dev brings openmpi-bin.
+        scripts -= {"g++", "ccache", "mesa-vulkan-drivers", "fonts-dejavu-core", "openmpi-bin"}
+        self.assertEqual(self.list_of("Build-Depends"), scripts | {"debhelper-compat"})
+
+    def test_both_recommend_the_same(self):
+        self.assertEqual(self.list_of("Recommends", "ewa"), set(self.set_in_cmake("CPACK_DEBIAN_PACKAGE_RECOMMENDS").split(", ")))
+
+    def test_the_packages_have_one_version_and_maintainer(self):
+        version = re.search(r"project\(ewa VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text()).group(1)
+        changelog = (ROOT / "debian/changelog").read_text()
+        self.assertTrue(changelog.startswith(f"ewa ({version}-"), changelog)
+        self.assertIn(f"\nPackage: libewa{version.rpartition('.')[0]}\n", self.control)
+        self.assertEqual(self.list_of("Maintainer"), {self.set_in_cmake("CPACK_PACKAGE_CONTACT")})
+
+    def test_cpack_excludes_the_others(self):
+        others = set(re.findall(r"^Package: (\S+)", self.control, re.M)) - {"ewa", "ewa-mpi"}
+        for field in ("CONFLICTS", "REPLACES"):
+            self.assertEqual(set(self.set_in_cmake(f"CPACK_DEBIAN_PACKAGE_{field}").split(", ")), others)
 
 
 if __name__ == "__main__":
