@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdlib>
 #include <fstream>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
@@ -135,7 +136,9 @@ Outcome run_ewa(const std::vector<std::string>& arguments, const Circumstances& 
     const Folder folder;
     const std::string out = circumstances.out_path.empty() ? folder / "out" : circumstances.out_path;
     const std::string err = circumstances.err_path.empty() ? folder / "err" : circumstances.err_path;
-    const std::string program = circumstances.program.empty() ? EWA_PROGRAM : circumstances.program;
+    const char* tested = std::getenv("EWA_TESTED_PROGRAM");
+    const std::string ewa = tested ? tested : EWA_PROGRAM;
+    const std::string program = circumstances.program.empty() ? ewa : circumstances.program;
     const pid_t child = fork();
     if (child < 0) throw std::runtime_error("fork failed");
     if (child == 0) become(program, arguments, out, err, circumstances);

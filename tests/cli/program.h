@@ -30,6 +30,7 @@ struct Circumstances {
     std::vector<std::pair<std::string, std::string>> environment = {};
 };
 
+/// $EWA_TESTED_PROGRAM runs in the place of the build's ewa, such as a script that starts a program for Windows.
 Outcome run_ewa(const std::vector<std::string>& arguments, const Circumstances& circumstances = {});
 
 /// A folder of its own, removed at the end; its paths as text, which arguments are.
