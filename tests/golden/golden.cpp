@@ -65,7 +65,8 @@ void write_png16(const fs::path& path, const Image& image) {
     std::vector<uint16_t> words(image.pixels.size());
     std::transform(image.pixels.begin(), image.pixels.end(), words.begin(),
                    [](float v) { return uint16_t(std::lround(65535 * std::clamp(double(v), 0.0, 1.0))); });
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "wb"), std::fclose);
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.string().c_str(), "wb"),
+                                                               std::fclose);
     if (!file || !write_png16(file.get(), image.width, image.height, image.channels, words.data()) ||
         std::fflush(file.get()) != 0)
         throw std::runtime_error(path.string() + ": cannot be written");

@@ -2,7 +2,6 @@
 // Files for tests, and what is expected of readers that meet broken ones.
 #pragma once
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <cstdlib>
@@ -14,6 +13,7 @@
 #include <string>
 
 #include "ewa/error.h"
+#include "platform/process.h"
 
 namespace ewa::test {
 
@@ -23,7 +23,7 @@ class TempFolder {
     TempFolder() {
         static std::atomic<int> counter{0};
         path_ = std::filesystem::temp_directory_path() /
-                ("ewa-test-" + std::to_string(getpid()) + "-" + std::to_string(counter++));
+                ("ewa-test-" + std::to_string(platform::process_id()) + "-" + std::to_string(counter++));
         std::filesystem::create_directories(path_);
     }
     ~TempFolder() {

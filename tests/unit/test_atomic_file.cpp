@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <sys/resource.h>
-#include <sys/stat.h>
-
-#include <csignal>
+#include <filesystem>
 #include <memory>
 #include <vector>
 
 #include "core/atomic_file.h"
+#include "platform/file.h"
+#include "support/file_limit.h"
 #include "support/temp_folder.h"
 
 namespace {
 
+namespace fs = std::filesystem;
 using namespace ewa;
 using core::AtomicFile;
 using test::expect_error;
@@ -45,22 +45,20 @@ TEST(AtomicFile, NamesPathAndReason) {
     std::filesystem::create_directory(folder / "folder");
     expect_error<RunError>([&] { AtomicFile file(folder / "folder"); }, {"folder", "not a regular file"});
     expect_error<RunError>([&] { AtomicFile file(folder / ""); }, {"names a folder"});
-    expect_error<RunError>([&] { AtomicFile file("/dev/null"); }, {"/dev/null", "not a regular file"});
+    expect_error<RunError>([&] { AtomicFile file(platform::kNullFile); },
+                           {platform::kNullFile, "not a regular file"});
 }
 
 // A limit on the size of files stands for the full disk: write returns an error in the same place.
 TEST(AtomicFile, FailedWriteKeepsTheOldFile) {
     TempFolder folder;
     const auto path = folder.write("a.txt", "old");
-    rlimit before{};
-    getrlimit(RLIMIT_FSIZE, &before);
-    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
-    const rlimit small{1000, before.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &small);
-    expect_error<RunError>([&] { core::write_text_file(path, std::string(5000, 'x')); },
-                           {"a.txt", "File too large"});
-    setrlimit(RLIMIT_FSIZE, &before);
-    std::signal(SIGXFSZ, handler);
+    if (!test::FileLimit::exists()) GTEST_SKIP() << "no limit on the size of files";
+    {
+        const test::FileLimit small(1000);
+        expect_error<RunError>([&] { core::write_text_file(path, std::string(5000, 'x')); },
+                               {"a.txt", "File too large"});
+    }
     EXPECT_EQ(file_bytes(path), "old");
     EXPECT_EQ(files_in(folder.path()), 1u);
 }
@@ -68,14 +66,12 @@ TEST(AtomicFile, FailedWriteKeepsTheOldFile) {
 TEST(AtomicFile, KeepsPermissionsAndFollowsLinks) {
     TempFolder folder;
     const auto path = folder.write("a.txt", "old");
-    chmod(path.c_str(), 0640);
+    fs::permissions(path, fs::perms(0640));
     std::filesystem::create_symlink("a.txt", folder / "link");
     core::write_text_file(folder / "link", "new");
     EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
     EXPECT_EQ(file_bytes(path), "new");
-    struct stat status {};
-    stat(path.c_str(), &status);
-    EXPECT_EQ(status.st_mode & 0777, 0640u);
+    EXPECT_EQ(fs::status(path).permissions(), fs::perms(0640));
 }
 
 TEST(AtomicFile, ForTheOwnerAlone) {
@@ -85,10 +81,9 @@ TEST(AtomicFile, ForTheOwnerAlone) {
     for (const auto& written : {path, folder / "link"}) {
         core::write_text_file(written, "secret", AtomicFile::Readers::owner);
         EXPECT_EQ(file_bytes(written), "secret");
-        struct stat status {};
-        lstat(written.c_str(), &status);
-        EXPECT_TRUE(S_ISREG(status.st_mode));
-        EXPECT_EQ(status.st_mode & 0777, 0600u);
+        const fs::file_status status = fs::symlink_status(written);
+        EXPECT_EQ(status.type(), fs::file_type::regular);
+        EXPECT_EQ(status.permissions(), fs::perms(0600));
     }
     EXPECT_EQ(file_bytes(others), "theirs");
 }

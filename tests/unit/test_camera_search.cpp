@@ -355,7 +355,7 @@ void write_shared_camera(const std::string& file) {
 
 TEST(DatabaseOfPhotos, NumbersThemByNameAndPartsTheirLenses) {
     const TempFolder folder;
-    const std::string file = folder / "database.db";
+    const std::string file = (folder / "database.db").string();
     write_shared_camera(file);
     capture::FeatureDatabase database(file);
     ASSERT_TRUE(database.has_cameras());
@@ -393,7 +393,7 @@ TEST(DatabaseOfPhotos, NumbersThemByNameAndPartsTheirLenses) {
 /// As COLMAP 3.12 and later write it: each image is a frame of its camera's rig.
 TEST(DatabaseOfPhotos, GivesEachARigOfItsOwn) {
     const TempFolder folder;
-    const std::string file = folder / "database.db";
+    const std::string file = (folder / "database.db").string();
     write_shared_camera(file);
     sqlite3* database = nullptr;
     ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
@@ -431,7 +431,7 @@ TEST(DatabaseOfPhotos, GivesEachARigOfItsOwn) {
 
 TEST(DatabaseOfPhotos, ClearsDescriptorsThatWereNeverWritten) {
     const TempFolder folder;
-    const std::string file = folder / "database.db";
+    const std::string file = (folder / "database.db").string();
     write_shared_camera(file);
     // x, y and the columns of a turned scale of 2: inside, at the lower border, at the right one.
     const std::array<float, 18> features{790, 590, 0, -2,    2,   0, 100, 597.5, 0,

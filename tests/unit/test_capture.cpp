@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The parts of a capture that need neither ffmpeg nor COLMAP.
 #include <cmath>
-#include <cstdlib>
 
 #include "capture/steps.h"
 #include "image/image_files.h"
+#include "platform/system.h"
 #include "support/temp_folder.h"
 
 namespace {
@@ -108,11 +108,11 @@ TEST(CapturePhotos, AreTheImagesOfAFolder) {
     folder.write("c.HEIC", "anything");
     if (image::reads_heif()) return;
     // This machine may have a program that converts them.
-    const std::string path = getenv("PATH");
-    setenv("PATH", folder.path().c_str(), 1);
+    const std::string path = platform::variable("PATH");
+    platform::set_variable("PATH", folder.path().string());
     test::expect_error<InputError>([&] { capture::photos_in(folder.path()); },
                                    {"1 photo is HEIC", "heif-convert"});
-    setenv("PATH", path.c_str(), 1);
+    platform::set_variable("PATH", path);
 }
 
 /// images.bin and points3D.bin as COLMAP writes them: a point that both images see.

@@ -7,6 +7,7 @@
 #include <ctime>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <numbers>
 
 #include "edit/edits.h"
 #include "edit/shapes.h"
@@ -133,8 +134,9 @@ TEST(BrushByExtent, TakesTheEllipsesThatItTouches) {
             const Drawn& splat = drawn[i];
             double distance = splat.has(line[0]) || splat.has(line[1]) || splat.has(line[2]) ? 0 : 1e9;
             for (int k = 0; k < kSamples; ++k)
-                distance = std::min(distance, distance_to(line, splat.border(2 * M_PI * k / kSamples)));
-            const double unsure = 2 * M_PI * splat.a / kSamples + 1e-3;
+                distance =
+                    std::min(distance, distance_to(line, splat.border(2 * std::numbers::pi * k / kSamples)));
+            const double unsure = 2 * std::numbers::pi * splat.a / kSamples + 1e-3;
             if (std::abs(distance - radius) < unsure) continue;
             EXPECT_EQ(splats.affected(i), distance < radius) << "stroke " << stroke << ", splat " << i;
             (distance < radius ? taken : left) += 1;

@@ -428,7 +428,7 @@ TEST(GltfSplats, ASpzOfManyPlacementsIsUnpackedOnce) {
         top["nodes"].push_back({{"mesh", 0}, {"translation", {i, 0, 0}}});
         top["scenes"][0]["nodes"].push_back(i);
     }
-    const std::string file = folder.write("a.gltf", top.dump());
+    const auto file = folder.write("a.gltf", top.dump());
     const std::clock_t begin = std::clock();
     const Gaussians all = load_splats(file);
     EXPECT_LT(double(std::clock() - begin) / CLOCKS_PER_SEC, 1);

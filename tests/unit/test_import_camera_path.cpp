@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // camera_path.json of nerfstudio's viewer. Its cameras have no images.
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "support/import_scene.h"
 
@@ -11,7 +12,7 @@ using namespace ewa::test;
 using nlohmann::json;
 
 constexpr double kPathFov = 37.5;  // degrees, vertical
-const double kPathFocal = 0.5 * kSceneHeight / std::tan(0.5 * kPathFov * M_PI / 180);
+const double kPathFocal = 0.5 * kSceneHeight / std::tan(0.5 * kPathFov * std::numbers::pi / 180);
 
 json path_json(const std::string& type = "perspective") {
     json cameras = json::array();
@@ -80,8 +81,8 @@ TEST(ImportCameraPath, OtherLenses) {
     json path = path_json("equirectangular");
     for (json& camera : path["camera_path"]) camera.erase("fov");
     expect_path_views(load_path(folder, path), [&](const glm::dvec3& p) {
-        return middle + glm::dvec2(kSceneWidth * std::atan2(p.x, p.z) / (2 * M_PI),
-                                   kSceneHeight * std::asin(p.y / glm::length(p)) / M_PI);
+        return middle + glm::dvec2(kSceneWidth * std::atan2(p.x, p.z) / (2 * std::numbers::pi),
+                                   kSceneHeight * std::asin(p.y / glm::length(p)) / std::numbers::pi);
     });
     EXPECT_FALSE(load_path(folder, path).frames[0].camera.distortion.none());
     EXPECT_TRUE(

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Journals of edits: what is read back, saves, versions of the file, locks, and files that cannot be written.
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <chrono>
-#include <csignal>
 #include <memory>
 
 #include "edit/journal.h"
 #include "ewa/error.h"
+#include "support/file_limit.h"
 #include "support/temp_folder.h"
 
 namespace {
@@ -142,23 +141,18 @@ TEST(Journal, OfANameThatIsNoUtf8IsWritten) {
 TEST(Journal, ThatCannotBeWrittenKeepsItsWholeLines) {
     const test::TempFolder folder;
     const auto file = folder / "a.edits";
-    const auto old = std::signal(SIGXFSZ, SIG_IGN);
-    rlimit limit{};
-    ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &limit), 0);
+    if (!test::FileLimit::exists()) GTEST_SKIP() << "no limit on the size of files";
+    Journal journal(file, {"a.ply", 3}, false);
+    journal.did(choosing("all"));
+    const std::string whole = test::file_bytes(file);
     {
-        Journal journal(file, {"a.ply", 3}, false);
-        journal.did(choosing("all"));
-        const std::string whole = test::file_bytes(file);
-        const rlimit full{.rlim_cur = whole.size() + 9, .rlim_max = limit.rlim_max};
-        setrlimit(RLIMIT_FSIZE, &full);
+        const test::FileLimit full(whole.size() + 9);
         EXPECT_THROW(journal.did(choosing("none")), RunError);
-        setrlimit(RLIMIT_FSIZE, &limit);
-        journal.did(choosing("invert"));
-        EXPECT_EQ(test::file_bytes(file), whole) << "no line follows one that is missing";
-        journal.saved();
-        EXPECT_FALSE(std::filesystem::exists(file)) << "its last edits are missing, and saved";
     }
-    std::signal(SIGXFSZ, old);
+    journal.did(choosing("invert"));
+    EXPECT_EQ(test::file_bytes(file), whole) << "no line follows one that is missing";
+    journal.saved();
+    EXPECT_FALSE(std::filesystem::exists(file)) << "its last edits are missing, and saved";
 }
 
 TEST(Journal, NamesTheLineThatIsDamaged) {

@@ -6,6 +6,7 @@
 #include <glm/glm.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
+#include <numbers>
 #include <random>
 #include <set>
 
@@ -127,7 +128,7 @@ TEST(SplatGroups, ViewsThatHaveAMeanInTheirImage) {
     Camera all = camera;
     all.width = 200;
     all.distortion.lens = Lens::equirectangular;
-    all.fx = all.fy = 100 / M_PI;
+    all.fx = all.fy = 100 / std::numbers::pi;
     all.cx = 100;
     EXPECT_EQ(scene::views_of_splats(g, {all}), (std::vector<uint32_t>{1, 1, 1, 1, 1}));
 }
