@@ -30,6 +30,16 @@ constexpr size_t kZipPiece = size_t(1) << 18;
 constexpr uint64_t kEncryptedFlag = 1, kDeflated = 8;
 constexpr unsigned kUnixKind = 0170000, kUnixFile = 0100000, kUnixFolder = 0040000;
 
+/// minizip takes names in bytes alone.
+unzFile open_zip(const fs::path& path) {
+    zlib_filefunc64_def functions{};
+    fill_fopen64_filefunc(&functions);
+    functions.zopen64_file = [](void*, const void* file, int) -> void* {
+        return platform::open_stream(*static_cast<const fs::path*>(file));
+    };
+    return unzOpen2_64(&path, &functions);
+}
+
 /// Files that desktops add, and the record by which ewa knows its own datasets.
 bool is_left_out(const fs::path& name) {
     return core::is_of_desktop(name) || name.filename() == folders::kCaptureFile;
@@ -158,7 +168,7 @@ bool is_zip(const fs::path& path) try {
 ZipFiles::ZipFiles(const fs::path& path) : state_(std::make_unique<State>()) {
     state_->name = core::one_line(path.string());
     const uint64_t bytes = core::FileReader(path).size();
-    state_->zip = unzOpen64(path.c_str());
+    state_->zip = open_zip(path);
     // Releases of minizip differ in whether they open an archive without entries.
     unz_global_info64 directory{};
     if (!state_->zip || unzGetGlobalInfo64(state_->zip, &directory) != UNZ_OK || directory.number_entry == 0)
