@@ -104,7 +104,8 @@ Mapping::Mapping(const Colmap& colmap, const Photos& photos, const PanoramaViews
 fs::path Mapping::database_for(const Way& way) const {
     const fs::path whole = work_ / "database.db", changed = work_ / "changed.db";
     if (!way.own_lenses && !way.neighbours) return whole;
-    fs::copy_file(whole, changed, fs::copy_options::overwrite_existing);
+    fs::remove(changed);  // MinGW's library overwrites none
+    fs::copy_file(whole, changed);
     FeatureDatabase database(changed);
     database.remove_descriptors();
     if (way.own_lenses) database.give_own_cameras();

@@ -28,11 +28,11 @@ void append_value(std::string& text, T value) {
     text.append(reinterpret_cast<const char*>(&value), sizeof(value));
 }
 
-/// Rewrites images.bin without these names. Returns the numbers of the images that it has lost.
-std::set<uint32_t> remove_images(const fs::path& file, const std::set<std::string>& names) {
+/// images.bin without these names. removed: the numbers of the images that it has lost.
+std::string without_names(const fs::path& file, const std::set<std::string>& names,
+                          std::set<uint32_t>& removed) {
     core::FileReader reader(file);
     const auto count = reader.read<uint64_t>("the number of images");
-    std::set<uint32_t> removed;
     uint64_t kept = 0;
     std::string text;
     for (uint64_t i = 0; i < count; ++i) {
@@ -53,16 +53,15 @@ std::set<uint32_t> remove_images(const fs::path& file, const std::set<std::strin
         append_value(text, features);
         text += rest;
     }
-    if (removed.empty()) return removed;
-    if (kept == 0) throw InputError(reader.name() + ": every photo has changed since its camera was found");
+    if (kept == 0 && !removed.empty())
+        throw InputError(reader.name() + ": every photo has changed since its camera was found");
     std::string head;
     append_value(head, kept);
-    core::write_text_file(file, head + text);
-    return removed;
+    return head + text;
 }
 
-/// Rewrites points3D.bin without these images in the tracks. The points stay.
-void remove_from_tracks(const fs::path& file, const std::set<uint32_t>& images) {
+/// points3D.bin without these images in the tracks. The points stay.
+std::string without_tracks(const fs::path& file, const std::set<uint32_t>& images) {
     core::FileReader reader(file);
     const auto count = reader.read<uint64_t>("the number of points");
     std::string text;
@@ -80,14 +79,18 @@ void remove_from_tracks(const fs::path& file, const std::set<uint32_t>& images) 
         append_value(text, uint64_t(kept.size() / kTrackBytes));
         text += kept;
     }
-    core::write_text_file(file, text);
+    return text;
 }
 
 }  // namespace
 
 void remove_views(const fs::path& model, const std::set<std::string>& names) {
-    const std::set<uint32_t> removed = remove_images(model / "images.bin", names);
-    if (!removed.empty()) remove_from_tracks(model / "points3D.bin", removed);
+    const fs::path images = model / "images.bin", points = model / "points3D.bin";
+    std::set<uint32_t> removed;
+    const std::string text = without_names(images, names, removed);
+    if (removed.empty()) return;
+    core::write_text_file(images, text);
+    core::write_text_file(points, without_tracks(points, removed));
 }
 
 }  // namespace ewa::capture
