@@ -92,7 +92,7 @@ std::vector<fs::path> picture_names(const std::vector<Frame>& frames) {
         if (uses[name] > 1) name = folders[i] / files[i];
         fs::path unique = name;
         for (int n = 2; !taken.insert(unique).second; ++n) unique = name.string() + "-" + std::to_string(n);
-        names.push_back(unique);
+        names.emplace_back(unique.generic_string());
     }
     return names;
 }
