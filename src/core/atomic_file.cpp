@@ -55,6 +55,8 @@ void AtomicFile::check(const std::error_code& error, const char* doing) const {
 AtomicFile::AtomicFile(const std::filesystem::path& path, Readers readers) : target_(path) {
     if (path.filename().empty() || path.filename() == "." || path.filename() == "..")
         throw RunError(one_line(path.string()) + ": cannot be written: it names a folder");
+    if (!platform::can_name_files(path.filename()))
+        throw RunError(one_line(path.string()) + ": cannot be written: not a regular file by this name");
     std::error_code ignored;
     if (readers == Readers::usual && platform::is_strangers_link(path))
         throw RunError(one_line(path.string()) +
