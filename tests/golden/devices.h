@@ -9,6 +9,7 @@
 
 #include "ewa/device.h"
 #include "support/shared_by_tests.h"
+#include "support/validation.h"
 
 namespace ewa::test {
 
@@ -19,12 +20,13 @@ inline const Devices& all_devices() {
     return devices_of_all->get([] {
         Devices devices;
         if (const char* name = std::getenv("EWA_TEST_DEVICE")) {
-            devices.push_back(open_device({.selector = name, .validation = true}));
+            devices.push_back(open_device({.selector = name, .validation = with_validation()}));
             return devices;
         }
         for (const DeviceInfo& info : list_devices())
             if (info.unusable.empty())
-                devices.push_back(open_device({.selector = std::to_string(info.index), .validation = true}));
+                devices.push_back(
+                    open_device({.selector = std::to_string(info.index), .validation = with_validation()}));
         return devices;
     });
 }

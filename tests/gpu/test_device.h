@@ -10,6 +10,7 @@
 #include "ewa/device.h"
 #include "gpu/device.h"
 #include "support/shared_by_tests.h"
+#include "support/validation.h"
 
 namespace ewa::test {
 
@@ -34,7 +35,7 @@ inline void pretend_gpu(gpu::Device& device) {
 inline std::shared_ptr<gpu::Device> open_test_device(bool validation) {
     DeviceOptions options;
     if (const char* name = std::getenv("EWA_TEST_DEVICE")) options.selector = name;
-    options.validation = validation;
+    options.validation = validation && with_validation();
     std::shared_ptr<gpu::Device> opened = open_device(options);
     const char* kernels = std::getenv("EWA_TEST_KERNELS");
     if (kernels && std::string_view(kernels) == "gpu") pretend_gpu(*opened);

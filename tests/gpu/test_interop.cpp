@@ -38,9 +38,10 @@ class Engine {
     explicit Engine(bool all = true, VkPhysicalDeviceVulkan13Features* own = nullptr) {
         heard.clear();
         const vk::ApplicationInfo application("engine", 1, nullptr, 0, VK_API_VERSION_1_3);
-        const char* layer = "VK_LAYER_KHRONOS_validation";
+        std::vector<const char*> layers;
+        if (with_validation()) layers.push_back("VK_LAYER_KHRONOS_validation");
         const char* extension = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
-        instance_ = vk::createInstanceUnique(vk::InstanceCreateInfo({}, &application, layer, extension));
+        instance_ = vk::createInstanceUnique(vk::InstanceCreateInfo({}, &application, layers, extension));
         VkDebugUtilsMessengerCreateInfoEXT listen{};
         listen.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT;
         listen.messageSeverity =

@@ -35,7 +35,7 @@ void write_twice(gpu::Device& device, bool barrier) {
 TEST(Synchronisation, ValidationSeesAMissingBarrierWhereItIsOn) {
     const char* enabled = std::getenv("VK_LAYER_ENABLES");
     const bool on = enabled && std::strstr(enabled, "SYNCHRONIZATION_VALIDATION");
-    gpu::Device watched(device()->info(), true);
+    gpu::Device watched(device()->info(), with_validation());
     write_twice(watched, true);
     EXPECT_NO_THROW(watched.check_validation());
     write_twice(watched, false);
