@@ -146,6 +146,9 @@ Outcome run_ewa(const std::vector<std::string>& arguments, const Circumstances& 
     outcome.status = wait_for(child, circumstances);
     if (circumstances.out_path.empty()) outcome.out = read_file(out);
     if (circumstances.err_path.empty()) outcome.err = without_counters(read_file(err));
+    if (tested)  // may be a program for Windows, whose paths have other separators
+        for (std::string* text : {&outcome.out, &outcome.err})
+            std::replace(text->begin(), text->end(), '\\', '/');
     return outcome;
 }
 

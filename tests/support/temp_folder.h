@@ -3,6 +3,7 @@
 #pragma once
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
@@ -66,6 +67,12 @@ std::string bytes_of(T value) {
     return bytes;
 }
 
+/// The text with the separators of paths that all systems but Windows write.
+inline std::string with_slashes(std::string text) {
+    std::replace(text.begin(), text.end(), '\\', '/');
+    return text;
+}
+
 /// The action throws Error with a text of one line that holds every part.
 template <class Error, class Action>
 void expect_error(const Action& action, std::initializer_list<std::string> parts) {
@@ -76,7 +83,8 @@ void expect_error(const Action& action, std::initializer_list<std::string> parts
         const std::string text = error.what();
         EXPECT_EQ(text.find('\n'), std::string::npos) << text;
         for (const std::string& part : parts)
-            EXPECT_NE(text.find(part), std::string::npos) << part << " not in: " << text;
+            EXPECT_NE(with_slashes(text).find(with_slashes(part)), std::string::npos)
+                << part << " not in: " << text;
     }
 }
 
