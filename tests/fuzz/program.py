@@ -342,7 +342,8 @@ def main():
     parser.add_argument("--findings", type=pathlib.Path, default=ROOT / "build" / "fuzz" / "findings")
     given = parser.parse_args()
     ewa = str(pathlib.Path(given.ewa).resolve())
-    sanitized = b"libasan" in subprocess.run(["ldd", ewa], stdout=subprocess.PIPE, check=True).stdout
+    # ewa may be a script, such as one that starts a program for Windows.
+    sanitized = b"libasan" in subprocess.run(["ldd", ewa], capture_output=True).stdout
     os.environ.update(LC_ALL="C.UTF-8", UBSAN_OPTIONS="halt_on_error=1:print_stacktrace=1", ASAN_OPTIONS="detect_leaks=0")
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     totals, findings = {}, []
