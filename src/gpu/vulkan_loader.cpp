@@ -48,8 +48,11 @@ std::string open_driver(Source& opened) {
 
 std::string open_loader(Source& opened) {
     opened.library = std::make_unique<platform::Library>(platform::kVulkanLoader);
-    if (*opened.library) return {};
-    return std::string("there is no Vulkan loader (") + platform::kVulkanLoader + ")";
+    if (!*opened.library) return std::string("there is no Vulkan loader (") + platform::kVulkanLoader + ")";
+    // Vulkan's C++ functions must not throw, so that a loader which is too old is refused here.
+    constexpr const char* kNewest = "vkGetPhysicalDeviceProperties2";
+    if (opened.library->find(kNewest)) return {};
+    return std::string(platform::kVulkanLoader) + " is older than Vulkan 1.1";
 }
 
 std::string open_locked(VulkanSource wanted) {

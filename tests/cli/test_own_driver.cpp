@@ -50,6 +50,10 @@ class OwnDriver : public testing::Test {
 TEST_F(OwnDriver, IsTheLastChoice) {
     EXPECT_TRUE(device(without_loader()).ends_with(" inside ewa"));
     EXPECT_TRUE(device({{"VK_LOADER_DRIVERS_DISABLE", "*"}}).ends_with(" inside ewa"));
+    // A loader that lacks functions: the driver exports none that programs call.
+    fs::create_directories(folder_ / "old");
+    fs::create_symlink(kSystemIcd, folder_ / "old/libvulkan.so.1");
+    EXPECT_TRUE(device({{"LD_LIBRARY_PATH", folder_ / "old"}}).ends_with(" inside ewa"));
     const Outcome system = run({"devices"}, {});
     expect_success(system);
     EXPECT_EQ(system.out.find(" inside ewa"), std::string::npos) << system.out;
