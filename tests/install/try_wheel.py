@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Uses an installed wheel of the Python package: try_wheel.py [files|plain]
+"""Uses an installed wheel of the Python package: try_wheel.py [files|plain|DATASET]
 
 "files" renders and trains nothing: there is no driver. "plain" is a wheel of the system's libraries, which has no modules inside.
+The folder DATASET is trained on for 200 steps. The splats go to splats.ply.
 """
 
 import json
@@ -87,6 +88,12 @@ def try_training(folder):
         assert len(mesh.triangles) > 100
 
 
+if pathlib.Path(MODE).is_dir() and MODE:
+    trainer = ewa.Trainer(MODE, steps=200, seed=1)
+    for _ in trainer:
+        pass
+    ewa.save("splats.ply", trainer.splats())
+    sys.exit()
 with tempfile.TemporaryDirectory() as name:
     folder = pathlib.Path(name)
     splats = try_files(folder)
