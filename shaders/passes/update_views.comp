@@ -36,10 +36,10 @@ layout(push_constant, scalar) uniform Push { UpdateViewsPush push; };
 const uint FLOATS = BY_DEPTH_PLANE ? SUM_FLOATS_DEPTH : ABSOLUTE ? SUM_FLOATS_ABSOLUTE : SUM_FLOATS;
 
 Sums sums_at(uint index) {
-    float s[SUM_FLOATS_DEPTH];
-    s[9] = s[10] = s[11] = 0.0;
-    [[unroll]] for (uint f = 0; f < FLOATS; ++f) s[f] = sums[FLOATS * index + f];
-    return Sums(s[0], vec2(s[1], s[2]), vec3(s[3], s[4], s[5]), vec3(s[6], s[7], s[8]), vec2(s[9], s[10]), s[11]);
+    const uint at = FLOATS * index;  // no local array of floats: glslang may give it the layout of a buffer's
+    return Sums(sums[at], vec2(sums[at + 1u], sums[at + 2u]), vec3(sums[at + 3u], sums[at + 4u], sums[at + 5u]),
+                vec3(sums[at + 6u], sums[at + 7u], sums[at + 8u]),
+                FLOATS > SUM_FLOATS ? vec2(sums[at + 9u], sums[at + 10u]) : vec2(0.0), BY_DEPTH_PLANE ? sums[at + 11u] : 0.0);
 }
 
 Sums added(Sums a, Sums b) {
