@@ -23,6 +23,7 @@
 #include "run/earlier_run.h"
 #include "run/evaluation.h"
 #include "run/final_evaluation.h"
+#include "run/first_kernels.h"
 #include "run/inria_files.h"
 #include "run/option_table.h"
 #include "run/resume.h"
@@ -67,7 +68,7 @@ class Run {
         : observer_(observer),
           opening_(std::async(open_device, options.device)),
           progress_{.seconds_before = options.seconds_before, .last = {}, .metrics = {}},
-          input_(train::load_run(options)),
+          input_(train::load_run(options, [&](const train::RunInput& input) { compile_ahead(input); })),
           measures_(train::measures_of(options)),
           folder_(train::checked_folder(input_)),
           cameras_(input_),
@@ -79,6 +80,7 @@ class Run {
 
   private:
     const RunOptions& options() const { return input_.options; }
+    void compile_ahead(const train::RunInput& input);
     void read_checkpoint(const RunOptions& asked);
     void begin_files();
     void leave_out_passers_by();
@@ -115,6 +117,18 @@ class Run {
     report::ReportData report_;
     std::filesystem::path first_render_;
 };
+
+/// Compiles the kernels of the first step once the device is open, while images are decoded.
+void Run::compile_ahead(const train::RunInput& input) try {
+    if (!train::has_plain_step(input.options)) return;
+    opening_ = std::async([step = train::first_step(input), opening = std::move(opening_)]() mutable {
+        std::shared_ptr<gpu::Device> device = opening.get();
+        train::compile_kernels(*device, step);
+        return device;
+    });
+} catch (const InputError&) {
+    // Who reads on finds the same fault.
+}
 
 void Run::read_checkpoint(const RunOptions& asked) {
     train::check_free(folder_.path(), options());  // again, now that no other run writes here

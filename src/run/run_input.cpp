@@ -197,7 +197,7 @@ FirstPlaces first_places(const RunInput& input) {
 
 }  // namespace
 
-RunInput load_run(const RunOptions& options) {
+RunInput load_run(const RunOptions& options, const std::function<void(const RunInput&)>& on_dataset) {
     RunInput input;
     input.options = options;
     input.name = run_name(options);
@@ -219,6 +219,7 @@ RunInput load_run(const RunOptions& options) {
             check_max_width(options.max_width, frame.source.width, frame.source.height,
                             "the image " + frame.name);
     }
+    if (on_dataset) on_dataset(input);
     add_findings(check_images(input.dataset, input.split, true), input);
     if (options.skip_blurred) {
         const std::string remark = skip_blurred(input.dataset, input.split);

@@ -2,6 +2,7 @@
 // The inputs of a training run: its dataset and its first splats.
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -29,8 +30,8 @@ struct RunInput {
     }
 };
 
-/// Loads the dataset and the first splats. Throws InputError.
-RunInput load_run(const RunOptions& options);
+/// Loads the dataset and the first splats. Throws InputError. on_dataset: called before images are decoded, without first splats.
+RunInput load_run(const RunOptions& options, const std::function<void(const RunInput&)>& on_dataset = {});
 
 /// Thins the points if the device lacks memory for one splat per point. Does nothing if the user set the number of splats.
 void thin_for_device(RunInput& input, const gpu::Device& device);
