@@ -54,10 +54,11 @@ const gpu::Pipeline& PassCache::pipeline(std::string_view shader, uint32_t group
     const bool pinhole =
         std::ranges::find(constants, gpu::SpecConstant{shared::SPEC_LENSES, shared::LENSES_PINHOLE}) !=
         constants.end();
-    std::span<const uint32_t> code =
-        pinhole ? pinhole_code(shader, config_.texel_buffers) : std::span<const uint32_t>();
+    std::span<const uint32_t> code;
+    if (config_.optimised_modules && pinhole) code = pinhole_code(shader, config_.texel_buffers);
     const bool without_lenses = !code.empty();
-    if (!without_lenses) code = shader_code(shader, config_.texel_buffers);
+    if (config_.optimised_modules && config_.texel_buffers && code.empty()) code = optimised_code(shader);
+    if (code.empty()) code = shader_code(shader, config_.texel_buffers);
     const gpu::Pipeline& made = device_.pipelines().get(device_, std::string(shader), code, constants);
     const std::vector<uint32_t>& declared = made.reflection().constants;
     for (const gpu::SpecConstant& constant : variant)

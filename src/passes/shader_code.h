@@ -11,6 +11,8 @@
 namespace ewa::passes {
 
 std::span<const std::uint32_t> shader_code(std::string_view name, bool texel_buffers);
+/// The module with texel buffers, in which the build has inlined functions and resolved variables. Empty: there is none.
+std::span<const std::uint32_t> optimised_code(std::string_view name);
 /// The module for SPEC_LENSES = LENSES_PINHOLE, without that constant and the code of other lenses. Empty: there is none.
 std::span<const std::uint32_t> pinhole_code(std::string_view name, bool texel_buffers);
 std::vector<std::string_view> shader_names();

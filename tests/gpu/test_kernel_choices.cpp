@@ -55,6 +55,9 @@ TEST_P(KernelChoices, ChangeNoByteOfAFrame) {
     passes::KernelConfig other = own;
     other.ranked_sort = !own.ranked_sort;
     EXPECT_TRUE(frame_with(other, scene) == expected) << "the other sort";
+    other = own;
+    other.optimised_modules = false;
+    EXPECT_TRUE(frame_with(other, scene) == expected) << "whole modules";
     for (const uint32_t broadcast :
          {shared::BROADCAST_SHUFFLES, shared::BROADCAST_SHARED, shared::BROADCAST_UNIFORM}) {
         other = own;

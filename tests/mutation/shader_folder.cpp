@@ -38,6 +38,9 @@ std::span<const std::uint32_t> ewa::passes::shader_code(std::string_view name, b
 }
 
 // A mutant is one of the whole module.
+std::span<const std::uint32_t> ewa::passes::optimised_code(std::string_view) {
+    return {};
+}
 std::span<const std::uint32_t> ewa::passes::pinhole_code(std::string_view, bool) {
     return {};
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The smaller modules of kernels that see pinholes alone.
+// Modules that the build has made from whole ones, so that drivers compile them faster.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -55,6 +55,38 @@ TEST(PinholeCode, IsTakenForPinholesAlone) {
     };
     EXPECT_FALSE(has_lenses(shared::LENSES_PINHOLE));
     EXPECT_TRUE(has_lenses(shared::LENSES_ANY));
+}
+
+/// It has no constants that the whole module declares and never reads.
+TEST(OptimisedCode, HasTheBindingsOfTheWholeModule) {
+    int found = 0;
+    for (const std::string_view name : passes::shader_names()) {
+        const std::span<const uint32_t> optimised = passes::optimised_code(name);
+        if (optimised.empty()) continue;
+        SCOPED_TRACE(name);
+        ++found;
+        const gpu::Reflection a = gpu::reflect(optimised), b = gpu::reflect(passes::shader_code(name, true));
+        EXPECT_TRUE(std::ranges::includes(b.constants, a.constants));
+        EXPECT_EQ(a.push_constant_bytes, b.push_constant_bytes);
+        EXPECT_EQ(a.uses_subgroups, b.uses_subgroups);
+        ASSERT_EQ(a.bindings.size(), b.bindings.size());
+        for (size_t i = 0; i < a.bindings.size(); ++i) {
+            EXPECT_EQ(a.bindings[i].kind, b.bindings[i].kind);
+            EXPECT_EQ(a.bindings[i].access, b.bindings[i].access);
+        }
+    }
+    EXPECT_EQ(found, 7);
+}
+
+/// A device keeps one pipeline for each module.
+TEST(OptimisedCode, IsUsedUnlessWholeModulesAreAskedFor) {
+    passes::PassCache cache(*device());
+    passes::KernelConfig config = cache.config();
+    if (!config.texel_buffers) GTEST_SKIP() << "the device has storage buffers in place of texel buffers";
+    config.optimised_modules = false;
+    passes::PassCache whole(*device(), config);
+    EXPECT_NE(&cache.get<passes::LossColumns>().pipeline, &whole.get<passes::LossColumns>().pipeline);
+    EXPECT_EQ(&cache.get<passes::Reduce>().pipeline, &whole.get<passes::Reduce>().pipeline);
 }
 
 }  // namespace
