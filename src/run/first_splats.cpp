@@ -255,14 +255,13 @@ void check_without_dataset(const RunOptions& options) {
         initial_splats(options, {}, {});
 }
 
-void thin_for_device(RunInput& input, const gpu::Device& device) {
+bool thin_for_device(RunInput& input, Needs& needs) {
     const TrainOptions& train = input.options.train;
     if (!input.from_points || train.max_splats != kAutomaticMaxSplats || train.device_memory_bytes > 0 ||
         input.options.ranks->size() > 1)
-        return;
-    const TrainOptions resolved = resolve(train, input.dataset, input.split.train);
-    const size_t fit = Needs(device, input.dataset, input.split.train, input.start, resolved).fitting_start();
-    if (fit >= input.start.size()) return;
+        return false;
+    const size_t fit = needs.fitting_start();
+    if (fit >= input.start.size()) return false;
     RunOptions fewer = input.options;
     fewer.train.max_splats = uint32_t(fit);
     StartSource source;
@@ -270,6 +269,7 @@ void thin_for_device(RunInput& input, const gpu::Device& device) {
     std::erase_if(input.notes, [](const std::string& note) { return note.ends_with(kOtherLimit); });
     if (!source.thinned.empty())
         input.notes.push_back(source.thinned + ": the device's memory has room for no more" + kOtherLimit);
+    return true;
 }
 
 }  // namespace ewa::train

@@ -166,11 +166,17 @@ void Run::list_settings() {
         if (name == "device" && value.empty()) value = report_.summary.device + " (chosen by ewa)";
 }
 
-/// Notes the largest number of splats, automatic unless options name it, and returns its memory. A checkpoint keeps it.
+/// Thins new points that are too many for the device. Notes the largest number of splats, automatic unless options name it, and
+/// returns its memory. A checkpoint keeps it.
 MemoryEstimate Run::choose_cap() {
     const TrainOptions train = resolve(options().train, input_.dataset, input_.split.train);
-    train::Needs needs(*device_, input_.dataset, input_.split.train, input_.start, train);
-    const SplatCap cap = needs.cap();
+    const auto needed = [&] {
+        return std::make_unique<train::Needs>(*device_, input_.dataset, input_.split.train, input_.start,
+                                              train);
+    };
+    std::unique_ptr<train::Needs> needs = needed();
+    if (!earlier_ && train::thin_for_device(input_, *needs)) needs = needed();
+    const SplatCap cap = needs->cap();
     report_.summary.max_splats = cap.splats;
     saves_.settings()["cap"] = cap.splats;
     if (train.max_splats == kAutomaticMaxSplats && train.strategy != Strategy::none)
@@ -178,7 +184,7 @@ MemoryEstimate Run::choose_cap() {
                                            core::counted(cap.splats, "splat"), cap.reason));
     const std::string full = train::check_disk_room(folder_.path(), input_.start.size(), cap.splats, train);
     if (!full.empty()) input_.remarks.push_back(full);
-    return needs.memory(cap.splats);
+    return needs->memory(cap.splats);
 }
 
 /// The options with that number: the rule of the automatic one takes time on a large dataset.
@@ -191,7 +197,6 @@ TrainOptions Run::capped_options() const {
 /// Opens the device and tells the observer what the run begins with.
 void Run::start() {
     device_ = opening_.get();
-    if (!earlier_) train::thin_for_device(input_, *device_);
     RunStart start;
     start.memory = choose_cap();
     report_.title = input_.name;

@@ -10,6 +10,7 @@
 #include "ewa/run_options.h"
 #include "prepare/viewed_sphere.h"
 #include "scene/frame_images.h"
+#include "train/needs.h"
 
 namespace ewa::train {
 
@@ -33,8 +34,9 @@ struct RunInput {
 /// Loads the dataset and the first splats. Throws InputError. on_dataset: called before images are decoded, without first splats.
 RunInput load_run(const RunOptions& options, const std::function<void(const RunInput&)>& on_dataset = {});
 
-/// Thins the points if the device lacks memory for one splat per point. Does nothing if the user set the number of splats.
-void thin_for_device(RunInput& input, const gpu::Device& device);
+/// Thins the points if the device lacks memory for one splat per point, and returns whether it did. It does not if the user set the
+/// number of splats. needs: of the input.
+bool thin_for_device(RunInput& input, Needs& needs);
 
 /// Whether RunOptions::init is a word, and not a file.
 inline bool starts_by_word(const std::string& init) {
