@@ -307,7 +307,9 @@ shared::Counts FrameBuffers::read_counts(uint32_t slot) const {
 }
 
 uint32_t first_capacity(size_t splats) {
-    return uint32_t(std::min<size_t>(std::max<size_t>(2 * splats, 4096), 1u << 24));
+    // Captures begin with 4 to 6 pairs a splat. For few splats these take little memory, and the first frame runs once.
+    const size_t usual = std::min<size_t>(6 * splats, 1u << 18);
+    return uint32_t(std::min<size_t>(std::max<size_t>({2 * splats, usual, 4096}), 1u << 24));
 }
 
 void check_rays_finished(const shared::Counts& counts) {
