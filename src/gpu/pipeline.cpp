@@ -248,13 +248,14 @@ Pipeline::Pipeline(Device& device, std::string name, std::span<const uint32_t> s
     const auto lanes = device.subgroup_size_control() && reflection_.uses_subgroups
                            ? std::optional(device.limits().subgroup_size)
                            : std::nullopt;
-    // A CPU has no more cores than its compiler fills: the store has as many threads.
+    // A CPU has no more cores than its compiler fills: the store has threads for them.
     pipeline_ = std::async(
         device.limits().cpu ? std::launch::deferred : std::launch::async, compile, std::ref(device), name_,
         with_float_modes(with_values(spirv, constants), device.float_modes()), constants, lanes, *layout_);
 }
 
-PipelineStore::PipelineStore() : threads_(std::max(1u, std::thread::hardware_concurrency())) {}
+// One core is left to the thread that needs the kernels. It has other work first, or compiles those that have not begun.
+PipelineStore::PipelineStore() : threads_(std::max(2u, std::thread::hardware_concurrency()) - 1) {}
 
 const Pipeline& PipelineStore::get(Device& device, const std::string& name, std::span<const uint32_t> spirv,
                                    const std::vector<SpecConstant>& constants) {

@@ -82,7 +82,7 @@ class Pipeline {
 };
 
 /// The pipelines of a device, which live as long as the device. Each is compiled once, for all users of the device. A CPU
-/// device compiles on all cores. Calls may come from any thread.
+/// device compiles on all cores but one. Calls may come from any thread.
 class PipelineStore {
   public:
     PipelineStore();
