@@ -41,8 +41,8 @@ Image channels_of(const Image& image, int first, int count) {
 
 Image load_file(const Frame& frame) {
     Image image = scene::load_finite_image(frame.image_path);
-    if (frame.masks == MaskUse::none) return image.channels == 3 ? image : channels_of(image, 0, 3);
-    if (frame.mask_path.empty()) return image;
+    if (frame.masks == MaskUse::none && image.channels != 3) return channels_of(image, 0, 3);
+    if (frame.masks == MaskUse::none || frame.mask_path.empty()) return image;
     return with_mask(image, scene::load_mask(frame.mask_path, read_image_size(frame.image_path)));
 }
 
@@ -117,7 +117,8 @@ Image load_frame_image(const Frame& frame) {
     if (!frame.distortion.none())
         image = scene::undistort_image(image, frame.source, frame.distortion, frame.pinhole);
     if (frame.downscale != 1) image = downscale(image, frame.downscale);
-    return frame.left_out ? without_left_out(image, frame) : image;
+    if (frame.left_out) return without_left_out(image, frame);
+    return image;
 }
 
 }  // namespace ewa
