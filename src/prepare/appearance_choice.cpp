@@ -99,15 +99,30 @@ bool are_related(const std::vector<double>& a, const std::vector<double>& b) {
     return ab > std::max(kLeastCorrelation, kDeviationsOfChance / std::sqrt(count)) * std::sqrt(aa * bb);
 }
 
+/// log2 of each 8-bit level, as a share of white.
+std::array<double, 256> logarithms() {
+    std::array<double, 256> all;
+    for (size_t level = 0; level < all.size(); ++level) all[level] = std::log2(double(level) / 255.0);
+    return all;
+}
+
 /// What the frame's image is against the points that it shows: log2(image / point), as medians. Unknown where the points are too
 /// few, or do not have the colours of the image.
 Measures against_points(const Dataset& dataset, const Frame& frame) {
     const std::shared_ptr<const Image> read = scene::image_of(frame);
     const Image& image = *read;
+    static const std::array<double, 256> log_of = logarithms();
     std::array<std::vector<double>, kQuantities> values;
     std::vector<double> own, usual;
-    for (const SeenPoint& p : seen_points(frame.camera, dataset.points)) {
-        const float* pixel = image.at(std::min(p.x, image.width - 1), std::min(p.y, image.height - 1));
+    const std::vector<SeenPoint> seen = seen_points(frame.camera, dataset.points);
+    const auto pixel_at = [&](const SeenPoint& p) {
+        return image.at(std::min(p.x, image.width - 1), std::min(p.y, image.height - 1));
+    };
+    constexpr size_t kAhead = 16;  // points, whose pixels come from memory meanwhile
+    for (size_t i = 0; i < seen.size(); ++i) {
+        if (i + kAhead < seen.size()) __builtin_prefetch(pixel_at(seen[i + kAhead]));
+        const SeenPoint& p = seen[i];
+        const float* pixel = pixel_at(p);
         const auto& color = dataset.points.colors[p.point];
         const auto usable = [&](int c) {
             const double there = double(pixel[c]), expected = color[c] / 255.0;
@@ -116,8 +131,7 @@ Measures against_points(const Dataset& dataset, const Frame& frame) {
         if (!usable(0) || !usable(1) || !usable(2) || (image.channels == 4 && pixel[3] < 1)) continue;
         std::array<double, 3> ratio;
         for (size_t c = 0; c < 3; ++c) ratio[c] = std::log2(double(pixel[c]) * 255 / color[c]);
-        const double expected =
-            (std::log2(color[0] / 255.0) + std::log2(color[1] / 255.0) + std::log2(color[2] / 255.0)) / 3;
+        const double expected = (log_of[color[0]] + log_of[color[1]] + log_of[color[2]]) / 3;
         values[kExposure].push_back((ratio[0] + ratio[1] + ratio[2]) / 3);
         values[kRed].push_back(ratio[0] - ratio[1]);
         values[kBlue].push_back(ratio[2] - ratio[1]);

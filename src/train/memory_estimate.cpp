@@ -119,6 +119,7 @@ std::vector<SampledView> sampled_views(const Gaussians& start, const Dataset& da
     std::vector<SampledView> views(std::min(frames.size(), kViews));
     core::on_all_cores(views.size(), [&](size_t v) {
         views[v].camera = &dataset.frames[size_t(frames[v * frames.size() / views.size()])].camera;
+        views[v].seen.reserve(start.size() / stride + 1);
         for (size_t i = 0; i < start.size(); i += stride)
             if (const auto footprint = project(start, i, *views[v].camera))
                 views[v].seen.push_back(*footprint);
