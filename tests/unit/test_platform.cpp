@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The calls of the operating system, as the other modules rely on them. Tests of those modules test more.
 #include <cstring>
+#include <string>
 #include <vector>
 
 #include "platform/file.h"
@@ -70,6 +71,15 @@ TEST(Platform, FilesAreKnownByTheirIds) {
     EXPECT_NE(platform::file_id(folder / "a"), platform::file_id(folder / "b"));
     EXPECT_EQ(platform::file_id(folder.path()), platform::file_id(folder / "."));
     EXPECT_FALSE(platform::file_id(folder / "absent"));
+}
+
+TEST(Platform, PathsAreMadeOfUtf8) {
+    const std::filesystem::path path("caf\xc3\xa9/\xf0\x9f\x98\x80");
+    EXPECT_EQ(path.generic_u16string(), u"caf\u00e9/\U0001F600");
+    const test::TempFolder folder;
+    EXPECT_EQ(test::file_bytes(folder.write(std::filesystem::path(u"\u65e5.txt"), "x")), "x");
+    EXPECT_TRUE(std::filesystem::exists(folder / "\xe6\x97\xa5.txt"));
+    EXPECT_FALSE(std::filesystem::exists(folder / "\xff\xc3")) << "no UTF-8, and no error";
 }
 
 TEST(Platform, AFolderShowsTheFilesOfAnother) {

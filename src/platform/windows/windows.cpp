@@ -15,6 +15,8 @@ class WindowsErrors : public std::error_category {
     std::string message(int error) const override { return error_words(DWORD(error)); }
 };
 
+constexpr wchar_t kNotValid = 0xfffd;
+
 }  // namespace
 
 std::wstring wide(std::string_view text) {
@@ -76,3 +78,36 @@ std::string error_words(DWORD error) {
 }
 
 }  // namespace ewa::platform
+
+// The C++ library of MinGW makes paths of text by this function of C. The one of MinGW takes each byte for a character. This one
+// reads UTF-8, as paths are written. Characters above U+FFFF are two units: the first one takes three bytes, the second one the
+// last. MinGW has both functions in one object, so both are here.
+extern "C" size_t mbrtowc(wchar_t* to, const char* from, size_t size, mbstate_t* state) {
+    if (!from) return 0;
+    if (size == 0) return size_t(-2);
+    wchar_t units[2] = {};
+    size_t bytes = 1;
+    if (state && *state) {
+        units[0] = wchar_t(*state);
+        *state = 0;
+    } else if (const auto first = static_cast<unsigned char>(*from); first < 0x80) {
+        units[0] = first;
+    } else {
+        const int length = first < 0xe0 ? 2 : first < 0xf0 ? 3 : 4;
+        const int count = size_t(length) > size
+                              ? 0
+                              : MultiByteToWideChar(CP_UTF8, MB_ERR_INVALID_CHARS, from, length, units, 2);
+        if (count == 0) units[0] = ewa::platform::kNotValid;
+        if (count > 0) bytes = size_t(length);
+        if (count == 2 && state) {
+            *state = units[1];
+            --bytes;
+        }
+    }
+    if (to) *to = units[0];
+    return units[0] ? bytes : 0;
+}
+
+extern "C" size_t mbrlen(const char* from, size_t size, mbstate_t* state) {
+    return mbrtowc(nullptr, from, size, state);
+}
