@@ -8,6 +8,7 @@
 #include "ewa/error.h"
 #include "ewa/image.h"
 #include "io/datasets/companions.h"
+#include "platform/file_facts.h"
 #include "scene/mask.h"
 
 namespace ewa::capture {
@@ -29,7 +30,7 @@ void write_mask(const fs::path& from, const ImageSize& size, const fs::path& to)
 
 bool is_newer(const fs::path& a, const fs::path& b) {
     std::error_code error;
-    return !core::is_file(b) || fs::last_write_time(a, error) > fs::last_write_time(b, error);
+    return !core::is_file(b) || platform::write_time(a, error) > platform::write_time(b, error);
 }
 
 /// A line for the user; empty if there are no masks.

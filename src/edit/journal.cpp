@@ -13,6 +13,7 @@
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "platform/file.h"
+#include "platform/file_facts.h"
 
 namespace ewa::edit {
 namespace {
@@ -121,7 +122,7 @@ std::string whole_text(const std::filesystem::path& file) {
 JournalHead head_of(const std::filesystem::path& file, size_t splats) {
     JournalHead head{file.filename().string(), splats};
     std::error_code error;
-    const auto time = std::filesystem::last_write_time(file, error);
+    const auto time = platform::write_time(file, error);
     if (error) return head;
     head.bytes = std::filesystem::file_size(file, error);
     if (!error) head.time = std::to_string(time.time_since_epoch().count());

@@ -21,6 +21,7 @@
 #include "io/splats/ply_table.h"
 #include "live/wire.h"
 #include "platform/file.h"
+#include "platform/file_facts.h"
 
 namespace ewa::live {
 namespace {
@@ -70,8 +71,8 @@ int steps_of(const fs::path& folder) {
 /// A run that continues a finished one leaves that one's summary until it ends itself.
 bool is_done(const fs::path& folder) {
     std::error_code absent, none;
-    const auto summary = fs::last_write_time(folder / folders::kSummaryFile, absent);
-    const auto config = fs::last_write_time(folder / folders::kConfigFile, none);
+    const auto summary = platform::write_time(folder / folders::kSummaryFile, absent);
+    const auto config = platform::write_time(folder / folders::kConfigFile, none);
     return !absent && (none || summary >= config);
 }
 
@@ -380,7 +381,7 @@ void Watcher::read_metrics() {
     const fs::path path = what_.folder / folders::kMetricsFile;
     std::error_code error;
     const std::uintmax_t bytes = fs::file_size(path, error);
-    if (error || bytes == metrics_read_ || fs::last_write_time(path, error) <= what_.metrics_after) return;
+    if (error || bytes == metrics_read_ || platform::write_time(path, error) <= what_.metrics_after) return;
     if (bytes > kLargestMetrics) throw InputError(path.string() + ": too large");
     std::string text = start_of(path, size_t(bytes));
     text.resize(text.rfind('\n') + 1);  // the last line may be half written; npos + 1 is 0
@@ -409,7 +410,7 @@ void Watcher::look_at_files() {
     read_metrics();
     const fs::path path = what_.folder / folders::kSplatsFile;
     std::error_code error;
-    const auto time = fs::last_write_time(path, error);
+    const auto time = platform::write_time(path, error);
     if (error || time <= splats_time_) return;
     auto splats = std::make_shared<const Gaussians>(load_splats(path));
     splats_time_ = time;

@@ -16,6 +16,7 @@
 #include "ewa/synthetic_dataset.h"
 #include "folders/run_folder.h"
 #include "io/datasets/refined_cameras.h"
+#include "platform/file_facts.h"
 #include "scene/looks.h"
 
 namespace ewa::viewer {
@@ -107,7 +108,7 @@ OpenedScene open_run(const folders::Run& run, const fs::path& cameras) {
     const bool splats = !run.splats.empty();
     if (splats) {
         std::error_code error;
-        scene.splats_time = fs::last_write_time(run.splats, error);
+        scene.splats_time = platform::write_time(run.splats, error);
         scene.gaussians = std::make_shared<const Gaussians>(load_splats(run.splats));
     }
     add_cameras(scene, run, cameras, !splats);

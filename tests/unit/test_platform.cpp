@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The calls of the operating system, as the other modules rely on them. Tests of those modules test more.
+#include <chrono>
 #include <cstring>
 #include <string>
 #include <vector>
 
 #include "platform/file.h"
+#include "platform/file_facts.h"
 #include "platform/library.h"
 #include "platform/process.h"
 #include "platform/socket.h"
@@ -71,6 +73,23 @@ TEST(Platform, FilesAreKnownByTheirIds) {
     EXPECT_NE(platform::file_id(folder / "a"), platform::file_id(folder / "b"));
     EXPECT_EQ(platform::file_id(folder.path()), platform::file_id(folder / "."));
     EXPECT_FALSE(platform::file_id(folder / "absent"));
+}
+
+TEST(Platform, WriteTimesAreFinerThanASecond) {
+    const test::TempFolder folder;
+    const auto file = folder.write("a", "x");
+    std::error_code error;
+    const auto first = platform::write_time(file, error);
+    ASSERT_FALSE(error);
+    auto later = first;
+    // Until the clock of the file system goes on.
+    for (int i = 0; later == first; ++i)
+        later = platform::write_time(folder.write("a", std::to_string(i)), error);
+    EXPECT_GT(later, first);
+    EXPECT_NE((later - first) % std::chrono::seconds(1), std::chrono::seconds(0));
+    EXPECT_LT(std::chrono::abs(later - std::filesystem::last_write_time(file)), std::chrono::seconds(1));
+    platform::write_time(folder / "absent", error);
+    EXPECT_EQ(error, std::errc::no_such_file_or_directory);
 }
 
 TEST(Platform, PathsAreMadeOfUtf8) {

@@ -12,6 +12,8 @@
 #include <cstdlib>
 #include <string>
 
+#include "platform/file_facts.h"
+
 namespace ewa::platform {
 namespace {
 
@@ -134,6 +136,10 @@ std::optional<FileId> file_id(const fs::path& path) {
     struct stat status {};
     if (stat(path.c_str(), &status) != 0) return std::nullopt;
     return FileId{uint64_t(status.st_dev), uint64_t(status.st_ino)};
+}
+
+fs::file_time_type write_time(const fs::path& file, std::error_code& error) {
+    return fs::last_write_time(file, error);
 }
 
 // Linux does not follow such links with fs.protected_symlinks, but that rule does not reach a path that the program resolves.

@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cwctype>
 #include <new>
+#include <ratio>
 #include <string>
 #include <vector>
 
+#include "platform/file_facts.h"
 #include "platform/windows/windows.h"
 
 namespace ewa::platform {
@@ -231,6 +234,17 @@ std::optional<FileId> file_id(const fs::path& path) {
     // Folders open with this flag alone.
     const File file(value_of(open_handle(path, 0, OPEN_EXISTING, FILE_FLAG_BACKUP_SEMANTICS)));
     return file.is_open() ? id_of(handle_of(file.handle())) : std::nullopt;
+}
+
+fs::file_time_type write_time(const fs::path& file, std::error_code& error) {
+    using Ticks = std::chrono::duration<int64_t, std::ratio<1, 10'000'000>>;
+    constexpr Ticks kTo1970 = std::chrono::seconds(11'644'473'600);  // from 1601
+    WIN32_FILE_ATTRIBUTE_DATA of{};
+    error = error_unless(GetFileAttributesExW(long_path(file).c_str(), GetFileExInfoStandard, &of));
+    if (error) return fs::file_time_type::min();
+    const Ticks ticks(int64_t(of.ftLastWriteTime.dwHighDateTime) << 32 | of.ftLastWriteTime.dwLowDateTime);
+    return std::chrono::file_clock::from_sys(
+        std::chrono::sys_time<std::chrono::nanoseconds>(ticks - kTo1970));
 }
 
 bool is_strangers_link(const fs::path&) {
