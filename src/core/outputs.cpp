@@ -11,6 +11,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "platform/file.h"
+#include "platform/file_facts.h"
 
 namespace ewa::core {
 namespace {
@@ -21,7 +22,7 @@ namespace fs = std::filesystem;
 /// names below it. Two hard links to one file are the same place.
 struct Place {
     platform::FileId there;
-    std::string rest;
+    fs::path rest;
     auto operator<=>(const Place&) const = default;
 };
 
@@ -32,7 +33,7 @@ Place place_of(const fs::path& path) {
     Place place;
     std::optional<platform::FileId> found = platform::file_id(there);
     for (; !found && there.has_relative_path(); found = platform::file_id(there)) {
-        place.rest = there.filename().string() + "/" + place.rest;
+        place.rest = platform::folded(there.filename() / place.rest);
         there = there.parent_path();
     }
     place.there = found.value_or(platform::FileId());

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "image/image_files.h"
+#include "platform/file_facts.h"
 
 namespace ewa::report {
 namespace {
@@ -82,16 +83,17 @@ std::vector<fs::path> picture_names(const std::vector<Frame>& frames) {
         for (size_t i = shared; i + 1 < name.size(); ++i) folder /= name[i];
         folders.push_back(folder);
         files.push_back(name.back());
-        ++uses[folder / files.back().stem()];
+        ++uses[platform::folded(folder / files.back().stem())];
     }
 
     std::vector<fs::path> names;
     std::set<fs::path> taken;
     for (size_t i = 0; i < frames.size(); ++i) {
         fs::path name = folders[i] / files[i].stem();
-        if (uses[name] > 1) name = folders[i] / files[i];
+        if (uses[platform::folded(name)] > 1) name = folders[i] / files[i];
         fs::path unique = name;
-        for (int n = 2; !taken.insert(unique).second; ++n) unique = name.string() + "-" + std::to_string(n);
+        for (int n = 2; !taken.insert(platform::folded(unique)).second; ++n)
+            unique = name.string() + "-" + std::to_string(n);
         names.emplace_back(unique.generic_string());
     }
     return names;

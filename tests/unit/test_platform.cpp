@@ -101,6 +101,15 @@ TEST(Platform, PathsAreMadeOfUtf8) {
     EXPECT_FALSE(std::filesystem::exists(folder / "\xff\xc3")) << "no UTF-8, and no error";
 }
 
+TEST(Platform, SpellingsOfOneFileAreFolded) {
+    const test::TempFolder folder;
+    folder.write("\xc3\x84.txt", "x");
+    const bool one = std::filesystem::exists(folder / "\xc3\xa4.TXT");
+    EXPECT_EQ(platform::folded(folder / "\xc3\x84.txt") == platform::folded(folder / "\xc3\xa4.TXT"), one);
+    EXPECT_EQ(platform::folded("a/b"), platform::folded(std::filesystem::path("a") / "b"));
+    EXPECT_TRUE(platform::folded({}).empty());
+}
+
 TEST(Platform, AFolderShowsTheFilesOfAnother) {
     const test::TempFolder folder;
     folder.write("from/below/a", "text");

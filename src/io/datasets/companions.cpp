@@ -15,6 +15,7 @@
 #include "ewa/error.h"
 #include "ewa/image.h"
 #include "io/datasets/importers/image_finder.h"
+#include "platform/file_facts.h"
 #include "scene/mask.h"
 
 namespace ewa::io {
@@ -397,7 +398,7 @@ UsedOf used_photos(const ImageRecords& model, const Dataset& dataset) {
     for (const Frame& frame : dataset.frames)
         if (frame.image_exists) used.insert(frame.name);
     for (const ImageRecord& image : model.images) {
-        known.insert(image.path);
+        known.insert(platform::folded(image.path));
         stems.insert(name_key(image.path.stem()));
         if (core::is_file(image.path))
             folders.insert(image.path.parent_path());
@@ -406,7 +407,7 @@ UsedOf used_photos(const ImageRecords& model, const Dataset& dataset) {
     }
     for (const Frame& frame : dataset.frames) {
         if (!frame.image_exists) continue;
-        known.insert({frame.mask_path, frame.depth_path});
+        known.insert({platform::folded(frame.mask_path), platform::folded(frame.depth_path)});
         if (result.used++ > 0) continue;
         const std::string path = frame.image_path.generic_string();
         if (!path.ends_with("/" + frame.name)) continue;
@@ -425,7 +426,7 @@ UsedOf used_photos(const ImageRecords& model, const Dataset& dataset) {
     for (const fs::path& folder : folders)
         for (const fs::path& name : list_images(folder, folder == model.folder)) files.insert(folder / name);
     for (const fs::path& file : files)
-        if (!known.contains(file) && !belongs_to(name_key(file.stem()), stems)) {
+        if (!known.contains(platform::folded(file)) && !belongs_to(name_key(file.stem()), stems)) {
             ++result.found;
             if (unplaced.empty()) unplaced = shown(file) + " has no camera";
         }

@@ -7,6 +7,7 @@
 #include "core/folders.h"
 #include "io/datasets/importers/image_finder.h"
 #include "io/datasets/importers/importer.h"
+#include "platform/file_facts.h"
 
 namespace ewa::io {
 
@@ -19,7 +20,8 @@ std::vector<fs::path> transforms_files(const fs::path& folder) {
     for (const char* name : kUsual)
         if (fs::path file = entry_in(folder, name); core::is_file(file)) files.push_back(std::move(file));
     for (const fs::path& file : files_of_folder(folder))
-        if (is_named_transforms(file) && std::ranges::find(files, file) == files.end() &&
+        if (is_named_transforms(file) &&
+            std::ranges::find(files, platform::folded(file), platform::folded) == files.end() &&
             core::is_file(file) && begins_as_transforms(head_of(file)))
             files.push_back(file);
     return files;

@@ -4,8 +4,8 @@
 #include <unzip.h>
 
 #include <algorithm>
+#include <map>
 #include <optional>
-#include <set>
 
 #include "core/file_reader.h"
 #include "core/folders.h"
@@ -15,6 +15,7 @@
 #include "ewa/error.h"
 #include "folders/run_folder.h"
 #include "platform/file.h"
+#include "platform/file_facts.h"
 
 namespace ewa::io {
 namespace {
@@ -145,12 +146,16 @@ void ZipFiles::State::list(uint64_t file_bytes) {
 
 /// Throws if two entries would be written to one place.
 void ZipFiles::State::check_conflicts() const {
-    std::set<std::string> files;
-    for (const Entry& entry : entries)
-        if (!files.insert(entry.name.string()).second) fail(entry.name.string(), "is there twice");
-    for (const std::string& file : files) {
-        const auto below = files.lower_bound(file + '/');
-        if (below != files.end() && below->starts_with(file + '/')) fail(file, "is both a file and a folder");
+    std::map<fs::path::string_type, std::string> files;  // names, by what the system takes for one
+    for (const Entry& entry : entries) {
+        const std::string file = entry.name.string();
+        if (!files.emplace(platform::folded(entry.name), file).second) fail(file, "is there twice");
+    }
+    for (const auto& [key, file] : files) {
+        const auto folder = key + fs::path::preferred_separator;
+        const auto below = files.lower_bound(folder);
+        if (below != files.end() && below->first.starts_with(folder))
+            fail(file, "is both a file and a folder");
     }
 }
 

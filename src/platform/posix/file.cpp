@@ -142,6 +142,10 @@ fs::file_time_type write_time(const fs::path& file, std::error_code& error) {
     return fs::last_write_time(file, error);
 }
 
+fs::path::string_type folded(const fs::path& path) {
+    return path.native();
+}
+
 // Linux does not follow such links with fs.protected_symlinks, but that rule does not reach a path that the program resolves.
 bool is_strangers_link(const fs::path& link) {
     struct stat of_link {

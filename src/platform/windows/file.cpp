@@ -247,6 +247,17 @@ fs::file_time_type write_time(const fs::path& file, std::error_code& error) {
         std::chrono::sys_time<std::chrono::nanoseconds>(ticks - kTo1970));
 }
 
+fs::path::string_type folded(const fs::path& path) {
+    std::wstring slashes = path.native();
+    std::ranges::replace(slashes, L'/', L'\\');
+    std::wstring text(slashes.size(), L'\0');
+    const int length = int(text.size());
+    if (length > 0)
+        LCMapStringEx(LOCALE_NAME_INVARIANT, LCMAP_UPPERCASE, slashes.data(), length, text.data(), length,
+                      nullptr, nullptr, 0);
+    return text;
+}
+
 bool is_strangers_link(const fs::path&) {
     return false;
 }

@@ -12,6 +12,7 @@
 #include "ewa/error.h"
 #include "folders/run_folder.h"
 #include "io/datasets/image_records.h"
+#include "platform/file_facts.h"
 
 namespace ewa::io {
 
@@ -212,22 +213,24 @@ const std::set<fs::path>& ImageFinder::claimed(size_t place, bool strict) const 
     const auto [at, is_new] = claimed_.try_emplace(place);
     if (is_new)
         for (const fs::path& name : names_)
-            for (fs::path& image : named(place, name, strict)) at->second.insert(std::move(image));
+            for (const fs::path& image : named(place, name, strict))
+                at->second.insert(platform::folded(image));
     return at->second;
 }
 
 std::vector<fs::path> ImageFinder::matches(size_t place, const fs::path& name, bool strict) const {
     const fs::path& folder = places_[place].folder;
     if (core::is_file(folder / name)) return {name};
-    if (const auto there = exact(folder, name); there && !claimed(place, strict).contains(*there))
-        return {*there};
+    const auto is_claimed = [&](const fs::path& image) {
+        return claimed(place, strict).contains(platform::folded(image));
+    };
+    if (const auto there = exact(folder, name); there && !is_claimed(*there)) return {*there};
     std::vector<fs::path> found = named(place, name, strict);
     for (const fs::path& key : {name.filename(), name.stem()}) {
         if (!found.empty()) break;
         found = listed(listing(place).by_stem, place, key, name, strict);
         // What another name is the name of is that one's image.
-        if (!found.empty())
-            std::erase_if(found, [&](const fs::path& each) { return claimed(place, strict).contains(each); });
+        if (!found.empty()) std::erase_if(found, is_claimed);
     }
     return found;
 }
