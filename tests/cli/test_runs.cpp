@@ -395,7 +395,8 @@ TEST_F(Runs, TrainTakesTheDatasetAndTheSplatsOfARun) {
         return read_json(out + "/config.json");
     };
     EXPECT_EQ(config({run}, folder / "a")["dataset"], folder / "data");
-    EXPECT_EQ(config({folder / "data", "--init", run}, folder / "b")["init"], run + "/splats.ply");
+    EXPECT_EQ(with_slashes(config({folder / "data", "--init", run}, folder / "b")["init"]),
+              run + "/splats.ply");
     EXPECT_EQ(load_splats(folder / "b/splats.ply").size(), 50u);
     expect_failure(run_ewa({"train", folder / "data", "--init", folder / "data", "-o", folder / "c"}), 2,
                    "a folder without splats");

@@ -455,8 +455,8 @@ TEST(FoundFiles, PointsInOtherForms) {
         expect_error<InputError>([&] { read(std::string("1 1 2 3 ") + colors + "\n"); },
                                  {"points3D.txt:1:", "colour"});
     read("1 1 2 3 4 5 6 0\n2 nan 0 0 4 5 6 0\n");
-    EXPECT_NE(data.used().find("1 of 2 points (" + (data.folder / "sparse/0/points3D.txt").string() +
-                               ":2 is not finite)"),
+    const std::string file = test::with_slashes((data.folder / "sparse/0/points3D.txt").string());
+    EXPECT_NE(test::with_slashes(data.used()).find("1 of 2 points (" + file + ":2 is not finite)"),
               std::string::npos)
         << data.used();
     // Binary points beside text cameras, and a PLY in place of both.

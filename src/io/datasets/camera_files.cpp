@@ -54,7 +54,7 @@ std::optional<ImageRecords> read_transforms_at(const fs::path& root, const std::
             "transforms_val.json is not used: transforms_test.json has the held-out images");
     const fs::path place = files[0].lexically_proximate(root);
     if (split_of(files[0]) == 0 && place != "transforms.json")
-        all.notes.push_back("the cameras are in " + core::one_line(place.string()));
+        all.notes.push_back("the cameras are in " + core::one_line(place.generic_string()));
     return all;
 }
 
@@ -62,7 +62,7 @@ std::optional<ImageRecords> read_transforms_at(const fs::path& root, const std::
 std::optional<ImageRecords> read_colmap_at(const fs::path& root, const std::vector<ColmapModel>& models) {
     if (models.empty()) return std::nullopt;
     const auto place_of = [&](const ColmapModel& model) {
-        return model.folder.lexically_proximate(root).string();
+        return model.folder.lexically_proximate(root).generic_string();
     };
     const auto shown = [&](const ColmapModel& model) {
         return place_of(model) + " with " + core::counted(model.images, "image") +
@@ -121,8 +121,9 @@ void note_other_cameras(const fs::path& path, ImageRecords& records) {
     const bool is_colmap = records.format == "COLMAP";
     const auto note = [&](const fs::path& other) {
         records.notes.push_back(core::one_line(
-            other.lexically_proximate(path).string() + " has cameras, too: name it to use it in place of " +
-            (is_colmap ? used.parent_path() : used).lexically_proximate(path).string()));
+            other.lexically_proximate(path).generic_string() +
+            " has cameras, too: name it to use it in place of " +
+            (is_colmap ? used.parent_path() : used).lexically_proximate(path).generic_string()));
     };
     for (const fs::path& file : transforms_files(path)) {
         if (std::ranges::find(records.files, file) != records.files.end()) continue;

@@ -414,7 +414,7 @@ UsedOf used_photos(const ImageRecords& model, const Dataset& dataset) {
         const fs::path place =
             fs::path(path.substr(0, path.size() - frame.name.size() - 1)).lexically_relative(dataset.root);
         if (place != "." && place != "images" && !place.empty() && *place.begin() != "..")
-            result.where = core::one_line(place.string());
+            result.where = core::one_line(place.generic_string());
     }
     result.found = model.images.size();
     std::set<fs::path> files;
