@@ -50,10 +50,10 @@ bool is_left_out(const fs::path& name) {
 std::string wrong_name(const std::string& name) {
     if (std::ranges::count_if(name, [](char c) { return c == '/' || c == '\\'; }) > kMostFolders)
         return "is more than " + std::to_string(kMostFolders) + " folders deep";
-    const std::optional<fs::path> inside = core::name_inside(name);
-    if (!inside) return "leads out of the folder";
     if (std::ranges::any_of(name, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }))
         return "has a control character";
+    const std::optional<fs::path> inside = core::name_inside(name);
+    if (!inside) return "leads out of the folder";
     for (const fs::path& part : *inside)
         if (part.string().size() > kLongestPart) return "is too long";
     return {};
@@ -255,7 +255,8 @@ bool ZipFiles::unpack(const fs::path& folder, const std::function<bool(int)>& pr
 std::string named_in_archive(std::string text, const fs::path& unpacked, const fs::path& archive) {
     const std::string folder = unpacked.string();
     for (size_t at = 0; (at = text.find(folder, at)) != text.npos;) {
-        const bool entry = text.compare(at + folder.size(), 1, "/") == 0;
+        const size_t after = at + folder.size();
+        const bool entry = text.find_first_of("/\\", after) == after;
         const std::string name = core::one_line(archive.string()) + (entry ? ": " : "");
         text.replace(at, folder.size() + (entry ? 1 : 0), name);
         at += name.size();
