@@ -2,6 +2,7 @@
 #include "core/messages.h"
 
 #include <spdlog/fmt/fmt.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -58,7 +59,9 @@ void print_warnings() {
     set_log_handler([](LogLevel, std::string_view text) {
         static const std::shared_ptr<spdlog::logger> logger = [] {
             auto made = spdlog::stderr_color_mt("ewa");
-            made->set_pattern("%^%l%$: %v");
+            // Windows' end of a line would be "\r\n".
+            made->set_formatter(std::make_unique<spdlog::pattern_formatter>(
+                "%^%l%$: %v", spdlog::pattern_time_type::local, "\n"));
             return made;
         }();
         logger->warn("{}", text);
