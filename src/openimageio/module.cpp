@@ -22,6 +22,8 @@ using ewa::image::StoredImage;
 }
 
 bool limit(uint64_t decoded_bytes, uint64_t channels) {
+    // No threads of OpenEXR. Its library waits at exit until they have begun, when Windows has already ended them.
+    OIIO::attribute("exr_threads", -1);
     return OIIO::attribute("limits:imagesize_MB", int(decoded_bytes >> 20)) &&
            OIIO::attribute("limits:channels", int(channels));
 }
