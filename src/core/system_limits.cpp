@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/system_limits.h"
 
-#include <latch>
+#include <mutex>
 #include <system_error>
 #include <thread>
 #include <vector>
@@ -20,14 +20,16 @@ bool has_room(uint64_t bytes, int threads) {
     const platform::Reservation reserved(bytes);
     if (!reserved) return false;
     bool started = true;
-    std::latch end(1);
+    // The threads wait for this lock. A std::latch may wait for ever with MinGW, whose atomics miss a notification.
+    std::mutex end;
+    std::unique_lock held(end);
     std::vector<std::jthread> all;
     try {
-        for (int i = 0; i < threads; ++i) all.emplace_back([&end] { end.wait(); });
+        for (int i = 0; i < threads; ++i) all.emplace_back([&end] { const std::lock_guard waits(end); });
     } catch (const std::system_error&) {
         started = false;
     }
-    end.count_down();
+    held.unlock();
     return started;
 }
 

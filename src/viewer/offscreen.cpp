@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "viewer/offscreen.h"
 
-#include <atomic>
+#include <condition_variable>
 #include <cstdlib>
 #include <exception>
+#include <mutex>
 
 #include "core/folders.h"
 #include "ewa/error.h"
@@ -15,10 +16,14 @@ void write_without_window(const Startup& startup) {
     if (!startup.picture.empty() && startup.settings.comparison != Comparison::none)
         throw InputError("--compare needs a desktop session; ewa render and ewa compare do not");
     const Size size = startup.size.value_or(camera_size_or_usual(startup));
-    std::atomic<uint64_t> news = 0;
-    RenderThread thread(startup.open_device, [&news] {
+    // No std::atomic: that of MinGW misses notifications.
+    std::mutex mutex;
+    std::condition_variable came;
+    uint64_t news = 0;
+    RenderThread thread(startup.open_device, [&] {
+        const std::lock_guard lock(mutex);
         ++news;
-        news.notify_one();
+        came.notify_one();
     });
     thread.set_scene(startup.scene.gaussians);
     uint64_t asked = 0;
@@ -37,8 +42,11 @@ void write_without_window(const Startup& startup) {
             write(scene::fitted(film.frame(i, frames), size.width, size.height), frame_file(startup.film, i));
     }
     for (uint64_t seen = 0, done = 0; done < asked;) {
-        news.wait(seen);
-        seen = news;
+        {
+            std::unique_lock lock(mutex);
+            came.wait(lock, [&] { return news != seen; });
+            seen = news;
+        }
         for (const ExtraDone& one : thread.take_news().extras) {
             if (one.failure) std::rethrow_exception(one.failure);
             ++done;
