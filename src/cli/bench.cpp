@@ -56,7 +56,9 @@ std::vector<std::string> options_given(const CLI::App& app) {
 
 /// The program beside this one. Throws RunError if it is not there.
 fs::path ewa_bench() {
-    const fs::path program = core::own_program().replace_filename("ewa-bench");
+    const fs::path own = core::own_program();
+    fs::path program = own.parent_path() / "ewa-bench";
+    if (own.extension() == ".exe") program += ".exe";
     if (!core::is_file(program))
         throw RunError(program.string() + ": is missing; install it there, or make it with scripts/build");
     return program;
