@@ -27,6 +27,13 @@ Image noise(int width, int height, int channels, unsigned seed, float low = 0, f
     return image;
 }
 
+/// Ends the threads of OpenImageIO before the program ends. MinGW's build of it would wait for them without waking them.
+class NoThreads : public testing::Environment {
+  public:
+    void TearDown() override { OIIO::attribute("threads", 1); }
+};
+[[maybe_unused]] testing::Environment* const no_threads = testing::AddGlobalTestEnvironment(new NoThreads);
+
 /// As OpenImageIO writes it, for the kinds of file that save_image does not make.
 template <class T>
 void write_file(const std::filesystem::path& path, int width, int height, int channels, OIIO::TypeDesc type,
@@ -109,6 +116,7 @@ TEST(ImageFiles, AlphaDoesNotTouchColour) {
 }
 
 TEST(ImageFiles, GreyAndDeepFiles) {
+    if (!OIIO::ImageOutput::create("a.png")) GTEST_SKIP() << "OpenImageIO writes no PNG here";
     TempFolder folder;
     write_file<uint8_t>(folder / "grey.png", 2, 1, 1, OIIO::TypeDesc::UINT8, {10, 200});
     const Image grey = load_image(folder / "grey.png");
@@ -159,9 +167,7 @@ TEST(ImageFiles, ReadsNoPartOfATruncatedFile) {
     const Image image = noise(5, 4, 3, 2);
     save_image(folder / "a.png", image);
     save_image(folder / "a.exr", image);
-    std::vector<uint8_t> bytes(16 * 16 * 3);
-    for (size_t i = 0; i < bytes.size(); ++i) bytes[i] = uint8_t(i * 37);
-    write_file(folder / "a.jpg", 16, 16, 3, OIIO::TypeDesc::UINT8, bytes);
+    save_image(folder / "a.jpg", noise(16, 16, 3, 3));
     for (const char* name : {"a.png", "a.exr", "a.jpg"}) {
         const auto path = folder / name;
         const std::string whole = test::file_bytes(path);

@@ -33,7 +33,7 @@ void write_jpeg(const std::filesystem::path& path, int components, J_COLOR_SPACE
     jpeg_error_mgr errors{};
     jpeg.err = jpeg_std_error(&errors);
     jpeg_create_compress(&jpeg);
-    std::FILE* file = std::fopen(path.c_str(), "wb");
+    std::FILE* file = std::fopen(path.string().c_str(), "wb");
     jpeg_stdio_dest(&jpeg, file);
     jpeg.image_width = kWidth;
     jpeg.image_height = kHeight;

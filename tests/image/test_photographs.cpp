@@ -56,6 +56,7 @@ TEST(SyntheticDataset, OfSeveralCamerasAndSizes) {
 }
 
 TEST(SyntheticDataset, StayAsStoredWhereTheModelHasTheStoredShape) {
+    if (!OIIO::ImageOutput::create("a.jpg")) GTEST_SKIP() << "OpenImageIO writes no JPEG here";
     const Capture capture("a.tif");
     for (int orientation : {3, 6}) {
         for (const char* name : {"a.tif", "a.jpg"}) {
@@ -128,6 +129,7 @@ TEST(SyntheticDataset, DeepAndLinearFilesKeepTheirValues) {
     std::vector<uint16_t> words(5 * 4 * 3);
     for (size_t i = 0; i < words.size(); ++i) words[i] = uint16_t(i * 1001);
     auto output = OIIO::ImageOutput::create("b.png");
+    if (!output) GTEST_SKIP() << "OpenImageIO writes no PNG here";
     ASSERT_TRUE(output->open((capture.folder / "images/b.png").string(),
                              OIIO::ImageSpec(5, 4, 3, OIIO::TypeDesc::UINT16)));
     ASSERT_TRUE(output->write_image(OIIO::TypeDesc::UINT16, words.data()));

@@ -96,9 +96,15 @@ void write(const std::filesystem::path& path, const Kind& kind, const Image& ima
     ASSERT_TRUE(output->close());
 }
 
+/// Whether this machine's OpenImageIO writes such files. That of the downloads writes neither PNG nor JPEG.
+bool is_written(const std::string& name) {
+    return OIIO::ImageOutput::create(name) != nullptr;
+}
+
 class PictureFormat : public testing::TestWithParam<Kind> {};
 
 TEST_P(PictureFormat, KeepsItsPixels) {
+    if (!is_written(GetParam().name)) GTEST_SKIP() << "OpenImageIO writes no " << GetParam().name << " here";
     TempFolder folder;
     const auto path = folder / GetParam().name;
     const Image image = picture(GetParam().channels);
@@ -121,6 +127,7 @@ TEST_P(PictureFormat, KeepsItsPixels) {
 }
 
 TEST_P(PictureFormat, IsWholeOrAnError) {
+    if (!is_written(GetParam().name)) GTEST_SKIP() << "OpenImageIO writes no " << GetParam().name << " here";
     TempFolder folder;
     const auto path = folder / GetParam().name;
     write(path, GetParam(), picture(GetParam().channels));
@@ -384,7 +391,7 @@ TEST(Heif, BecomesJpegWithItsExif) {
     spec.attribute("Make", "Apple");
     spec.attribute("Exif:FocalLength", 4.25f);
     spec.attribute("Exif:FocalLengthIn35mmFilm", 26);
-    const std::string heif = folder / "a.heic", jpeg = folder / "a.jpg";
+    const std::string heif = (folder / "a.heic").string(), jpeg = (folder / "a.jpg").string();
     const auto output = OIIO::ImageOutput::create(heif);
     if (!output || !output->open(heif, spec)) GTEST_SKIP() << "OpenImageIO writes no HEIC here";
     std::vector<uint8_t> pixels(64 * 48 * 3);
