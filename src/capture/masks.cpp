@@ -5,6 +5,7 @@
 #include "capture/steps.h"
 #include "core/folders.h"
 #include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/image.h"
 #include "io/datasets/companions.h"
