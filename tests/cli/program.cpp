@@ -80,12 +80,14 @@ bool has_bytes(const std::string& path) {
     return !error && size > 0;
 }
 
-/// Without what the counters of a coverage build say where a full disk, or none for them, stops them too.
-std::string without_counters(const std::string& text) {
+/// Without what the counters of a coverage build say where a full disk, or none for them, stops them too, and without what Wine
+/// says of its own threads while a program ends.
+std::string without_noise(const std::string& text) {
     std::istringstream lines(text);
     std::string kept;
     for (std::string line; std::getline(lines, line);)
-        if (!line.starts_with("libgcov profiling error:") && !line.starts_with("profiling:"))
+        if (!line.starts_with("libgcov profiling error:") && !line.starts_with("profiling:") &&
+            !line.starts_with("wine client error:"))
             kept += line + (lines.eof() ? "" : "\n");
     return kept;
 }
@@ -145,7 +147,7 @@ Outcome run_ewa(const std::vector<std::string>& arguments, const Circumstances& 
     Outcome outcome;
     outcome.status = wait_for(child, circumstances);
     if (circumstances.out_path.empty()) outcome.out = read_file(out);
-    if (circumstances.err_path.empty()) outcome.err = without_counters(read_file(err));
+    if (circumstances.err_path.empty()) outcome.err = without_noise(read_file(err));
     if (tested)  // may be a program for Windows, whose paths have other separators
         for (std::string* text : {&outcome.out, &outcome.err})
             std::replace(text->begin(), text->end(), '\\', '/');
