@@ -6,7 +6,7 @@
 namespace ewa::platform {
 
 /// Call it first in main(). Opens the null file for each of the standard streams that is closed: without this, the next opened file
-/// would get its number, and messages would be written into this file. Freed memory stays with the process. Windows: the arguments become UTF-8, the streams and
+/// would get its number, and messages would be written into this file. Windows: the arguments become UTF-8, the streams and
 /// files keep their bytes, and the console shows UTF-8.
 void begin_program(int& argc, char**& argv);
 

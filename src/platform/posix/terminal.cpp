@@ -4,9 +4,6 @@
 #include <fcntl.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
-#ifdef __GLIBC__
-#include <malloc.h>
-#endif
 
 #include <cstdlib>
 #include <string>
@@ -30,13 +27,6 @@ void begin_program(int&, char**&) {
     int descriptor = open("/dev/null", O_RDWR);
     while (descriptor >= 0 && descriptor <= STDERR_FILENO) descriptor = open("/dev/null", O_RDWR);
     if (descriptor >= 0) close(descriptor);
-#ifdef __GLIBC__
-    // glibc comes to these values itself, but only after a block of this size was freed. Until then each image is fresh memory, whose
-    // pages the system clears.
-    constexpr int kLargestKept = 32 << 20;  // bytes
-    mallopt(M_MMAP_THRESHOLD, kLargestKept);
-    mallopt(M_TRIM_THRESHOLD, 2 * kLargestKept);
-#endif
 }
 
 bool is_terminal(Stream stream) {
