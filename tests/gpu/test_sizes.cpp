@@ -362,7 +362,9 @@ TEST(FrameReserve, KeepsBuffersThatAreLargeEnough) {
 
 TEST(Capacity, GrowsPastWhatWasNeeded) {
     EXPECT_EQ(first_capacity(0), 4096u);
-    EXPECT_EQ(first_capacity(4000), 8000u);
+    EXPECT_EQ(first_capacity(4000), 24000u);
+    EXPECT_EQ(first_capacity(100000), 1u << 18);
+    EXPECT_EQ(first_capacity(1000000), 2000000u);
     EXPECT_EQ(first_capacity(1u << 30), 1u << 24);
     EXPECT_EQ(grown_capacity(1000), 1125u);
     EXPECT_GT(grown_capacity(0xe0000000u - 1000), 0xe0000000u - 1000);
