@@ -71,6 +71,13 @@ vec4 first_texel(uint instance, uint at) {
     return texel;
 }
 
+// The lane's first pixel.
+uvec2 first_pixel(uint tile) {
+    const uint lane = LANE;
+    return uvec2(TILE_WIDTH, TILE_HEIGHT) * uvec2(tile % push.tiles[0], tile / push.tiles[0]) +
+           uvec2(lane % TILE_WIDTH, lane / TILE_WIDTH);
+}
+
 // exp(-2 (u_step^2 + v_step^2)). record1: as projected.
 float ratio_step_of(vec4 record1) {
     const float u_step = record1.x * record1.y * float(ROW_STEP), v_step = record1.z * float(ROW_STEP);

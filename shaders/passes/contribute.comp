@@ -28,9 +28,7 @@ float subgroup_most(float x) {
 void main() {
     const uint tile = gl_WorkGroupID.x * push.tile_step[0] + gl_WorkGroupID.y * push.tile_step[1];
     if (tile >= push.tiles[0] * push.tiles[1]) return;
-    const uint lane = LANE;
-    const uint px = (tile % push.tiles[0]) * TILE_WIDTH + lane % TILE_WIDTH;
-    const uint py = (tile / push.tiles[0]) * TILE_HEIGHT + lane / TILE_WIDTH;
+    const uint lane = LANE, px = first_pixel(tile).x, py = first_pixel(tile).y;
     const vec2 pixel = vec2(px, py) + 0.5;
 
     float T[PIXELS];
