@@ -47,15 +47,11 @@ void FrameRun::record(const passes::Recorder& recorder) {
 }
 
 void FrameRun::run() {
-    counts_ = run_until_it_fits(cache_, executor_, frame_,
-                                {.splats = model_.splats,
-                                 .width = inputs_.camera.width,
-                                 .height = inputs_.camera.height,
-                                 .instances = frame_.instance_capacity,
-                                 .gradients = train_,
-                                 .overlaid = train_,
-                                 .rays = plan_.rays()},
-                                [&](const passes::Recorder& on) { record(on); });
+    FrameRequest size = frame_request(plan_, inputs_.camera.width, inputs_.camera.height);
+    size.splats = model_.splats;
+    size.instances = frame_.instance_capacity;
+    counts_ =
+        run_until_it_fits(cache_, executor_, frame_, size, [&](const passes::Recorder& on) { record(on); });
 }
 
 void FrameRun::run_forward() {
@@ -87,7 +83,11 @@ void FrameRun::run_update() {
 }
 
 std::vector<uint32_t> FrameRun::sorted_splats() const {
-    return sorted_.splats->download<uint32_t>(counts_.instances);
+    std::vector<uint32_t> splats = sorted_.splats->download<uint32_t>(counts_.instances);
+    if (!frame_.slots_emitted()) return splats;
+    std::vector<uint32_t> sorted = sorted_.indices->download<uint32_t>(counts_.instances);
+    for (uint32_t& index : sorted) index = index < splats.size() ? splats[index] : ~0u;
+    return sorted;
 }
 
 std::vector<uint32_t> FrameRun::tile_starts() const {

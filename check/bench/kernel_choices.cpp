@@ -54,6 +54,9 @@ void set_choice(passes::KernelConfig& config, const std::string& choice, const g
     } else if (name == "sort") {
         config.ranked_sort = one_of<bool>(choice, value, {{"ranked", true}, {"counted", false}});
         if (config.ranked_sort && !passes::can_rank(limits)) refuse(choice, "what this device can do");
+    } else if (name == "slots") {
+        config.slots = one_of<uint32_t>(
+            choice, value, {{"sorted", shared::SLOTS_SORTED}, {"emitted", shared::SLOTS_EMITTED}});
     } else if (name == "scan") {
         config.scan_turns = number_in(choice, value, 1024);
     } else if (name == "elements") {
@@ -63,7 +66,7 @@ void set_choice(passes::KernelConfig& config, const std::string& choice, const g
     } else if (name == "interleave") {
         config.tile_interleave = number_in(choice, value, 1024);
     } else {
-        refuse(choice, "one of tile, broadcast, sort, scan, elements and interleave with a value");
+        refuse(choice, "one of tile, broadcast, sort, slots, scan, elements and interleave with a value");
     }
 }
 

@@ -4,6 +4,7 @@
 // A batch is evaluated in blocks of BLOCK splats. A block is unrolled. On a GPU, unrolling all blocks would outgrow the
 // instruction cache. On a CPU, shuffles are fast only with constant lanes.
 // Needs subgroup.glsl. The including pass declares `push` (BlendPush), records, splats and tile_starts before this file.
+// With BINDING_INDICES it may have SLOTS_EMITTED: splats are in the order of emission too then.
 #ifndef EWA_LIB_TILE
 #define EWA_LIB_TILE
 #include "lib/density.glsl"
@@ -59,8 +60,16 @@ struct LaneSplat {
     float part;  // of the tile, with PARTS
 };
 
+#ifdef BINDING_INDICES
+layout(set = 0, binding = BINDING_INDICES, scalar) readonly buffer Indices { uint indices[]; };
+layout(constant_id = SPEC_SLOTS) const uint SLOTS = SLOTS_SORTED;
+#define slot_of(INSTANCE) (SLOTS == SLOTS_EMITTED ? indices[INSTANCE] : (INSTANCE))
+#else
+#define slot_of(INSTANCE) (INSTANCE)
+#endif
+
 uint splat_of(uint instance) {
-    const uint word = splats[instance];
+    const uint word = splats[slot_of(instance)];
     return PARTS != 0u ? word & ((1u << PART_SHIFT) - 1u) : word;
 }
 

@@ -56,11 +56,11 @@ void write_other_slots(uint k, uint end, uint tile) {
     if (tile + 1u == push.tiles[0] * push.tiles[1]) {
         const uint all = tile_starts[tile + 2u];
         for (uint e = end; e < all; e += SUBGROUP) {
-            if (e + lane < all) write_slot(e + lane, NO_GRADIENT);
+            if (e + lane < all) write_slot(slot_of(e + lane), NO_GRADIENT);
         }
     }
     for (; k < end; k += SUBGROUP) {
-        if (k + lane < end) write_slot(k + lane, NO_GRADIENT);
+        if (k + lane < end) write_slot(slot_of(k + lane), NO_GRADIENT);
     }
 }
 #endif

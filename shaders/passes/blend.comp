@@ -4,6 +4,7 @@
 // One workgroup is one subgroup and owns one tile. It reads the tile's range of the sorted splats and their records,
 // and writes the tile's pixels in the image planes. SPEC_MODE: BLEND_*.
 #extension GL_GOOGLE_include_directive : require
+#define BINDING_INDICES 4
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
 

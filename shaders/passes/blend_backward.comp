@@ -4,9 +4,10 @@
 // dL/d(alpha) = T c . dL/dC - R / (1 - alpha). R starts as C . dL/dC, and each splat subtracts its own share.
 // So no value is divided by 1 - alpha again and again.
 // One workgroup is one subgroup and owns one tile. It reads the tile's sorted splats, their records, the image planes
-// and dL/d(image). It writes the gradient slots of the tile's instances, each slot once. Slots are in sorted order.
+// and dL/d(image). It writes the gradient slots of the tile's instances, each slot once. Slots are in the order of SPEC_SLOTS.
 // SPEC_MODE: BLEND_BACKWARD_* bits.
 #extension GL_GOOGLE_include_directive : require
+#define BINDING_INDICES 6
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
 
@@ -129,7 +130,7 @@ void main() {
                 slot[i] = first == 0u || lane / BLOCK == first / BLOCK ? sum : slot[i];
             }
         }
-        if (k + lane < end) write_slot(k + lane, slot);
+        if (k + lane < end) write_slot(slot_of(k + lane), slot);
         bool open = false;
         [[unroll]] for (uint p = 0; p < PIXELS; ++p) open = open || T[p] > 0.0;
         k += SUBGROUP;

@@ -5,6 +5,7 @@
 // raises largest[splat], the bits of a float of at least zero. Such floats are ordered as their bits are, and the order of
 // maxima does not matter.
 #extension GL_GOOGLE_include_directive : require
+#define BINDING_INDICES 4
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
 

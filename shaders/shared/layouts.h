@@ -24,6 +24,7 @@ EWA_UINT(SPEC_NEAREST, 13u);       // spheres that a pixel draws, at least 1
 EWA_UINT(SPEC_PARTS, 14u);         // 1: an instance counts in one part of its tile: see PART_SIZE
 EWA_UINT(SPEC_LENSES, 15u);        // LENSES_*: what a camera is
 EWA_UINT(SPEC_WRAP, 16u);          // 1: the image's left and right border are one line of the scene
+EWA_UINT(SPEC_SLOTS, 17u);         // SLOTS_*: the order of the gradient slots
 
 // ---- A splat's parameters ----
 // Flat float f is component f % 4 of texel plane f / 4. Splats are stored in blocks of PARAM_BLOCK. Within a
@@ -180,6 +181,11 @@ EWA_UINT(WRITE_MOMENTS, 1u);  // one of the two in float32, or both in one
 EWA_UINT(BROADCAST_SHUFFLES, 0u);  // one splat a lane, in registers
 EWA_UINT(BROADCAST_SHARED, 1u);    // in shared memory
 EWA_UINT(BROADCAST_UNIFORM, 2u);   // every lane loads every splat: free where uniform loads are scalar
+
+// ---- SPEC_SLOTS ----
+EWA_UINT(SLOTS_SORTED, 0u);  // as the tiles' lists; indices[i]: where emitted instance i is in the lists
+EWA_UINT(SLOTS_EMITTED,
+         1u);  // as the instances were emitted; indices[k]: which of them entry k of the lists is
 
 // ---- Where a grand total or a sum is written ----
 // ScanTotalsPush.total

@@ -146,7 +146,7 @@ shared::BlendPush push_of(const passes::Recorder& on, const BlendFrame& f) {
 void record_blend(const passes::Recorder& on, const BlendFrame& f, uint32_t mode) {
     for (uint32_t group = 0; group < f.groups(); ++group) {
         if (group > 0) record_collect(on, f, group, mode | shared::COLLECT_FEATURES);
-        on.record(passes::Blend{buffers_of(f, group)}, push_of(on, f),
+        on.record(passes::Blend{buffers_of(f, group), f.frame.instance_splats[1]}, push_of(on, f),
                   blend_variant(f, has_fourth(f, group) ? shared::BLEND_DEPTH : shared::BLEND_COLOR));
     }
 }
@@ -328,7 +328,8 @@ void record_gradient(const passes::Recorder& on, const BlendFrame& f, uint32_t g
         gather |= shared::GATHER_FOURTH;
     }
     if (f.groups() > 1) record_collect(on, f, group, shared::COLLECT_FEATURES);
-    on.record(passes::BlendBackward{{buffers_of(f, group), f.frame.image_gradient, f.frame.slots}},
+    on.record(passes::BlendBackward{{buffers_of(f, group), f.frame.image_gradient, f.frame.slots},
+                                    f.frame.instance_splats[1]},
               push_of(on, f), blend_variant(f, blend));
     record_gather(on, f, kGroup * group, gather);
 }

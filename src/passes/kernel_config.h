@@ -30,7 +30,8 @@ struct KernelConfig {
     uint32_t loop_limit = 65535;   // iterations of a loop in one invocation
     uint32_t broadcast = shared::BROADCAST_SHUFFLES;  // of blending: SPEC_BROADCAST
     uint32_t frames_in_flight = 1;                    // training steps that are submitted and not finished
-    bool texel_buffers = true;  // read-only buffers are texel buffers, or storage buffers
+    uint32_t slots = shared::SLOTS_SORTED;  // of frames that may choose (FrameRequest::splatting): SPEC_SLOTS
+    bool texel_buffers = true;              // read-only buffers are texel buffers, or storage buffers
     /// Modules that the build has made faster to compile. They change no byte. Tests compare them with whole ones.
     bool optimised_modules = true;
     /// Smaller alphas are skipped. Benchmarks change it to compare speed.

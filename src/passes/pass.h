@@ -139,7 +139,7 @@ class PassCache {
     const KernelConfig& config() const { return config_; }
 
     /// variant: the shader's specialisation constants (SPEC_*) that the configuration does not set; SPEC_SHARP,
-    /// SPEC_KERNEL and SPEC_PARTS are 0 without. Throws std::logic_error if one is missing or the shader does not declare it.
+    /// SPEC_KERNEL, SPEC_PARTS and SPEC_SLOTS are 0 without. Throws std::logic_error if one is missing or the shader does not declare it.
     template <class Definition>
     Pass<Definition> get(const Constants& variant = {}) {
         return {pipeline(Definition::shader, Definition::Work::group_size(config_), variant), config_};

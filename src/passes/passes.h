@@ -34,7 +34,7 @@ struct UpdateBuffers {
         params_out, moments1_out, moments2_out, statistics, sorted_indices;
 };
 
-/// Gradient of Project. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (UPDATE_* bits), SPEC_LENSES.
+/// Gradient of Project. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (UPDATE_* bits), SPEC_LENSES, SPEC_SLOTS.
 struct Update : UpdateBuffers {
     static constexpr char shader[] = "update";
     gpu::BufferPart motion_sums;
@@ -68,7 +68,7 @@ struct ReceiveRecords {
     gpu::BufferPart records, depth_keys, tile_counts;
 };
 
-/// Adds the gradient slots of each listed splat. Variant: SPEC_MODE (0 or UPDATE_ABSOLUTE).
+/// Adds the gradient slots of each listed splat. Variant: SPEC_MODE (0 or UPDATE_ABSOLUTE), SPEC_SLOTS.
 struct SumSlots {
     static constexpr char shader[] = "sum_slots";
     using Work = PerElement<&shared::SumSlotsPush::splats>;
@@ -233,21 +233,24 @@ struct BlendBackwardBuffers : BlendBuffers {
     gpu::BufferPart image_gradient, slots;
 };
 
-/// Blends the splats of every tile into the image planes. Variant: SPEC_MODE (BLEND_*), SPEC_WRAP.
+/// Blends the splats of every tile into the image planes. indices: with SLOTS_EMITTED. Variant: SPEC_MODE (BLEND_*), SPEC_WRAP,
+/// SPEC_SLOTS.
 struct Blend : BlendBuffers {
     static constexpr char shader[] = "blend";
+    gpu::BufferPart indices;
 };
 
-/// Gradient of Blend. Variant: SPEC_MODE (BLEND_BACKWARD_* bits), SPEC_WRAP.
+/// Gradient of Blend. Variant: SPEC_MODE (BLEND_BACKWARD_* bits), SPEC_WRAP, SPEC_SLOTS.
 struct BlendBackward : BlendBackwardBuffers {
     static constexpr char shader[] = "blend_backward";
+    gpu::BufferPart indices;
 };
 
-/// Raises each splat's largest weight at a pixel: the bits of a float a splat. Variant: SPEC_KERNEL, SPEC_WRAP.
+/// Raises each splat's largest weight at a pixel: the bits of a float a splat. Variant: SPEC_KERNEL, SPEC_WRAP, SPEC_SLOTS.
 struct Contribute {
     static constexpr char shader[] = "contribute";
     using Work = PerTile;
-    gpu::BufferPart records, splats, tile_starts, largest;
+    gpu::BufferPart records, splats, tile_starts, largest, indices;
 };
 
 /// Absolute gradients by the means over any number of channels, in slots whose other floats are 0. Variant: SPEC_MODE (the

@@ -61,7 +61,7 @@ void record_instances(const passes::Recorder& on, bool gradients, uint32_t splat
                                     .totals = frame.scan_totals,
                                     .counts = frame.counts,
                                     .keys = frame.instance_keys[frame.tile_sort_start()],
-                                    .splats = frame.instance_splats[frame.tile_sort_start()],
+                                    .splats = frame.emitted_splats(),
                                     .first_instances = frame.first_instances},
               {.splats = splats,
                .capacity = frame.instance_capacity,
@@ -75,15 +75,17 @@ void record_instances(const passes::Recorder& on, bool gradients, uint32_t splat
 
 /// The result is in the second buffers.
 void record_tile_order(const passes::Recorder& on, bool gradients, const FrameBuffers& frame) {
-    // With gradients a splat must find its instances again: their slots are in sorted order.
-    const auto indices = [&](uint32_t i) { return gradients ? &frame.sorted_indices[i] : nullptr; };
+    const bool emitted = frame.slots_emitted(), tracked = gradients && !emitted;
+    const auto& values = emitted ? frame.sorted_indices : frame.instance_splats;
+    // A splat must find its sorted slots again.
+    const auto indices = [&](uint32_t i) { return tracked ? &frame.sorted_indices[i] : nullptr; };
     const uint32_t a = frame.tile_sort_start(), b = 1 - a;
     const Sizes& s = frame.sizes;
     record_sort(on,
                 {.keys = {&frame.instance_keys[a], &frame.instance_keys[b]},
-                 .values = {&frame.instance_splats[a], &frame.instance_splats[b]},
+                 .values = {&values[a], &values[b]},
                  .indices = {indices(a), indices(b)},
-                 .own_indices = false,
+                 .own_indices = emitted,
                  .counters = frame.counters,
                  .counter_prefix = frame.counter_prefix,
                  .digit_totals = frame.digit_totals,
@@ -168,8 +170,9 @@ void FramePasses::contributions(const Sorted& sorted, const gpu::Buffer& largest
     record(passes::Contribute{.records = frame.records,
                               .splats = *sorted.splats,
                               .tile_starts = frame.tile_starts,
-                              .largest = largest},
-           blend_push(cache.config(), frame, inputs.background), {kernel(), wrap()});
+                              .largest = largest,
+                              .indices = sorted.indices ? *sorted.indices : *sorted.splats},
+           blend_push(cache.config(), frame, inputs.background), {kernel(), wrap(), slots()});
 }
 
 Sorted FramePasses::forward(const Model& model) const {

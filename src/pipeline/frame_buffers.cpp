@@ -73,6 +73,7 @@ std::vector<Allocation> overlaid(FrameBuffers& f, const Sizes& s) {
     const Texel floats = Texel::rgba32f, words = Texel::rgba32ui;
     const uint64_t splats = placed(s.splat_words), instances = placed(s.instance_words);
     const uint64_t indices = s.slots > 0 ? s.instance_words : 0;
+    const uint64_t sorted_splats = s.slot_order == shared::SLOTS_SORTED ? s.instance_words : 0;
     return {// The depth sort, which ends in order[0].
             {&f.depth_keys[0], "depth keys", s.splat_words, words, 0},
             {&f.depth_keys[1], "depth keys", s.splat_words, words, splats},
@@ -80,7 +81,7 @@ std::vector<Allocation> overlaid(FrameBuffers& f, const Sizes& s) {
             // The tile sort, which ends in instance_splats[1] and sorted_indices[1].
             {&f.instance_keys[0], "instance keys", s.instance_words, words, 0},
             {&f.instance_keys[1], "instance keys", s.instance_words, words, instances},
-            {&f.instance_splats[0], "instance splats", s.instance_words, words, 2 * instances},
+            {&f.instance_splats[0], "instance splats", sorted_splats, words, 2 * instances},
             {&f.sorted_indices[0], "sorted indices", indices, words, 3 * instances},
             // The loss. It is done with the moments when it blurs their derivatives.
             {&f.moments, "moments", s.moments, floats, 0},
@@ -236,6 +237,7 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
         s.motion_sums = motion_rows * s.motion_items * word;
         s.motion_reduced = motion_rows * s.motion_blocks * word;
     }
+    if (request.gradients && request.splatting) s.slot_order = config.slots;
     if (request.gradients) {
         const uint32_t slot = request.rays ? shared::RAY_SLOT_FLOATS : shared::SLOT_FLOATS;
         s.slots = std::max<uint64_t>(request.instances, 1) * slot * word;

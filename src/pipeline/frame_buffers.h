@@ -24,10 +24,11 @@ struct FrameRequest {
     bool given_gradient = false;
     // With gradients: buffers that are not needed at the same time share memory. All requests of a frame have the same value.
     bool overlaid = false;
-    bool motion = false;    // with gradients: also the gradient of the camera's motion
-    bool readouts = false;  // with motion: also the gradient of the motion during a readout
-    bool rays = false;      // splats are integrated along rays
-    LossWeights loss{};     // with gradients: a term of weight 0 has no buffers
+    bool motion = false;     // with gradients: also the gradient of the camera's motion
+    bool readouts = false;   // with motion: also the gradient of the motion during a readout
+    bool rays = false;       // splats are integrated along rays
+    bool splatting = false;  // blending has the lists and slots that KernelConfig chooses
+    LossWeights loss{};      // with gradients: a term of weight 0 has no buffers
 };
 
 /// How a radix sort is divided into lanes and passes.
@@ -45,7 +46,8 @@ struct Sizes {
     RadixCut depth_sort, tile_sort;
     uint32_t strip_rows = 0;  // tile rows of an emitting lane
     uint32_t image_planes = 0;
-    uint32_t partials = 0;  // partial sums partial sums of a loss kernel
+    uint32_t slot_order = shared::SLOTS_SORTED;  // SPEC_SLOTS
+    uint32_t partials = 0;                       // partial sums partial sums of a loss kernel
     uint32_t reduce_block = 0, reduce_blocks = 0;
     uint32_t ppisp_blocks = 0;  // of pixels, for the gradient of PPISP's values
     uint32_t grid_parts = 0;    // of pixels, for the gradient of the bilateral grid
@@ -94,6 +96,11 @@ struct FrameBuffers {
     /// Which of each two buffers of keys, splats and indices the tile sort reads first. The sort ends in buffer 1. Buffer 0 is
     /// unused afterwards and may be overlaid.
     uint32_t tile_sort_start() const { return sizes.tile_sort.passes % 2 == 0 ? 1 : 0; }
+    /// Whether the tile sort moves the emitted instances' numbers alone. Their splats stay in instance_splats[1].
+    bool slots_emitted() const { return sizes.slot_order == shared::SLOTS_EMITTED; }
+    const gpu::Buffer& emitted_splats() const {
+        return instance_splats[slots_emitted() ? 1 : tile_sort_start()];
+    }
 
     /// Frees the overlay with all buffers in it. Without overlaid, frees the same buffers one by one.
     void free_overlaid();

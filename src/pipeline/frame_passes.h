@@ -20,8 +20,8 @@ struct ViewBuffers;
 
 /// Which of the ping-pong buffers hold the sorted instances after the forward frame.
 struct Sorted {
-    const gpu::Buffer* splats = nullptr;   // each instance's splat
-    const gpu::Buffer* indices = nullptr;  // with gradients: each emitted instance's sorted index and slot
+    const gpu::Buffer* splats = nullptr;   // each instance's splat, in the order of Sizes::slot_order
+    const gpu::Buffer* indices = nullptr;  // with gradients: see SLOTS_SORTED and SLOTS_EMITTED
 };
 
 /// Depths that the loss compares with the render's.
@@ -93,6 +93,7 @@ struct FramePasses : passes::Recorder {
     gpu::SpecConstant degree() const;
     gpu::SpecConstant lenses() const { return {shared::SPEC_LENSES, inputs.camera.lenses}; }
     gpu::SpecConstant wrap() const { return {shared::SPEC_WRAP, inputs.camera.wraps ? 1u : 0u}; }
+    gpu::SpecConstant slots() const { return {shared::SPEC_SLOTS, frame.sizes.slot_order}; }
     gpu::SpecConstant kernel() const { return {shared::SPEC_KERNEL, uint32_t(plan.kernel)}; }
 
   private:
@@ -110,7 +111,7 @@ struct FramePasses : passes::Recorder {
 
 /// The part between projection and blending: depth order, instances, tile order, tile starts. It reads frame's records,
 /// depth_keys[0] and tile_counts, and leaves each tile's splats in instance_splats[1] and tile_starts; with gradients also
-/// sorted_indices[1] and first_instances.
+/// sorted_indices[1] and first_instances. Sizes::slot_order says what is in which order.
 /// wraps: as in CameraUse.
 void record_tile_lists(const passes::Recorder& on, bool gradients, uint32_t splats, const FrameBuffers& frame,
                        bool wraps = false);

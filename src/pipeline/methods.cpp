@@ -17,6 +17,11 @@ gpu::BufferPart marks_or_any(On on, const passes::ProjectBuffers& buffers) {
                            : gpu::BufferPart(*buffers.params.buffer, 0, 16);
 }
 
+/// Only SLOTS_EMITTED reads the indices.
+const gpu::Buffer& indices_or_splats(On on, const passes::BlendBuffers& buffers) {
+    return on.frame.slots_emitted() ? on.frame.sorted_indices[1] : *buffers.splats.buffer;
+}
+
 constexpr MethodPasses kSplats{
     .project =
         [](On on, auto& buffers, auto& push, Mode mode) {
@@ -25,17 +30,19 @@ constexpr MethodPasses kSplats{
         },
     .blend =
         [](On on, auto& buffers, auto& push, Mode mode) {
-            on.record(passes::Blend{buffers}, push, {mode, on.kernel(), on.wrap()});
+            on.record(passes::Blend{buffers, indices_or_splats(on, buffers)}, push,
+                      {mode, on.kernel(), on.wrap(), on.slots()});
         },
     .blend_backward =
         [](On on, auto& buffers, auto& push, Mode mode) {
-            on.record(passes::BlendBackward{buffers}, push, {mode, on.kernel(), on.wrap()});
+            on.record(passes::BlendBackward{buffers, indices_or_splats(on, buffers)}, push,
+                      {mode, on.kernel(), on.wrap(), on.slots()});
         },
     .update =
         [](On on, auto& buffers, auto& push, Mode mode) {
             // A binding that a mode does not use needs a buffer.
             on.record(passes::Update{buffers, on.plan.motion ? on.frame.motion_sums : on.frame.partials},
-                      push, {on.degree(), mode, on.kernel(), on.lenses()});
+                      push, {on.degree(), mode, on.kernel(), on.lenses(), on.slots()});
         }};
 
 constexpr MethodPasses kSpheres{

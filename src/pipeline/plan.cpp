@@ -91,6 +91,7 @@ FrameRequest frame_request(const Plan& plan, uint32_t width, uint32_t height) {
             .overlaid = plan.gradients,
             .motion = plan.motion,
             .rays = plan.rays(),
+            .splatting = plan.method->kind == scene::MethodKind::splat,
             .loss = plan.loss};
 }
 

@@ -154,7 +154,8 @@ void FramePasses::list_backward(uint32_t splats, const Sorted& sorted, const gpu
                             .sums = sums},
            {.splats = splats, .first_index = first_index},
            {{shared::SPEC_MODE, (plan.absolute ? shared::UPDATE_ABSOLUTE : 0) |
-                                    (plan.loss.depth > 0 ? shared::UPDATE_DEPTH : 0)}});
+                                    (plan.loss.depth > 0 ? shared::UPDATE_DEPTH : 0)},
+            slots()});
 }
 
 void FramePasses::update_views(const Model& model, const ViewBuffers& buffers, const Rates& rates,

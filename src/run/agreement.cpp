@@ -57,7 +57,7 @@ uint64_t kernels_of(const gpu::Device& device) {
     const passes::KernelConfig config = passes::config_for(device.limits());
     core::Hash hash;
     for (const uint32_t value : {config.subgroup, config.tile_width, config.tile_height, config.broadcast,
-                                 uint32_t(config.ranked_sort), uint32_t(config.texel_buffers)})
+                                 uint32_t(config.ranked_sort), config.slots, uint32_t(config.texel_buffers)})
         hash.add(value);
     return hash.value();
 }

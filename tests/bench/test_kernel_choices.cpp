@@ -32,6 +32,8 @@ TEST(BenchKernels, ReplaceWhatTheDeviceGets) {
     EXPECT_EQ(config.element_group, 256u);
     EXPECT_EQ(config.tile_interleave, 3u);
     EXPECT_EQ(bench::config_with("tile=4x8", limits_of(4)).tile_width, 4u);
+    EXPECT_EQ(own.slots, shared::SLOTS_SORTED);
+    EXPECT_EQ(bench::config_with("slots=emitted", limits).slots, shared::SLOTS_EMITTED);
 }
 
 TEST(BenchKernels, NamesWhatItCannotUse) {
@@ -52,7 +54,7 @@ TEST(BenchKernels, NamesWhatItCannotUse) {
         EXPECT_EQ(text.find('\n'), std::string::npos);
     }
     for (const char* wrong : {"tile=axb", "tile=0x8", "tile=64x8", "scan", "scan=0", "scan=1025",
-                              "elements=2048", "broadcast=", "sort=fast"}) {
+                              "elements=2048", "broadcast=", "sort=fast", "slots=any"}) {
         const std::string text = message(std::string("interleave=2,") + wrong);
         EXPECT_TRUE(text.starts_with("--kernels: " + std::string(wrong) + ": '")) << wrong << ": " << text;
         EXPECT_NE(text.find("' is not "), std::string::npos) << text;

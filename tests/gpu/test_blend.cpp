@@ -106,7 +106,8 @@ TEST_P(BlendPass, PlanesMatchTheReference) {
             r.cache
                 .get<passes::Blend>(
                     {{shared::SPEC_MODE, with_depth ? shared::BLEND_DEPTH : shared::BLEND_COLOR}})
-                .record(recording, {lists.records, lists.splats, lists.starts, out}, lists.push());
+                .record(recording, {lists.records, lists.splats, lists.starts, out, lists.splats},
+                        lists.push());
         });
         EXPECT_TRUE(out.intact());
         const auto actual = out.read<float>();
@@ -147,7 +148,7 @@ TEST_P(BlendPass, CountsMatchTheReference) {
     Guarded out("planes", uint64_t(lists.sizes.plane_floats) * 5 * 4);
     r.run([&](gpu::Recording& recording) {
         r.cache.get<passes::Blend>({{shared::SPEC_MODE, shared::BLEND_COUNT}})
-            .record(recording, {lists.records, lists.splats, lists.starts, out}, lists.push());
+            .record(recording, {lists.records, lists.splats, lists.starts, out, lists.splats}, lists.push());
     });
     EXPECT_TRUE(out.intact());
     const auto actual = out.read<float>();
@@ -169,7 +170,7 @@ TEST_P(BlendPass, EllipsoidsMatchTheReference) {
     Guarded out("planes", uint64_t(lists.sizes.plane_floats) * 4 * 4);
     r.run([&](gpu::Recording& recording) {
         r.cache.get<passes::Blend>({{shared::SPEC_MODE, shared::BLEND_ELLIPSOIDS}})
-            .record(recording, {lists.records, lists.splats, lists.starts, out}, lists.push());
+            .record(recording, {lists.records, lists.splats, lists.starts, out, lists.splats}, lists.push());
     });
     EXPECT_TRUE(out.intact());
     const reference::Raster expected =
@@ -197,7 +198,7 @@ TEST_P(BlendPass, LargestWeightsMatchTheReference) {
     Guarded largest("largest", before);
     r.run([&](gpu::Recording& recording) {
         r.cache.get<passes::Contribute>().record(
-            recording, {lists.records, lists.splats, lists.starts, largest}, lists.push());
+            recording, {lists.records, lists.splats, lists.starts, largest, lists.splats}, lists.push());
     });
     EXPECT_TRUE(largest.intact());
     const auto expected = reference::largest_weights(lists.cpu.projected, lists.cpu.instances);
@@ -229,7 +230,8 @@ TEST_P(BlendBackwardPass, SlotsAreTheReferencesMoments) {
         slots("slots", std::max<uint64_t>(lists.count(), 1) * shared::SLOT_FLOATS * 4, gpu::Texel::rgba32f);
     r.run([&](gpu::Recording& recording) {
         r.cache.get<passes::BlendBackward>({{shared::SPEC_MODE, shared::BLEND_BACKWARD_ABSOLUTE}})
-            .record(recording, {{{lists.records, lists.splats, lists.starts, planes}, incoming, slots}},
+            .record(recording,
+                    {{{lists.records, lists.splats, lists.starts, planes}, incoming, slots}, lists.splats},
                     lists.push());
     });
     EXPECT_TRUE(slots.intact());
@@ -282,9 +284,11 @@ TEST(BlendBackwardSlots, BehindTheLastTileAreZero) {
         slots("slots", stale, gpu::Texel::rgba32f);
     r.run([&](gpu::Recording& recording) {
         r.cache.get<passes::Blend>({{shared::SPEC_MODE, shared::BLEND_COLOR}})
-            .record(recording, {lists.records, lists.splats, lists.starts, planes}, lists.push());
+            .record(recording, {lists.records, lists.splats, lists.starts, planes, lists.splats},
+                    lists.push());
         r.cache.get<passes::BlendBackward>({{shared::SPEC_MODE, 0}})
-            .record(recording, {{{lists.records, lists.splats, lists.starts, planes}, incoming, slots}},
+            .record(recording,
+                    {{{lists.records, lists.splats, lists.starts, planes}, incoming, slots}, lists.splats},
                     lists.push());
     });
     expect_intact({&slots});
@@ -305,9 +309,11 @@ size_t check_one_tile(const Scene& scene) {
         slots("slots", lists.count() * shared::SLOT_FLOATS * 4, gpu::Texel::rgba32f);
     r.run([&](gpu::Recording& recording) {
         r.cache.get<passes::Blend>({{shared::SPEC_MODE, shared::BLEND_COLOR}})
-            .record(recording, {lists.records, lists.splats, lists.starts, planes}, lists.push());
+            .record(recording, {lists.records, lists.splats, lists.starts, planes, lists.splats},
+                    lists.push());
         r.cache.get<passes::BlendBackward>({{shared::SPEC_MODE, shared::BLEND_BACKWARD_ABSOLUTE}})
-            .record(recording, {{{lists.records, lists.splats, lists.starts, planes}, incoming, slots}},
+            .record(recording,
+                    {{{lists.records, lists.splats, lists.starts, planes}, incoming, slots}, lists.splats},
                     lists.push());
     });
     expect_intact({&planes, &slots});
