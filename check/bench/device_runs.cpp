@@ -84,6 +84,8 @@ void FrameRun::run_update() {
 
 std::vector<uint32_t> FrameRun::sorted_splats() const {
     std::vector<uint32_t> splats = sorted_.splats->download<uint32_t>(counts_.instances);
+    if (frame_.sizes.quads > 0)
+        for (uint32_t& splat : splats) splat &= (1u << shared::PART_SHIFT) - 1;
     if (!frame_.slots_emitted()) return splats;
     std::vector<uint32_t> sorted = sorted_.indices->download<uint32_t>(counts_.instances);
     for (uint32_t& index : sorted) index = index < splats.size() ? splats[index] : ~0u;

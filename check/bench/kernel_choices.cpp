@@ -54,6 +54,11 @@ void set_choice(passes::KernelConfig& config, const std::string& choice, const g
     } else if (name == "sort") {
         config.ranked_sort = one_of<bool>(choice, value, {{"ranked", true}, {"counted", false}});
         if (config.ranked_sort && !passes::can_rank(limits)) refuse(choice, "what this device can do");
+    } else if (name == "quads") {
+        config.quads = number_in(choice, value, 1024);
+        if (config.quads % config.subgroup != 0 || config.quads > passes::most_quads(limits))
+            refuse(choice, "a multiple of " + std::to_string(config.subgroup) + " lanes up to " +
+                               std::to_string(passes::most_quads(limits)));
     } else if (name == "slots") {
         config.slots = one_of<uint32_t>(
             choice, value, {{"sorted", shared::SLOTS_SORTED}, {"emitted", shared::SLOTS_EMITTED}});
@@ -66,7 +71,8 @@ void set_choice(passes::KernelConfig& config, const std::string& choice, const g
     } else if (name == "interleave") {
         config.tile_interleave = number_in(choice, value, 1024);
     } else {
-        refuse(choice, "one of tile, broadcast, sort, slots, scan, elements and interleave with a value");
+        refuse(choice,
+               "one of tile, quads, broadcast, sort, slots, scan, elements and interleave with a value");
     }
 }
 

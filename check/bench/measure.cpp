@@ -127,8 +127,8 @@ void add_ceilings(CaseResult& result, const FrameRun& run, int runs) {
     lists.tile_starts = starts.data();
     lists.width = uint32_t(run.camera().width);
     lists.height = uint32_t(run.camera().height);
-    lists.tile_width = run.cache().config().tile_width;
-    lists.tile_height = run.cache().config().tile_height;
+    lists.tile_width = run.cache().config().tile_width * (sizes.quads > 0 ? 2 : 1);
+    lists.tile_height = run.cache().config().tile_height * (sizes.quads > 0 ? 2 : 1);
     lists.tiles_x = sizes.tiles_x;
     for (size_t c = 0; c < 3; ++c) lists.background[c] = run.options().background[c];
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One subgroup owns one tile. Lane l has column l % TILE_WIDTH and PIXELS pixels of it, ROW_STEP rows apart.
 // A batch is SUBGROUP splats of the tile's list. Each lane loads one; SPEC_BROADCAST says how all lanes come to read it.
+// With SPEC_QUADS a workgroup has the subgroups of a quad. They stage a batch of its list together, and each picks its own.
 // A batch is evaluated in blocks of BLOCK splats. A block is unrolled. On a GPU, unrolling all blocks would outgrow the
 // instruction cache. On a CPU, shuffles are fast only with constant lanes.
 // Needs subgroup.glsl. The including pass declares `push` (BlendPush), records, splats and tile_starts before this file.
@@ -31,11 +32,20 @@ const bool BY_RATIO = SEGMENT >= 4u && SHARP == 0u;
 
 layout(constant_id = SPEC_BROADCAST) const uint BROADCAST = BROADCAST_SHUFFLES;
 const uint BLOCK = SUBGROUP < 8u ? SUBGROUP : 8u;
-shared vec4 shared_batch[BROADCAST == BROADCAST_SHARED ? RECORD_TEXELS * SUBGROUP : 1u];
+layout(constant_id = SPEC_QUADS) const uint QUADS = 0;
+const uint CREW = QUADS != 0u ? QUAD_TILES * SUBGROUP : SUBGROUP;  // invocations of a workgroup
+const uint BATCH = QUADS != 0u ? QUADS : SUBGROUP;
+shared vec4 shared_batch[QUADS != 0u || BROADCAST == BROADCAST_SHARED ? RECORD_TEXELS * BATCH : 1u];
+shared uint shared_words[QUADS != 0u ? BATCH : 1u];                // of the batch; 0 behind the list's end
+shared uint shared_picks[QUADS != 0u ? QUAD_TILES * BATCH : 1u];  // of each tile: the places in the batch of its splats
+shared uint shared_open[QUADS != 0u ? QUAD_TILES : 1u];
+uint open_tiles = (1u << QUAD_TILES) - 1u;  // of a quad: bits of the tiles with an open pixel
 
 // The splat that this lane loaded.
 struct Loaded {
     uint first, end;  // of the batch, and of the tile's list
+    // With QUADS: open_tiles before the batch, number of splats that this subgroup has picked, and where its evaluation ends.
+    uint open, picks, turns;
     vec4 record0, record1, record2;
     float ratio_step;
 };
@@ -68,9 +78,11 @@ layout(constant_id = SPEC_SLOTS) const uint SLOTS = SLOTS_SORTED;
 #define slot_of(INSTANCE) (INSTANCE)
 #endif
 
+const uint SPLAT_BITS = (1u << PART_SHIFT) - 1u;
+
 uint splat_of(uint instance) {
     const uint word = splats[slot_of(instance)];
-    return PARTS != 0u ? word & ((1u << PART_SHIFT) - 1u) : word;
+    return PARTS != 0u || QUADS != 0u ? word & SPLAT_BITS : word;
 }
 
 // Texel 0 of the record of an instance. With PARTS, z is the instance's part: such records have no low digits of the mean.
@@ -80,11 +92,54 @@ vec4 first_texel(uint instance, uint at) {
     return texel;
 }
 
-// The lane's first pixel.
-uvec2 first_pixel(uint tile) {
+// The lane's first pixel. list: of a tile or of a quad.
+uvec2 first_pixel(uint list) {
     const uint lane = LANE;
-    return uvec2(TILE_WIDTH, TILE_HEIGHT) * uvec2(tile % push.tiles[0], tile / push.tiles[0]) +
-           uvec2(lane % TILE_WIDTH, lane / TILE_WIDTH);
+    uvec2 tile = uvec2(list % push.tiles[0], list / push.tiles[0]);
+    if (QUADS != 0u) tile = 2u * tile + uvec2(SUBGROUP_INDEX % 2u, SUBGROUP_INDEX / 2u);
+    return uvec2(TILE_WIDTH, TILE_HEIGHT) * tile + uvec2(lane % TILE_WIDTH, lane / TILE_WIDTH);
+}
+
+// This invocation's place in a batch, where it is below BATCH.
+uint own_place() { return QUADS != 0u ? SUBGROUP_INDEX * SUBGROUP + LANE : LANE; }
+
+// Stages a batch of a quad, and picks the splats that reach this subgroup's tile, in their order. Returns their number, 0 where all
+// pixels of the tile are closed. The ranks are sums over shuffles, since a device may lack ballots.
+uint stage_batch(uint first, uint end) {
+    const uint place = own_place(), own_bit = PART_SHIFT + SUBGROUP_INDEX;
+    if (place < BATCH) {
+        const uint instance = min(first + place, end - 1u), word = splats[slot_of(instance)];
+        const uint at = RECORD_TEXELS * (word & SPLAT_BITS);
+        [[unroll]] for (uint t = 0; t < RECORD_TEXELS; ++t) shared_batch[RECORD_TEXELS * place + t] = fetch(records, at + t);
+        shared_words[place] = first + place < end ? word : 0u;
+    }
+    barrier();
+    const uint reached = (open_tiles >> SUBGROUP_INDEX & 1u) << own_bit;
+    uint picks = 0u;
+    for (uint base = 0u; base < BATCH; base += SUBGROUP) {
+        const uint picked = min(shared_words[base + LANE] & reached, 1u), upto = picks + subgroup_inclusive_sum(picked);
+        if (picked != 0u) shared_picks[SUBGROUP_INDEX * BATCH + upto - 1u] = base + LANE;
+        picks = subgroupShuffle(upto, SUBGROUP - 1u);
+    }
+    subgroupMemoryBarrierShared();
+    subgroupBarrier();
+    return picks;
+}
+
+// Place in the batch of the subgroup's pick j. Behind its last one: 0.
+uint place_of(Loaded own, uint j) { return j < own.picks ? shared_picks[SUBGROUP_INDEX * BATCH + j] : 0u; }
+uint picked_splat(Loaded own, uint j) { return shared_words[place_of(own, j)] & SPLAT_BITS; }
+
+// Whether all pixels of the list's tiles are closed. open: whether one of this lane's is open. Behind it, what the subgroups of
+// a quad have written to shared memory is there to read.
+bool all_closed(bool open) {
+    const bool closed = subgroupAll(!open);
+    if (QUADS == 0u) return closed;
+    if (LANE == 0u) shared_open[SUBGROUP_INDEX] = closed ? 0u : 1u << SUBGROUP_INDEX;
+    barrier();
+    open_tiles = 0u;
+    [[unroll]] for (uint t = 0; t < QUAD_TILES; ++t) open_tiles |= shared_open[t];
+    return open_tiles == 0u;
 }
 
 // exp(-2 (u_step^2 + v_step^2)). record1: as projected.
@@ -98,6 +153,14 @@ Loaded load_batch(uint first, uint end) {
     Loaded own;
     own.first = first;
     own.end = end;
+    if (QUADS != 0u) {
+        own.open = open_tiles;
+        own.picks = own.turns = stage_batch(first, end);
+#ifdef EWA_EMULATE_SUBGROUPS
+        own.turns = BATCH;  // the subgroups of a workgroup stay together
+#endif
+        return own;
+    }
     if (BROADCAST == BROADCAST_UNIFORM) return own;
     const uint lane = LANE;
     const uint instance = min(first + lane, end - 1u);
@@ -144,14 +207,16 @@ vec4 shuffled(vec4 v, uint lane) {
 
 // Splat j of the batch. pixel: centre of the lane's first pixel.
 LaneSplat lane_splat(Loaded own, uint j, vec2 pixel) {
-    if (BROADCAST == BROADCAST_SHUFFLES)
+    if (QUADS == 0u && BROADCAST == BROADCAST_SHUFFLES)
         return lane_splat_of(shuffled(own.record0, j), shuffled(own.record1, j), shuffled(own.record2, j),
                              subgroupShuffle(own.ratio_step, j), pixel);
     vec4 record0, record1, record2;
-    if (BROADCAST == BROADCAST_SHARED) {
-        record0 = shared_batch[RECORD_TEXELS * j];
-        record1 = shared_batch[RECORD_TEXELS * j + 1u];
-        record2 = shared_batch[RECORD_TEXELS * j + 2u];
+    if (QUADS != 0u || BROADCAST == BROADCAST_SHARED) {
+        const uint place = QUADS != 0u ? place_of(own, j) : j;
+        record0 = shared_batch[RECORD_TEXELS * place];
+        record1 = shared_batch[RECORD_TEXELS * place + 1u];
+        record2 = shared_batch[RECORD_TEXELS * place + 2u];
+        if (QUADS != 0u) record1.w = j < own.picks ? record1.w : 0.0;
     } else {
         const uint instance = min(own.first + j, own.end - 1u);
         const uint at = RECORD_TEXELS * splat_of(instance);

@@ -47,20 +47,33 @@ void write_slot(uint index, float slot[12]) {
     }
 }
 
+// The sums of a quad's tiles over the splats that they have picked. They lie apart by place, for the banks of shared memory.
+shared float shared_sums[QUADS != 0u ? QUAD_TILES * SUMS * BATCH : 1u];
+uint sum_at(uint tile, uint sum, uint place) { return (tile * SUMS + sum) * BATCH + place; }
+
+// The sums of the splat at this place of the batch over the tiles that have picked it, in the order of the tiles.
+void add_tiles(Loaded batch, uint place, inout float slot[12]) {
+    const uint picked = shared_words[place] >> PART_SHIFT & batch.open;
+    [[unroll]] for (uint tile = 0; tile < QUAD_TILES; ++tile) {
+        if ((picked >> tile & 1u) == 0u) continue;
+        [[unroll]] for (uint i = 0; i < SUMS; ++i) slot[i] += shared_sums[sum_at(tile, i, place)];
+    }
+}
+
 // The slots that the tile has not reached, from instance k to the end of its list, have gradient zero: they lie behind the
 // last open pixel.
 void write_other_slots(uint k, uint end, uint tile) {
-    const uint lane = LANE;
+    const uint place = own_place();
     // The last tile also clears the slots of instances with the sentinel tile. Every slot of the list is written, so that
     // none keeps values of an earlier frame.
     if (tile + 1u == push.tiles[0] * push.tiles[1]) {
         const uint all = tile_starts[tile + 2u];
-        for (uint e = end; e < all; e += SUBGROUP) {
-            if (e + lane < all) write_slot(slot_of(e + lane), NO_GRADIENT);
+        for (uint e = end; e < all; e += CREW) {
+            if (e + place < all) write_slot(slot_of(e + place), NO_GRADIENT);
         }
     }
-    for (; k < end; k += SUBGROUP) {
-        if (k + lane < end) write_slot(slot_of(k + lane), NO_GRADIENT);
+    for (; k < end; k += CREW) {
+        if (k + place < end) write_slot(slot_of(k + place), NO_GRADIENT);
     }
 }
 #endif

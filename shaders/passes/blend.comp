@@ -1,8 +1,8 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
 // Blends the splats of each tile front to back: C = sum c alpha T + T background.
-// One workgroup is one subgroup and owns one tile. It reads the tile's range of the sorted splats and their records,
-// and writes the tile's pixels in the image planes. SPEC_MODE: BLEND_*.
+// One workgroup is one subgroup and owns one tile; with SPEC_QUADS it is four, and owns a quad. It reads the range of the sorted
+// splats and their records, and writes the pixels in the image planes. SPEC_MODE: BLEND_*.
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_INDICES 4
 #include "lib/prelude.glsl"
@@ -59,7 +59,7 @@ void main() {
     // The condition of the loop comes last: where it comes first, lavapipe runs the body once more behind the last turn.
     if (k < end) do {
         const Loaded batch = load_batch(k, end);
-        UNROLL_BLOCKS for (uint first = 0; first < SUBGROUP; first += BLOCK) {
+        UNROLL_BLOCKS for (uint first = 0; first < (QUADS != 0u ? batch.turns : BATCH); first += BLOCK) {
             [[unroll]] for (uint j = 0; j < BLOCK; ++j) {
                 const LaneSplat s = lane_splat(batch, first + j, pixel);
                 if (MODE == BLEND_ELLIPSOIDS) {
@@ -85,8 +85,8 @@ void main() {
         }
         bool open = false;
         [[unroll]] for (uint p = 0; p < PIXELS; ++p) open = open || T[p] > 0.0;
-        if (subgroupAll(!open)) break;
-        k += SUBGROUP;
+        if (all_closed(open)) break;
+        k += BATCH;
     } while (k < end);
     if (MEDIAN) {
         [[unroll]] for (uint p = 0; p < PIXELS; ++p) T[p] = abs(T[p]);

@@ -3,9 +3,9 @@
 // Gradient of blending, front to back. With R = (what is blended behind a splat) . dL/dC,
 // dL/d(alpha) = T c . dL/dC - R / (1 - alpha). R starts as C . dL/dC, and each splat subtracts its own share.
 // So no value is divided by 1 - alpha again and again.
-// One workgroup is one subgroup and owns one tile. It reads the tile's sorted splats, their records, the image planes
-// and dL/d(image). It writes the gradient slots of the tile's instances, each slot once. Slots are in the order of SPEC_SLOTS.
-// SPEC_MODE: BLEND_BACKWARD_* bits.
+// One workgroup is one subgroup and owns one tile; with SPEC_QUADS it is four, and owns a quad. It reads the sorted splats, their
+// records, the image planes and dL/d(image). It writes the gradient slots of the instances, each slot once, in the order of
+// SPEC_SLOTS. SPEC_MODE: BLEND_BACKWARD_* bits.
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_INDICES 6
 #include "lib/prelude.glsl"
@@ -33,7 +33,7 @@ layout(push_constant, scalar) uniform Push { BlendPush push; };
 void main() {
     const uint tile = gl_WorkGroupID.x * push.tile_step[0] + gl_WorkGroupID.y * push.tile_step[1];
     if (tile >= push.tiles[0] * push.tiles[1]) return;
-    const uint lane = LANE, px = first_pixel(tile).x, py = first_pixel(tile).y;
+    const uint lane = LANE, place = own_place(), px = first_pixel(tile).x, py = first_pixel(tile).y;
     const vec2 pixel = vec2(px, py) + 0.5;
 
     float T[PIXELS], rest[PIXELS], fourth[PIXELS], by_red[PIXELS], by_green[PIXELS], by_blue[PIXELS], red[PIXELS],
@@ -69,7 +69,7 @@ void main() {
     if (k < end) do {
         const Loaded batch = load_batch(k, end);
         float slot[12] = NO_GRADIENT;
-        UNROLL_BLOCKS for (uint first = 0; first < SUBGROUP; first += BLOCK) {
+        UNROLL_BLOCKS for (uint first = 0; first < (QUADS != 0u ? batch.turns : BATCH); first += BLOCK) {
             float sums[12][8];
             [[unroll]] for (uint j = 0; j < BLOCK; ++j) {
                 const LaneSplat s = lane_splat(batch, first + j, pixel);
@@ -125,16 +125,24 @@ void main() {
                 sums[10][j] = absolute.y / float(ROW_STEP);
                 sums[11][j] = fourth_sum;
             }
+            const uint summed = QUADS != 0u ? place_of(batch, first + lane) : 0u;
             [[unroll]] for (uint i = 0; i < SUMS; ++i) {
                 const float sum = transposing_sum(sums[i]);
-                slot[i] = first == 0u || lane / BLOCK == first / BLOCK ? sum : slot[i];
+                if (QUADS == 0u)
+                    slot[i] = first == 0u || lane / BLOCK == first / BLOCK ? sum : slot[i];
+                else if (lane < BLOCK && first + lane < batch.picks)
+                    shared_sums[sum_at(SUBGROUP_INDEX, i, summed)] = sum;
             }
         }
-        if (k + lane < end) write_slot(slot_of(k + lane), slot);
         bool open = false;
         [[unroll]] for (uint p = 0; p < PIXELS; ++p) open = open || T[p] > 0.0;
-        k += SUBGROUP;
-        if (subgroupAll(!open)) break;
+        const bool closed = all_closed(open);
+        if (place < BATCH && k + place < end) {
+            if (QUADS != 0u) add_tiles(batch, place, slot);
+            write_slot(slot_of(k + place), slot);
+        }
+        k += BATCH;
+        if (closed) break;
     } while (k < end);
     write_other_slots(k, end, tile);
 }

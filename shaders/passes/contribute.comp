@@ -1,9 +1,9 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
 // Finds the largest weight alpha * T that each splat has at a pixel of the image.
-// One workgroup is one subgroup and owns one tile. It reads the tile's range of the sorted splats and their records, and
-// raises largest[splat], the bits of a float of at least zero. Such floats are ordered as their bits are, and the order of
-// maxima does not matter.
+// One workgroup is one subgroup and owns one tile; with SPEC_QUADS it is four, and owns a quad. It reads the range of the sorted
+// splats and their records, and raises largest[splat], the bits of a float of at least zero. Such floats are ordered as their bits
+// are, and the order of maxima does not matter.
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_INDICES 4
 #include "lib/prelude.glsl"
@@ -41,7 +41,7 @@ void main() {
     if (k < end) do {
         const Loaded batch = load_batch(k, end);
         float own = 0.0;
-        UNROLL_BLOCKS for (uint first = 0; first < SUBGROUP; first += BLOCK) {
+        UNROLL_BLOCKS for (uint first = 0; first < (QUADS != 0u ? batch.turns : BATCH); first += BLOCK) {
             [[unroll]] for (uint j = 0; j < BLOCK; ++j) {
                 float raw[PIXELS], most = 0.0;
                 column_alphas(lane_splat(batch, first + j, pixel), raw);
@@ -51,12 +51,13 @@ void main() {
                 }
                 most = subgroup_most(most);
                 own = lane == first + j ? most : own;
+                if (QUADS != 0u && lane == 0u && most > 0.0) atomicMax(largest[picked_splat(batch, first + j)], floatBitsToUint(most));
             }
         }
-        if (k + lane < end && own > 0.0) atomicMax(largest[splat_of(k + lane)], floatBitsToUint(own));
+        if (QUADS == 0u && k + lane < end && own > 0.0) atomicMax(largest[splat_of(k + lane)], floatBitsToUint(own));
         bool open = false;
         [[unroll]] for (uint p = 0; p < PIXELS; ++p) open = open || T[p] > 0.0;
-        if (subgroupAll(!open)) break;
-        k += SUBGROUP;
+        if (all_closed(open)) break;
+        k += BATCH;
     } while (k < end);
 }

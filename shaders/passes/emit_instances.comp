@@ -4,7 +4,7 @@
 // One invocation owns the splat at one depth rank, and of its tile rows the strip given by workgroup.z. The strip
 // bounds the loop: a splat may cover more tiles than some drivers allow iterations.
 // It reads the splat's record, tile count and prefix sum, and writes the keys and splats of its instances. A splat's
-// instances are contiguous, in rows from top to bottom.
+// instances are contiguous, in rows from top to bottom. With SPEC_QUADS they are of quads in place of tiles.
 // SPEC_MODE: EMIT_FIRST_INSTANCES also writes where each splat's instances begin.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
@@ -40,13 +40,13 @@ void main() {
 
     uint at = first + count_tiles(f, f.row_begin, begin, size);
     for (uint row = begin; row < end; ++row) {
-        const uvec2 columns = columns_of(f, row, size);
+        const ListRow lists = list_row(f, row, size);
         // The count bounds the writes: project's footprint may be rounded differently from this one, and no instance
         // may land past the splat's own range.
-        for (uint column = columns.x; column < columns.y; ++column) {
+        for (uint column = lists.columns.x; column < lists.columns.y; ++column) {
             if (at < first + count) {
-                keys[at] = row * push.tiles[0] + (WRAP != 0u && column >= push.tiles[0] ? column - push.tiles[0] : column);
-                splats[at] = splat;
+                keys[at] = row * push.tiles[0] + (WRAP != 0u ? column % push.tiles[0] : column);
+                splats[at] = QUADS != 0u ? splat | reached_tiles(lists, column, size) << PART_SHIFT : splat;
             }
             ++at;
         }

@@ -25,6 +25,7 @@ EWA_UINT(SPEC_PARTS, 14u);         // 1: an instance counts in one part of its t
 EWA_UINT(SPEC_LENSES, 15u);        // LENSES_*: what a camera is
 EWA_UINT(SPEC_WRAP, 16u);          // 1: the image's left and right border are one line of the scene
 EWA_UINT(SPEC_SLOTS, 17u);         // SLOTS_*: the order of the gradient slots
+EWA_UINT(SPEC_QUADS, 18u);  // 0, or four tiles share a list, and this is a batch's size: see QUAD_TILES
 
 // ---- A splat's parameters ----
 // Flat float f is component f % 4 of texel plane f / 4. Splats are stored in blocks of PARAM_BLOCK. Within a
@@ -84,6 +85,13 @@ EWA_UINT(SUM_FLOATS_DEPTH, 12u);
 // the instance's splat from PART_SHIFT up. A tile has at most 16 parts.
 EWA_UINT(PART_SIZE, 4u);  // px
 EWA_UINT(PART_SHIFT, 28u);
+
+// ---- Lists of quads, with SPEC_QUADS: two tiles side by side and the two below them share a list ----
+// Bit PART_SHIFT + t of an instance's splat says whether the splat reaches tile t of the quad, row by row. A workgroup has a
+// subgroup for each tile. Together they stage a batch of splats, a multiple of the subgroup and at most one an invocation.
+EWA_UINT(QUAD_TILES, 4u);
+// A splat in a batch has its record, its word, and for each tile a pick and up to 12 sums (lib/tile.glsl, lib/tile_sums.glsl).
+EWA_UINT(QUAD_SPLAT_BYTES, 260u);
 
 // ---- Image planes ----
 // Plane p of pixel (x, y) is float p * plane_floats + y * stride + x.

@@ -37,10 +37,11 @@ void add_bench_options(App& app, BenchOptions& options) {
         ->type_name("N");
     app.add_option("--device", options.device, "Number of the device, or part of its name (see ewa devices)")
         ->type_name("NAME|N");
-    app.add_option(
-           "--kernels", options.kernels,
-           "Use other kernels than those for the device: tile=8x8, broadcast=shuffles|shared|uniform, "
-           "sort=ranked|counted, slots=sorted|emitted, scan=N, elements=N, interleave=N")
+    app.add_option("--kernels", options.kernels,
+                   "Use other kernels than those for the device: tile=8x8, quads=N, "
+                   "broadcast=shuffles|shared|uniform, sort=ranked|counted, slots=sorted|emitted, scan=N, "
+                   "elements=N, "
+                   "interleave=N")
         ->type_name("NAME=VALUE,...");
     app.add_flag("--check", options.check,
                  "Compare the results with the CPU reference; exit with status 1 if one exceeds its bound");

@@ -30,7 +30,9 @@ struct KernelConfig {
     uint32_t loop_limit = 65535;   // iterations of a loop in one invocation
     uint32_t broadcast = shared::BROADCAST_SHUFFLES;  // of blending: SPEC_BROADCAST
     uint32_t frames_in_flight = 1;                    // training steps that are submitted and not finished
-    uint32_t slots = shared::SLOTS_SORTED;  // of frames that may choose (FrameRequest::splatting): SPEC_SLOTS
+    // The next two are of frames with FrameRequest::splatting. Others have sorted slots and lists of tiles.
+    uint32_t slots = shared::SLOTS_SORTED;  // SPEC_SLOTS
+    uint32_t quads = 0;                     // SPEC_QUADS
     bool texel_buffers = true;              // read-only buffers are texel buffers, or storage buffers
     /// Modules that the build has made faster to compile. They change no byte. Tests compare them with whole ones.
     bool optimised_modules = true;
@@ -44,6 +46,14 @@ constexpr uint32_t kRankedBytes = 32768;  // of shared memory, at most, in radix
 inline bool can_rank(const gpu::Limits& limits) {
     return limits.ballots && limits.shared_bytes >= kRankedBytes &&
            limits.max_invocations >= shared::RANKED_SUBGROUPS * limits.subgroup_size;
+}
+
+/// The largest batch of a quad that the device has room for. 0: none.
+inline uint32_t most_quads(const gpu::Limits& limits) {
+    const uint32_t crew = shared::QUAD_TILES * limits.subgroup_size;
+    if (limits.max_invocations < crew) return 0;
+    const uint32_t room = limits.shared_bytes / shared::QUAD_SPLAT_BYTES;
+    return std::min(crew, room / limits.subgroup_size * limits.subgroup_size);
 }
 
 /// Throws std::logic_error unless the subgroup size is a power of two up to 64.

@@ -47,8 +47,9 @@ const gpu::Pipeline& PassCache::pipeline(std::string_view shader, uint32_t group
                            {shared::SPEC_BROADCAST, config_.broadcast},
                            {shared::SPEC_CUT_OFF, std::bit_cast<uint32_t>(config_.cut_off)}};
     constants.insert(constants.end(), variant.begin(), variant.end());
-    for (const uint32_t optional : {shared::SPEC_SHARP, shared::SPEC_KERNEL, shared::SPEC_PARTS,
-                                    shared::SPEC_LENSES, shared::SPEC_WRAP, shared::SPEC_SLOTS})
+    for (const uint32_t optional :
+         {shared::SPEC_SHARP, shared::SPEC_KERNEL, shared::SPEC_PARTS, shared::SPEC_LENSES, shared::SPEC_WRAP,
+          shared::SPEC_SLOTS, shared::SPEC_QUADS})
         if (std::ranges::find(variant, optional, &gpu::SpecConstant::id) == variant.end())
             constants.push_back({optional, 0});
     const bool pinhole =

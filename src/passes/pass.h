@@ -69,6 +69,16 @@ struct PerTile : OneSubgroup<shared::BlendPush> {
     static Groups groups(const KernelConfig& config, const Push& push) { return tile_groups(config, push); }
 };
 
+/// Four subgroups a quad, of a pass that otherwise has one a tile. Variant: SPEC_QUADS too.
+template <class PassOfTiles>
+struct OfQuads : PassOfTiles {
+    struct Work : PerTile {
+        static uint32_t group_size(const KernelConfig& config) {
+            return shared::QUAD_TILES * config.subgroup;
+        }
+    };
+};
+
 /// Strips of a tile, in each of which a lane has one pixel.
 inline uint32_t strips_of(const KernelConfig& config) {
     return config.tile_width * config.tile_height / config.subgroup;
@@ -139,7 +149,7 @@ class PassCache {
     const KernelConfig& config() const { return config_; }
 
     /// variant: the shader's specialisation constants (SPEC_*) that the configuration does not set; SPEC_SHARP,
-    /// SPEC_KERNEL, SPEC_PARTS and SPEC_SLOTS are 0 without. Throws std::logic_error if one is missing or the shader does not declare it.
+    /// SPEC_KERNEL, SPEC_PARTS, SPEC_SLOTS and SPEC_QUADS are 0 without. Throws std::logic_error if one is missing or the shader does not declare it.
     template <class Definition>
     Pass<Definition> get(const Constants& variant = {}) {
         return {pipeline(Definition::shader, Definition::Work::group_size(config_), variant), config_};

@@ -14,7 +14,7 @@ struct ProjectBuffers {
 };
 
 /// Projects every splat into pixels. marks: a byte a splat. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (PROJECT_* bits),
-/// SPEC_LENSES, SPEC_WRAP.
+/// SPEC_LENSES, SPEC_WRAP, SPEC_QUADS.
 struct Project : ProjectBuffers {
     static constexpr char shader[] = "project";
     gpu::BufferPart marks;
@@ -47,7 +47,7 @@ struct UpdateRays : UpdateBuffers {
 
 // A batch of views. Each view has a list of the splats that reach a tile of it.
 
-/// Counts the tiles of a view's band that each splat reaches, after Project. Variant: SPEC_WRAP.
+/// Counts the tiles of a view's band that each splat reaches, after Project. Variant: SPEC_WRAP, SPEC_QUADS.
 struct BandTiles {
     static constexpr char shader[] = "band_tiles";
     using Work = PerElement<&shared::BandTilesPush::splats>;
@@ -61,7 +61,7 @@ struct CollectVisible {
     gpu::BufferPart records, tile_counts, prefix, totals, list_indices, visible;
 };
 
-/// Depth keys and tile counts of a list of records. Variant: SPEC_WRAP.
+/// Depth keys and tile counts of a list of records. Variant: SPEC_WRAP, SPEC_QUADS.
 struct ReceiveRecords {
     static constexpr char shader[] = "receive_records";
     using Work = PerElement<&shared::ReceivePush::splats>;
@@ -198,7 +198,7 @@ struct RadixScatterRanked : ScatterBuffers {
 };
 
 /// Writes the (splat, tile) instances in depth order, each layer for a strip of tile rows. Variant: SPEC_MODE
-/// (0 or EMIT_FIRST_INSTANCES), SPEC_WRAP.
+/// (0 or EMIT_FIRST_INSTANCES), SPEC_WRAP, SPEC_QUADS.
 struct EmitInstances {
     static constexpr char shader[] = "emit_instances";
     struct Work : ElementGroup<shared::EmitPush> {

@@ -70,7 +70,8 @@ void record_instances(const passes::Recorder& on, bool gradients, uint32_t splat
                .size = {s.width, s.height},
                .tiles = {s.tiles_x, s.tiles_y}},
               {{shared::SPEC_MODE, gradients ? shared::EMIT_FIRST_INSTANCES : 0},
-               {shared::SPEC_WRAP, wraps ? 1u : 0u}});
+               {shared::SPEC_WRAP, wraps ? 1u : 0u},
+               {shared::SPEC_QUADS, s.quads}});
 }
 
 /// The result is in the second buffers.
@@ -167,12 +168,12 @@ Sorted FramePasses::draw(uint32_t splats) const {
 }
 
 void FramePasses::contributions(const Sorted& sorted, const gpu::Buffer& largest) const {
-    record(passes::Contribute{.records = frame.records,
-                              .splats = *sorted.splats,
-                              .tile_starts = frame.tile_starts,
-                              .largest = largest,
-                              .indices = sorted.indices ? *sorted.indices : *sorted.splats},
-           blend_push(cache.config(), frame, inputs.background), {kernel(), wrap(), slots()});
+    record_tiles(passes::Contribute{.records = frame.records,
+                                    .splats = *sorted.splats,
+                                    .tile_starts = frame.tile_starts,
+                                    .largest = largest,
+                                    .indices = sorted.indices ? *sorted.indices : *sorted.splats},
+                 blend_push(cache.config(), frame, inputs.background), {kernel()});
 }
 
 Sorted FramePasses::forward(const Model& model) const {

@@ -200,8 +200,10 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
                          std::to_string(request.height) + " pixels; at most 1048576 a side can be drawn");
     s.width = request.width;
     s.height = request.height;
-    s.tiles_x = divide_up(request.width, config.tile_width);
-    s.tiles_y = divide_up(request.height, config.tile_height);
+    if (request.splatting && request.splats >> shared::PART_SHIFT == 0) s.quads = config.quads;
+    const uint32_t side = s.quads > 0 ? 2 : 1;  // of a list, in tiles
+    s.tiles_x = divide_up(request.width, config.tile_width * side);
+    s.tiles_y = divide_up(request.height, config.tile_height * side);
     const uint64_t tiles = uint64_t(s.tiles_x) * s.tiles_y;
     s.tiles = uint32_t(std::min<uint64_t>(tiles, 0xffffffffu));
     check_image(config, request, s);

@@ -39,14 +39,15 @@ struct RadixCut {
 RadixCut radix_cut(const passes::KernelConfig& config, uint32_t items, uint32_t key_bits);
 
 struct Sizes {
-    uint32_t width = 0, height = 0;  // px
-    uint32_t tiles_x = 0, tiles_y = 0, tiles = 0;
-    uint32_t stride = 0, plane_floats = 0;     // of an image plane
-    uint32_t scan_block = 0, scan_blocks = 0;  // of the prefix sum over tile counts
+    uint32_t width = 0, height = 0;                // px
+    uint32_t tiles_x = 0, tiles_y = 0, tiles = 0;  // that have a list
+    uint32_t stride = 0, plane_floats = 0;         // of an image plane
+    uint32_t scan_block = 0, scan_blocks = 0;      // of the prefix sum over tile counts
     RadixCut depth_sort, tile_sort;
     uint32_t strip_rows = 0;  // tile rows of an emitting lane
     uint32_t image_planes = 0;
     uint32_t slot_order = shared::SLOTS_SORTED;  // SPEC_SLOTS
+    uint32_t quads = 0;                          // SPEC_QUADS
     uint32_t partials = 0;                       // partial sums partial sums of a loss kernel
     uint32_t reduce_block = 0, reduce_blocks = 0;
     uint32_t ppisp_blocks = 0;  // of pixels, for the gradient of PPISP's values

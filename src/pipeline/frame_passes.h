@@ -93,8 +93,20 @@ struct FramePasses : passes::Recorder {
     gpu::SpecConstant degree() const;
     gpu::SpecConstant lenses() const { return {shared::SPEC_LENSES, inputs.camera.lenses}; }
     gpu::SpecConstant wrap() const { return {shared::SPEC_WRAP, inputs.camera.wraps ? 1u : 0u}; }
+    gpu::SpecConstant quads() const { return {shared::SPEC_QUADS, frame.sizes.quads}; }
     gpu::SpecConstant slots() const { return {shared::SPEC_SLOTS, frame.sizes.slot_order}; }
     gpu::SpecConstant kernel() const { return {shared::SPEC_KERNEL, uint32_t(plan.kernel)}; }
+
+    /// Records a pass that has one subgroup a tile, or four a quad.
+    template <class Definition>
+    void record_tiles(const Definition& buffers, const shared::BlendPush& push,
+                      passes::Constants variant) const {
+        variant.insert(variant.end(), {wrap(), slots(), quads()});
+        if (frame.sizes.quads > 0)
+            record(passes::OfQuads<Definition>{buffers}, push, variant);
+        else
+            record(buffers, push, variant);
+    }
 
   private:
     void add_sky() const;

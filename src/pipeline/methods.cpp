@@ -26,17 +26,17 @@ constexpr MethodPasses kSplats{
     .project =
         [](On on, auto& buffers, auto& push, Mode mode) {
             on.record(passes::Project{buffers, marks_or_any(on, buffers)}, push,
-                      {on.degree(), mode, on.kernel(), on.lenses(), on.wrap()});
+                      {on.degree(), mode, on.kernel(), on.lenses(), on.wrap(), on.quads()});
         },
     .blend =
         [](On on, auto& buffers, auto& push, Mode mode) {
-            on.record(passes::Blend{buffers, indices_or_splats(on, buffers)}, push,
-                      {mode, on.kernel(), on.wrap(), on.slots()});
+            on.record_tiles(passes::Blend{buffers, indices_or_splats(on, buffers)}, push,
+                            {mode, on.kernel()});
         },
     .blend_backward =
         [](On on, auto& buffers, auto& push, Mode mode) {
-            on.record(passes::BlendBackward{buffers, indices_or_splats(on, buffers)}, push,
-                      {mode, on.kernel(), on.wrap(), on.slots()});
+            on.record_tiles(passes::BlendBackward{buffers, indices_or_splats(on, buffers)}, push,
+                            {mode, on.kernel()});
         },
     .update =
         [](On on, auto& buffers, auto& push, Mode mode) {

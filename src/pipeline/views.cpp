@@ -108,7 +108,7 @@ void FramePasses::list(const Model& model, const ViewBuffers& buffers, const Lis
                                  .depth_keys = frame.depth_keys[0],
                                  .tile_counts = frame.tile_counts},
                {.splats = model.splats, .first_row = band.first, .size = {inputs.camera.width, band.rows}},
-               {wrap()});
+               {wrap(), quads()});
     record_scan(*this,
                 {.source = frame.tile_counts,
                  .order = nullptr,
@@ -139,7 +139,7 @@ Sorted FramePasses::draw_list(uint32_t splats) const {
     record(
         passes::ReceiveRecords{
             .records = frame.records, .depth_keys = frame.depth_keys[0], .tile_counts = frame.tile_counts},
-        {.splats = splats, .size = {frame.sizes.width, frame.sizes.height}}, {wrap()});
+        {.splats = splats, .size = {frame.sizes.width, frame.sizes.height}}, {wrap(), quads()});
     return draw(splats);
 }
 

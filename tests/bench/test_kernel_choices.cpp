@@ -32,8 +32,11 @@ TEST(BenchKernels, ReplaceWhatTheDeviceGets) {
     EXPECT_EQ(config.element_group, 256u);
     EXPECT_EQ(config.tile_interleave, 3u);
     EXPECT_EQ(bench::config_with("tile=4x8", limits_of(4)).tile_width, 4u);
+    EXPECT_EQ(own.quads, 0u);
     EXPECT_EQ(own.slots, shared::SLOTS_SORTED);
-    EXPECT_EQ(bench::config_with("slots=emitted", limits).slots, shared::SLOTS_EMITTED);
+    const passes::KernelConfig quads = bench::config_with("tile=8x8,quads=96,slots=emitted", limits);
+    EXPECT_EQ(quads.quads, 96u);
+    EXPECT_EQ(quads.slots, shared::SLOTS_EMITTED);
 }
 
 TEST(BenchKernels, NamesWhatItCannotUse) {
@@ -47,7 +50,8 @@ TEST(BenchKernels, NamesWhatItCannotUse) {
         }
         return std::string();
     };
-    for (const char* wrong : {"tile=8", "tile=3x8", "tile=32x32", "tiles=8x8", "elements=48"}) {
+    for (const char* wrong :
+         {"tile=8", "tile=3x8", "tile=32x32", "tiles=8x8", "elements=48", "quads=48", "quads=160"}) {
         const std::string text = message(std::string("interleave=2,") + wrong);
         EXPECT_TRUE(text.starts_with("--kernels: '" + std::string(wrong) + "' is not "))
             << wrong << ": " << text;
@@ -62,6 +66,9 @@ TEST(BenchKernels, NamesWhatItCannotUse) {
     EXPECT_NE(message("tile=16x8", 8), "");
     EXPECT_NE(message("sort=ranked", 32, false), "");
     EXPECT_EQ(message("sort=ranked"), "");
+    EXPECT_EQ(message("quads=128"), "");
+    EXPECT_EQ(message("quads=128", 64), "");
+    EXPECT_NE(message("quads=256", 64), "") << "more than shared memory holds";
 }
 
 }  // namespace

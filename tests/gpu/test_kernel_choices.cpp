@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Kernels that a device may choose between compute the same bytes, on any device.
+// Kernels that a device may choose between compute the same bytes, on any device. Quads add the sums of gradients in another order.
 #include <gtest/gtest.h>
 
 #include "gpu/guarded.h"
 #include "gpu/reference_inputs.h"
 #include "pipeline/backward.h"
 #include "pipeline/views.h"
+#include "support/gradient_check.h"
+#include "support/random_lens.h"
 
 namespace ewa::test {
 namespace {
@@ -120,6 +122,86 @@ TEST_P(KernelChoices, ChangeNoByteOfAFrame) {
 INSTANTIATE_TEST_SUITE_P(Kinds, KernelChoices,
                          testing::Values(SplatKind::ordinary, SplatKind::mixed, SplatKind::needles),
                          [](const auto& kind) { return std::string(name_of(kind.param)); });
+
+passes::KernelConfig with_quads(uint32_t slots = shared::SLOTS_SORTED) {
+    passes::KernelConfig config = rig().config();
+    config.quads = passes::most_quads(device()->limits());
+    config.slots = slots;
+    EXPECT_GE(config.quads, config.subgroup);
+    return config;
+}
+
+/// The gradients of two frames whose sums have other orders.
+void expect_close(const FrameBytes& actual, const FrameBytes& expected) {
+    GradientTolerance tolerance;
+    tolerance.cosine = 1e-11;
+    tolerance.norm = 2e-6;
+    tolerance.element_relative = 1e-3;
+    tolerance.element_absolute = 1e-6;
+    EXPECT_TRUE(splat_gradients_agree(actual.gradient, expected.gradient, tolerance));
+    const std::vector<double> sums(actual.sums.begin(), actual.sums.end()),
+        expected_sums(expected.sums.begin(), expected.sums.end());
+    EXPECT_TRUE(gradients_agree(sums, expected_sums, tolerance));
+}
+
+/// As KernelChoices, in a group that runs with other subgroup sizes too.
+class QuadsBlendPass : public testing::TestWithParam<SplatKind> {
+  protected:
+    // Neither side is a whole number of tiles, nor of quads.
+    const Scene scene = random_scene(4200, 700, GetParam(), 149, 83, 2);
+};
+
+TEST_P(QuadsBlendPass, DrawTheBytesOfTiles) {
+    Scene each = scene;
+    for (const Drawing drawing :
+         {Drawing::color, Drawing::depth, Drawing::count, Drawing::ellipsoids, Drawing::median_depth}) {
+        each.options.kernel = drawing == Drawing::depth   ? Footprint::antialias
+                              : drawing == Drawing::count ? Footprint::density
+                                                          : Footprint::peak;
+        const pipeline::PlanRequest request{.render = {}, .drawing = drawing};
+        const FrameBytes expected = frame_with(rig().config(), each, request),
+                         actual = frame_with(with_quads(), each, request);
+        EXPECT_TRUE(actual.same_image(expected)) << "drawing " << int(drawing);
+        EXPECT_LT(actual.splats.size(), expected.splats.size());
+    }
+}
+
+TEST_P(QuadsBlendPass, GradientsAreThoseOfTilesAndOfTheReference) {
+    const FrameBytes tiles = frame_with(rig().config(), scene), quads = frame_with(with_quads(), scene);
+    EXPECT_TRUE(quads.same_image(tiles));
+    expect_close(quads, tiles);
+    const FrameBytes emitted = frame_with(with_quads(shared::SLOTS_EMITTED), scene);
+    EXPECT_TRUE(emitted.same_image(tiles) && emitted.same_gradient(quads));
+    const auto expected =
+        reference::loss_gradient(scene.gaussians, scene.camera,
+                                 random_target(9, scene.camera.width, scene.camera.height), scene.options);
+    GradientTolerance tolerance;
+    tolerance.norm = 2e-4;
+    tolerance.element_relative = 1e-2;
+    tolerance.element_absolute = 1e-4;
+    EXPECT_TRUE(splat_gradients_agree(quads.gradient, expected.gradient, tolerance));
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, QuadsBlendPass,
+                         testing::Values(SplatKind::mixed, SplatKind::needles, SplatKind::opacity_extremes),
+                         [](const auto& kind) { return std::string(name_of(kind.param)); });
+
+/// Splats on the seam reach quads at both borders. The last quad of a row has one column of tiles, or two.
+TEST(QuadsOfAPanorama, DrawTheBytesOfTiles) {
+    const auto columns = [](int width) { return (width + 2 * 8 - 1) / (2 * 8); };
+    ASSERT_NE(columns(100) % 2, columns(120) % 2);
+    for (const int width : {100, 120}) {
+        Scene scene;
+        scene.camera = random_lenses(6800, width, 50)[4].camera;
+        scene.gaussians = gaussians_around(6801, 400, scene.camera, 0);
+        const FrameBytes tiles = frame_with(rig().config(), scene), quads = frame_with(with_quads(), scene);
+        EXPECT_TRUE(quads.same_image(tiles)) << width;
+        EXPECT_LT(quads.splats.size(), tiles.splats.size());
+        expect_close(quads, tiles);
+        for (size_t i = 0; i < scene.gaussians.size(); ++i) scene.gaussians.log_scales[3 * i] += 2;
+        EXPECT_TRUE(frame_with(with_quads(), scene).same_image(frame_with(rig().config(), scene))) << width;
+    }
+}
 
 }  // namespace
 }  // namespace ewa::test
