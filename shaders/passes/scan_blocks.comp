@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Exclusive prefix sums within blocks.
 // One workgroup is one subgroup and owns one block of `block` entries. It reads them, and writes for each entry
-// the sum of the entries before it in the block, and the block's total. SPEC_MODE: SCAN_GATHERED or
-// SCAN_FLAGS, which say what an entry is.
+// the sum of the entries before it in the block, and the block's total. SPEC_MODE: SCAN_GATHERED,
+// SCAN_FLAGS or SCAN_LIVE, which say what an entry is, and how many a block has.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -14,13 +14,14 @@ layout(set = 0, binding = 0, scalar) readonly buffer Source { uint source[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Order { uint order[]; };
 layout(set = 0, binding = 2, scalar) writeonly buffer Prefix { uint prefix[]; };
 layout(set = 0, binding = 3, scalar) writeonly buffer Totals { uint totals[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer CountsBlock { Counts counts; };
 layout(push_constant, scalar) uniform Push { ScanPush push; };
 
 void main() {
     const uint block = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     const uint begin = block * push.block;
     if (begin >= push.items) return;
-    const uint end = min(begin + push.block, push.items);
+    const uint end = min(begin + (MODE == SCAN_LIVE ? min(counts.sort_blocks, push.block) : push.block), push.items);
     uint carry = 0u;
     for (uint base = begin; base < end; base += SCANNED) {
         uint value[SCAN_AHEAD];

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Exclusive prefix sum of the blocks' totals, in place; entry `blocks` becomes the grand total.
 // One workgroup of one subgroup does all of it. It may also write the grand total to Counts: TOTAL_*.
+// With TOTAL_INSTANCES and push.sort_keys it also writes how many workgroups sort the instances.
 // Instances are also counted in two 16-bit halves, which cannot wrap. A total above 32 bits is reported as 0xffffffff.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
@@ -40,6 +41,13 @@ void main() {
             const uint needed = wrapped || overflowed ? 0xffffffffu : carry;
             counts.instances = needed;
             counts.overflowed = needed > push.capacity ? 1u : 0u;
+            if (push.sort_keys > 0u) {
+                const uint items = needed > push.capacity ? 0u : needed;
+                const uint blocks = (items + push.sort_keys - 1u) / push.sort_keys;
+                const uint rows = max((blocks + push.max_groups - 1u) / push.max_groups, 1u);
+                counts.sort_blocks = blocks;
+                counts.sort_groups = uint[3]((blocks + rows - 1u) / rows, rows, 1u);
+            }
         }
         if (push.total == TOTAL_SCAN) counts.scan_total = carry;
     }

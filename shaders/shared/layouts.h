@@ -122,6 +122,7 @@ EWA_UINT(EMIT_FIRST_INSTANCES, 1u);  // also writes where each splat's instances
 // scan_blocks.comp
 EWA_UINT(SCAN_GATHERED, 1u);  // entry e is source[order[e]]
 EWA_UINT(SCAN_FLAGS, 2u);     // entry e is 1 where source[e] is not 0
+EWA_UINT(SCAN_LIVE, 3u);      // a block has Counts.sort_blocks entries; the others are not read
 // blend.comp
 EWA_UINT(BLEND_COLOR, 0u);
 EWA_UINT(BLEND_DEPTH, 1u);       // also writes PLANE_DEPTH
@@ -336,6 +337,10 @@ struct Counts {
     float l2;                // mean (x - y)^2, with LOSS_SQUARES
     float alpha;             // mean |1 - T - alpha of the training image|
     float depth;             // mean |ln(depth / depth of the training image)|
+    // With live counts: the blocks of keys of the sort of the instances, and as many workgroups along x, y and z, which an
+    // indirect dispatch reads. None if the instances exceed the capacity.
+    uint sort_blocks;
+    uint sort_groups[3];
     // Not cleared by a frame that may begin before the host has read the counts of the one before. Once a frame
     // has too many instances, this is 1, later frames report 2^32 - 1 instances, and no pass changes the model.
     uint overflowed;
@@ -381,6 +386,8 @@ struct ScanTotalsPush {
     uint blocks;
     uint total;     // TOTAL_*: where the grand total is written
     uint capacity;  // with TOTAL_INSTANCES: of instances
+    // With TOTAL_INSTANCES: keys of a workgroup of the sort, or 0 without live counts; and the most workgroups along x.
+    uint sort_keys, max_groups;
 };
 
 struct EmitPush {

@@ -74,7 +74,8 @@ void Buffer::create(FindMemory find_memory) {
                        " MiB at once; fewer splats or a smaller image need less");
     using Usage = vk::BufferUsageFlagBits;
     vk::BufferCreateInfo info;
-    info.setSize(bytes_).setUsage(Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst);
+    info.setSize(bytes_).setUsage(Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst |
+                                  Usage::eIndirectBuffer);
     if (fetched) info.usage |= Usage::eUniformTexelBuffer;
     if (uniform_) info.usage |= Usage::eUniformBuffer;
     try {

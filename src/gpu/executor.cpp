@@ -88,7 +88,7 @@ void Executor::reserve(Slot& slot, const Recording& recording, bool timed) {
     for (const Command& command : recording.commands()) {
         if (command.kind != Command::Kind::dispatch) continue;
         ++sets;
-        bindings += uint32_t(command.uses.size());
+        bindings += uint32_t(command.pipeline->reflection().bindings.size());
     }
     if (!slot.descriptor_pool || sets > slot.pool_sets || bindings > slot.pool_bindings) {
         slot.pool_sets = std::max(1u, 2 * sets);
@@ -120,9 +120,8 @@ vk::DescriptorSet Executor::bind(const Command& command, vk::DescriptorPool pool
     std::deque<vk::DescriptorBufferInfo> infos;
     std::deque<vk::BufferView> views;
     std::vector<vk::WriteDescriptorSet> updates;
-    for (size_t i = 0; i < command.uses.size(); ++i) {
-        const BufferPart& part = command.uses[i].part;
-        const Binding& binding = command.pipeline->reflection().bindings[i];
+    for (const Binding& binding : command.pipeline->reflection().bindings) {
+        const BufferPart& part = command.uses[binding.binding].part;
         vk::WriteDescriptorSet update;
         update.setDstSet(set).setDstBinding(binding.binding).setDescriptorType(descriptor_type(binding.kind));
         if (binding.kind == BindingKind::texel)
@@ -149,13 +148,16 @@ void Executor::record(const Recording& recording, const Slot& slot, bool timed) 
         if (timed) commands.writeTimestamp(Stage::eBottomOfPipe, *slot.queries, query++);
     };
     // What earlier submissions wrote is seen here: their fence orders the host alone.
-    commands.pipelineBarrier(Stage::eAllCommands, work, {}, vk::MemoryBarrier(Flag::eMemoryWrite, used), {},
-                             {});
+    const auto barrier = [&](vk::PipelineStageFlags after, vk::AccessFlags writes, bool for_groups) {
+        commands.pipelineBarrier(
+            after, for_groups ? work | Stage::eDrawIndirect : work, {},
+            vk::MemoryBarrier(writes, for_groups ? used | Flag::eIndirectCommandRead : used), {}, {});
+    };
+    barrier(Stage::eAllCommands, Flag::eMemoryWrite, true);
     if (timed) commands.resetQueryPool(*slot.queries, 0, uint32_t(recording.commands().size()) + 1);
     stamp();
     for (const Command& command : recording.commands()) {
-        if (command.barrier_before)
-            commands.pipelineBarrier(work, work, {}, vk::MemoryBarrier(written, used), {}, {});
+        if (command.barrier_before) barrier(work, written, command.barrier_for_groups);
         if (command.kind == Command::Kind::fill) {
             const Buffer& target = *command.uses[0].part.buffer;
             commands.fillBuffer(target.handle(), target.begin() + command.target_offset, command.bytes,
@@ -173,7 +175,12 @@ void Executor::record(const Recording& recording, const Slot& slot, bool timed) 
             if (!command.push.empty())
                 commands.pushConstants(command.pipeline->layout(), vk::ShaderStageFlagBits::eCompute, 0,
                                        uint32_t(command.push.size()), command.push.data());
-            commands.dispatch(command.groups[0], command.groups[1], command.groups[2]);
+            if (const auto* groups = std::get_if<std::array<uint32_t, 3>>(&command.groups)) {
+                commands.dispatch((*groups)[0], (*groups)[1], (*groups)[2]);
+            } else {
+                const auto& part = std::get<BufferPart>(command.groups);
+                commands.dispatchIndirect(part.buffer->handle(), part.buffer->begin() + part.offset);
+            }
         }
         stamp();
     }

@@ -27,10 +27,16 @@ void check_part(const Pipeline& pipeline, const Binding& binding, const BufferPa
         fail(pipeline, at + " reaches past the buffer's end");
 }
 
+void check_groups(const Pipeline& pipeline, const BufferPart& groups) {
+    if (groups.offset % 4 != 0 || groups.offset + sizeof(VkDispatchIndirectCommand) > groups.buffer->bytes())
+        fail(pipeline, "workgroups at byte " + std::to_string(groups.offset) + " of " +
+                           groups.buffer->name() + ", which has " + std::to_string(groups.buffer->bytes()));
+}
+
 }  // namespace
 
 void Recording::dispatch(const Pipeline& pipeline, std::string name, std::span<const BufferPart> parts,
-                         std::span<const std::byte> push, std::array<uint32_t, 3> groups) {
+                         std::span<const std::byte> push, const Workgroups& groups) {
     const Reflection& shader = pipeline.reflection();
     if (parts.size() != shader.bindings.size())
         fail(pipeline, "declares " + std::to_string(shader.bindings.size()) + " bindings, the pass gives " +
@@ -38,10 +44,12 @@ void Recording::dispatch(const Pipeline& pipeline, std::string name, std::span<c
     if (push.size() != shader.push_constant_bytes)
         fail(pipeline, "takes " + std::to_string(shader.push_constant_bytes) +
                            " bytes of push constants, the pass gives " + std::to_string(push.size()));
-    for (const uint32_t count : groups)
+    const auto* known = std::get_if<std::array<uint32_t, 3>>(&groups);
+    for (const uint32_t count : known ? *known : std::array<uint32_t, 3>{1, 1, 1})
         if (count == 0 || count > limits_.max_groups)
             fail(pipeline, "a dispatch of " + std::to_string(count) + " workgroups (1 to " +
                                std::to_string(limits_.max_groups) + " are possible)");
+    if (!known) check_groups(pipeline, std::get<BufferPart>(groups));
     Command command;
     for (size_t i = 0; i < parts.size(); ++i) {
         check_part(pipeline, shader.bindings[i], parts[i]);
@@ -51,6 +59,7 @@ void Recording::dispatch(const Pipeline& pipeline, std::string name, std::span<c
     command.pipeline = &pipeline;
     command.push.assign(push.begin(), push.end());
     command.groups = groups;
+    if (!known) command.uses.push_back({std::get<BufferPart>(groups), Access::read});
     append(std::move(command));
 }
 
@@ -89,7 +98,14 @@ void Recording::append(Command command) {
             if (!state.written && !has(use.access, Access::write)) continue;
             if (state.buffer->overlaps(*use.part.buffer)) command.barrier_before = true;
         }
-    if (command.barrier_before) states_.clear();
+    if (command.barrier_before) {
+        states_.clear();
+        last_barrier_ = commands_.size();
+    }
+    // What an earlier barrier made visible, the last one makes visible again.
+    command.barrier_for_groups = command.barrier_before && command.indirect();
+    if (command.indirect() && last_barrier_ < commands_.size())
+        commands_[last_barrier_].barrier_for_groups = true;
     for (const Use& use : command.uses) {
         auto state = std::find_if(states_.begin(), states_.end(),
                                   [&](const State& s) { return s.buffer == use.part.buffer; });
@@ -103,10 +119,11 @@ void Recording::append(Command command) {
 std::string Recording::describe() const {
     std::string text;
     for (const Command& command : commands_) {
-        if (command.barrier_before) text += "barrier\n";
+        if (command.barrier_before) text += command.barrier_for_groups ? "barrier groups\n" : "barrier\n";
         text += command.name + ":";
         for (const Use& use : command.uses)
-            text += " " + use.part.buffer->name() + (has(use.access, Access::read) ? ":r" : ":") +
+            text += (command.indirect() && &use == &command.uses.back() ? " groups " : " ") +
+                    use.part.buffer->name() + (has(use.access, Access::read) ? ":r" : ":") +
                     (has(use.access, Access::write) ? "w" : "");
         text += "\n";
     }

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <span>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "gpu/buffer.h"
@@ -33,16 +34,24 @@ struct Use {
     Access access;
 };
 
+/// Workgroups of a dispatch along x, y and z: numbers, or a part of a buffer with a VkDispatchIndirectCommand, which the device
+/// reads. The device's numbers may be 0, and must not exceed its limits.
+using Workgroups = std::variant<std::array<uint32_t, 3>, BufferPart>;
+
 struct Command {
     enum class Kind { dispatch, fill, copy } kind = Kind::dispatch;
     std::string name;
-    std::vector<Use> uses;  // dispatch: by binding; fill: the target; copy: source, then target
+    // dispatch: by binding, then the buffer with the workgroups if there is one; fill: the target; copy: source, then target
+    std::vector<Use> uses;
     const Pipeline* pipeline = nullptr;
     std::vector<std::byte> push{};
-    std::array<uint32_t, 3> groups{1, 1, 1};
+    Workgroups groups = std::array<uint32_t, 3>{1, 1, 1};
     uint32_t fill_value = 0;
     uint64_t source_offset = 0, target_offset = 0, bytes = 0;
     bool barrier_before = false;  // derived
+    // Derived: the barrier is also for workgroups in a buffer, of this command or of one up to the next barrier.
+    bool barrier_for_groups = false;
+    bool indirect() const { return std::holds_alternative<BufferPart>(groups); }
 };
 
 class Recording {
@@ -54,9 +63,9 @@ class Recording {
     /// - the number of parts is not the shader's number of bindings;
     /// - a buffer lacks the usage of its texel or uniform binding;
     /// - the push constants' size is not the shader's;
-    /// - a group count is zero or over the device's limit.
+    /// - a group count is zero or over the device's limit, or its place in a buffer is not a multiple of 4 bytes or not inside.
     void dispatch(const Pipeline& pipeline, std::string name, std::span<const BufferPart> parts,
-                  std::span<const std::byte> push, std::array<uint32_t, 3> groups);
+                  std::span<const std::byte> push, const Workgroups& groups);
     /// Sets bytes [offset, offset + bytes) to a repeated 32-bit value. Both are multiples of 4.
     void fill(const Buffer& target, uint32_t value, uint64_t offset, uint64_t bytes);
     void copy(const Buffer& source, uint64_t source_offset, const Buffer& target, uint64_t target_offset,
@@ -65,7 +74,8 @@ class Recording {
     void append(Command command);
 
     const std::vector<Command>& commands() const { return commands_; }
-    /// One line a command: name, buffers with r, w or rw, and a line "barrier" before it where it has one.
+    /// One line a command: name, buffers with r, w or rw, and a line "barrier" before it where it has one. "groups" is before the
+    /// buffer with the workgroups, and after a barrier for one.
     std::string describe() const;
 
   private:
@@ -76,6 +86,7 @@ class Recording {
         bool read, written;  // since the last barrier
     };
     std::vector<State> states_;
+    size_t last_barrier_ = SIZE_MAX;  // index of the last command with one
 };
 
 }  // namespace ewa::gpu

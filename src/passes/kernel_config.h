@@ -24,6 +24,7 @@ struct KernelConfig {
     uint32_t sort_chunk = 512;                 // least number of items of a sorting lane
     uint32_t sort_group = 64;                  // invocations of a sorting workgroup
     bool ranked_sort = false;                  // keys are ranked in shared memory; sort_lanes_max is not used
+    bool live_counts = false;                  // with ranked_sort: the device counts the sort's workgroups
     uint32_t scan_turns = 64;                  // items that a lane scans
     uint32_t tile_interleave = 1;  // distance of neighbouring workgroups' tiles, or groups of splats
     uint32_t max_groups = 65535;   // workgroups along one dimension
@@ -82,7 +83,7 @@ inline KernelConfig config_for(const gpu::Limits& limits) {
         if (config.subgroup == 32) config.tile_width = 16;
         config.scan_turns = 16;
         config.broadcast = limits.scalar_loads ? shared::BROADCAST_UNIFORM : shared::BROADCAST_SHARED;
-        config.ranked_sort = can_rank(limits);
+        config.ranked_sort = config.live_counts = can_rank(limits);
     }
     return config;
 }

@@ -11,10 +11,10 @@ namespace ewa::shared {
 // The scalar block layout packs these structs without padding, and so does C++.
 static_assert(sizeof(CameraBlock) == 4 * (9 + 9 + 3 + 3 + 8 + 4 + 4 + 24 + 2 + 9));
 static_assert(offsetof(CameraBlock, size) == 4 * (9 + 9 + 3 + 3 + 8 + 4));
-static_assert(sizeof(Counts) == 56 && offsetof(Counts, l1) == 16);
+static_assert(sizeof(Counts) == 72 && offsetof(Counts, l1) == 16);
 static_assert(sizeof(ProjectPush) == 20 && sizeof(SortPush) == 16 && sizeof(ScanPush) == 8);
 static_assert(sizeof(ViewBlock) == 184 && sizeof(ViewsPush) == 32 && sizeof(HarmonicsPush) == 16);
-static_assert(sizeof(ScanTotalsPush) == 12 && sizeof(EmitPush) == 32 && sizeof(TileStartsPush) == 8);
+static_assert(sizeof(ScanTotalsPush) == 20 && sizeof(EmitPush) == 32 && sizeof(TileStartsPush) == 8);
 static_assert(sizeof(BlendPush) == 48 && offsetof(BlendPush, capacity) == 44);
 static_assert(sizeof(RayPush) == 56);
 static_assert(sizeof(CollectPush) == 20 && sizeof(GatherPush) == 12);

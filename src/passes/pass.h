@@ -128,9 +128,9 @@ struct Pass {
                 const char* name = Definition::shader) const {
         record(recording, buffers, push, Definition::Work::groups(config, push), name);
     }
-    /// groups: the dispatch's workgroups.
-    void record(gpu::Recording& recording, const Definition& buffers, const Push& push, const Groups& groups,
-                const char* name = Definition::shader) const {
+    /// groups: the dispatch's workgroups, as Recording::dispatch takes them.
+    void record(gpu::Recording& recording, const Definition& buffers, const Push& push,
+                const gpu::Workgroups& groups, const char* name = Definition::shader) const {
         constexpr size_t kParts = sizeof(Definition) / sizeof(gpu::BufferPart);
         static_assert(sizeof(Definition) == kParts * sizeof(gpu::BufferPart));
         recording.dispatch(pipeline, name, std::bit_cast<std::array<gpu::BufferPart, kParts>>(buffers),

@@ -152,11 +152,11 @@ struct HarmonicsBackward {
 
 // Prefix sums, radix sort, and the lists of (splat, tile) instances built with them.
 
-/// Exclusive prefix sums within blocks. Variant: SPEC_MODE (0, SCAN_GATHERED or SCAN_FLAGS).
+/// Exclusive prefix sums within blocks. Variant: SPEC_MODE (0, SCAN_GATHERED, SCAN_FLAGS or SCAN_LIVE).
 struct ScanBlocks {
     static constexpr char shader[] = "scan_blocks";
     using Work = PerBlock<shared::ScanPush>;
-    gpu::BufferPart source, order, prefix, totals;
+    gpu::BufferPart source, order, prefix, totals, counts;
 };
 
 /// Exclusive prefix sum of the blocks' totals, in place, followed by the grand total.

@@ -95,7 +95,8 @@ void record_tile_order(const passes::Recorder& on, bool gradients, const FrameBu
                  .items = 0,
                  .capacity = frame.instance_capacity,
                  .keep_keys = s.tile_sort.passes > 1,
-                 .name = "tile order"});
+                 .name = "tile order",
+                 .live = true});
     // The one digit of a sort in one pass is the tile.
     if (s.tile_sort.passes == 1)
         on.recording.copy(frame.digit_totals, 0, frame.tile_starts, 0, s.tile_starts);

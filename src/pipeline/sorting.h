@@ -19,6 +19,7 @@ struct ScanWork {
     const char* name;         // of the timing
     uint32_t capacity = ~0u;  // of instances, with TOTAL_INSTANCES
     bool flags = false;       // counts the entries that are not 0
+    bool live = false;        // a block ends after Counts.sort_blocks entries
 };
 
 /// Records an exclusive prefix sum. The sum before entry e is totals[e / block] + prefix[e].
@@ -40,6 +41,7 @@ struct SortWork {
     uint32_t capacity;  // of the buffers
     bool keep_keys;     // also returns the sorted keys
     const char* name;   // of the timing
+    bool live = false;  // the last scan with TOTAL_INSTANCES has counted the items, and the workgroups
 };
 
 /// Records a stable sort of pairs by the low cut.passes * cut.bits bits of the key. Returns i such that values[i], indices[i] and,

@@ -109,7 +109,7 @@ void compile_splatting(Compiler& compiler) {
           {0, UPDATE_STATISTICS, packed, packed | UPDATE_STATISTICS, packed | UPDATE_REGULARISED,
            packed | UPDATE_STATISTICS | UPDATE_ABSOLUTE, packed | UPDATE_STATISTICS | UPDATE_BANDS,
            packed | UPDATE_REGULARISED | UPDATE_BANDS}}});
-    compiler.compile<passes::ScanBlocks>({{SPEC_MODE, {0, SCAN_GATHERED, SCAN_FLAGS}}});
+    compiler.compile<passes::ScanBlocks>({{SPEC_MODE, {0, SCAN_GATHERED, SCAN_FLAGS, SCAN_LIVE}}});
     compiler.compile<passes::ScanTotals>();
     const Values scatter_modes = {0,
                                   SORT_OWN_INDICES,

@@ -90,6 +90,38 @@ FrameBytes frame_with(const passes::KernelConfig& config, const Scene& scene,
     return bytes;
 }
 
+/// A frame that at first has room for `capacity` instances, and is repeated until it fits.
+FrameBytes repeated_frame_with(const passes::KernelConfig& config, const Scene& scene, uint32_t capacity) {
+    passes::PassCache cache(*device(), config);
+    const pipeline::Model model = pipeline::upload_model(*device(), scene.gaussians, 1, false);
+    const gpu::Buffer camera = camera_buffer(scene.camera, config);
+    const gpu::Buffer photo =
+        pipeline::upload_photo(*device(), random_target(9, scene.camera.width, scene.camera.height));
+    const pipeline::Plan plan = pipeline::plan_for({.purpose = pipeline::Purpose::gradient,
+                                                    .scene_degree = scene.gaussians.sh_degree,
+                                                    .present_degree = scene.gaussians.sh_degree,
+                                                    .render = scene.options});
+    const pipeline::FrameInputs inputs = pipeline::inputs_of(camera, scene.camera, scene.options);
+    pipeline::FrameRequest size = pipeline::frame_request(plan, inputs.camera.width, inputs.camera.height);
+    size.splats = model.splats;
+    size.instances = capacity;
+    pipeline::FrameBuffers frame;
+    pipeline::Sorted sorted;
+    const shared::Counts counts =
+        run_until_it_fits(cache, rig().executor, frame, size, [&](const passes::Recorder& recorder) {
+            const pipeline::FramePasses on{recorder, plan, frame, inputs};
+            sorted = on.forward(model);
+            on.loss(photo);
+            on.backward(model, sorted, {});
+        });
+    EXPECT_GT(counts.instances, 2000u);
+    return {.planes = frame.planes.download<float>(frame.sizes.planes / 4),
+            .weights = {},
+            .splats = sorted.splats->download<uint32_t>(counts.instances),
+            .indices = sorted.indices->download<uint32_t>(counts.instances),
+            .gradient = download_model(model, model.moments1)};
+}
+
 class KernelChoices : public testing::TestWithParam<SplatKind> {};
 
 TEST_P(KernelChoices, ChangeNoByteOfAFrame) {
@@ -102,6 +134,15 @@ TEST_P(KernelChoices, ChangeNoByteOfAFrame) {
     other = own;
     other.optimised_modules = false;
     EXPECT_TRUE(frame_with(other, scene) == expected) << "whole modules";
+    other = own;
+    other.ranked_sort = true;
+    const FrameBytes enough = repeated_frame_with(own, scene, 40000);
+    for (const bool live : {false, true}) {
+        other.live_counts = live;
+        EXPECT_TRUE(frame_with(other, scene) == expected) << "live counts " << live;
+        EXPECT_TRUE(repeated_frame_with(other, scene, 1) == enough)
+            << "after an overflow, live counts " << live;
+    }
     for (const uint32_t broadcast :
          {shared::BROADCAST_SHUFFLES, shared::BROADCAST_SHARED, shared::BROADCAST_UNIFORM}) {
         other = own;

@@ -30,7 +30,7 @@ TEST(ScanEdges, ATotalPast32BitsIsTheLargestNumber) {
         Guarded sums("totals", totals), counts = zero_counts();
         r.run([&](gpu::Recording& recording) {
             r.cache.get<passes::ScanTotals>().record(recording, {sums, counts},
-                                                     {blocks, shared::TOTAL_INSTANCES, ~0u}, "scan");
+                                                     {blocks, shared::TOTAL_INSTANCES, ~0u, 0, 1}, "scan");
         });
         expect_intact({&sums, &counts});
         return counts.read<shared::Counts>()[0].instances;
@@ -40,6 +40,37 @@ TEST(ScanEdges, ATotalPast32BitsIsTheLargestNumber) {
     EXPECT_EQ(instances({0xffff0000u, 0xffffu, 1u}), 0xffffffffu);  // by the carry of the low halves
     EXPECT_EQ(instances({0x80000000u, 0x80000000u, 7u}), 0xffffffffu);
     EXPECT_EQ(instances(std::vector<uint32_t>(300, 0x10000000u)), 0xffffffffu);
+}
+
+/// The workgroups of a sort cover all keys, in rows that the device allows. None cover instances that do not fit.
+TEST(ScanEdges, WorkgroupsAreThoseOfTheInstances) {
+    const auto counted = [](uint32_t total, uint32_t capacity, uint32_t overflowed = 0) {
+        constexpr uint32_t kKeys = 1000, kMostGroups = 7;
+        shared::Counts before{};
+        before.overflowed = overflowed;
+        Guarded sums("totals", std::vector<uint32_t>{total, kPoison}),
+            counts("counts", std::vector<shared::Counts>{before});
+        Rig& r = rig();
+        r.run([&](gpu::Recording& recording) {
+            r.cache.get<passes::ScanTotals>().record(
+                recording, {sums, counts}, {1, shared::TOTAL_INSTANCES, capacity, kKeys, kMostGroups},
+                "scan");
+        });
+        expect_intact({&sums, &counts});
+        const auto read = counts.read<shared::Counts>()[0];
+        return std::vector<uint32_t>{read.sort_blocks, read.sort_groups[0], read.sort_groups[1],
+                                     read.sort_groups[2]};
+    };
+    using Four = std::vector<uint32_t>;
+    EXPECT_EQ(counted(0, 9000), (Four{0, 0, 1, 1}));
+    EXPECT_EQ(counted(1, 9000), (Four{1, 1, 1, 1}));
+    EXPECT_EQ(counted(1000, 9000), (Four{1, 1, 1, 1}));
+    EXPECT_EQ(counted(1001, 9000), (Four{2, 2, 1, 1}));
+    EXPECT_EQ(counted(7000, 9000), (Four{7, 7, 1, 1}));
+    EXPECT_EQ(counted(7001, 9000), (Four{8, 4, 2, 1}));
+    EXPECT_EQ(counted(9000, 9000), (Four{9, 5, 2, 1}));
+    EXPECT_EQ(counted(9001, 9000), (Four{0, 0, 1, 1}));
+    EXPECT_EQ(counted(1, 9000, 1), (Four{0, 0, 1, 1}));  // an earlier frame in flight did not fit
 }
 
 /// Antialiased lines of a tenth of a pixel, at each height between the rows: the sharpest footprints. Their exponentials

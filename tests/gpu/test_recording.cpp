@@ -181,6 +181,24 @@ TEST_F(Barriers, AreWrittenInTheDescription) {
         "tile_starts: a:r b:r c:w\nbarrier\ntile_starts: c:r b:r d:w\nbarrier\nfill c: c:w\nfill a: a:w\n");
 }
 
+/// The device reads workgroups in a buffer at a stage of its own. A barrier that orders them says so, wherever it stands.
+TEST_F(Barriers, OfWorkgroupsInABuffer) {
+    const auto starts = rig().cache.get<passes::TileStarts>();
+    const gpu::BufferPart groups(c, 16, 12);
+    copy_like(recording, a, b, c);
+    starts.record(recording, {.keys = a, .counts = b, .tile_starts = d}, {1, 1}, groups);  // c was written
+    copy_like(recording, a, b, c);  // over workgroups that were read
+    copy_like(recording, d, b, e);
+    copy_like(recording, e, b, f);  // a barrier, which also orders the workgroups of the next command
+    starts.record(recording, {.keys = a, .counts = b, .tile_starts = a}, {1, 1}, groups);
+    EXPECT_EQ(recording.describe(),
+              "tile_starts: a:r b:r c:w\n"
+              "barrier groups\ntile_starts: a:r b:r d:w groups c:r\n"
+              "barrier\ntile_starts: a:r b:r c:w\ntile_starts: d:r b:r e:w\n"
+              "barrier groups\ntile_starts: e:r b:r f:w\n"
+              "tile_starts: a:r b:r a:w groups c:r\n");
+}
+
 // ---- What a dispatch refuses ----
 
 struct Dispatches : testing::Test {
@@ -199,7 +217,7 @@ struct Dispatches : testing::Test {
     /// The text of the logic_error that recording this dispatch ends with.
     template <class Push>
     std::string error(const gpu::Pipeline& pipeline, const std::vector<BufferPart>& parts, const Push& values,
-                      std::array<uint32_t, 3> groups = {1, 1, 1}) {
+                      const gpu::Workgroups& groups = std::array<uint32_t, 3>{1, 1, 1}) {
         try {
             recording.dispatch(pipeline, "test", parts, std::as_bytes(std::span(&values, 1)), groups);
         } catch (const std::logic_error& e) {
@@ -257,13 +275,23 @@ TEST_F(Dispatches, RefuseAUniformBlockOnABufferThatIsNotOne) {
 TEST_F(Dispatches, RefusePartsPastTheEndAndTooManyGroups) {
     expect_parts(error(starts, {BufferPart(a, 1008, 32), b, c}, push), {"tile_starts", "binding 0", "past"});
     const uint32_t most = device()->limits().max_groups;
-    expect_parts(error(starts, {a, b, c}, push, {1, 0, 1}), {"tile_starts", " 0 workgroups"});
+    expect_parts(error(starts, {a, b, c}, push, std::array{1u, 0u, 1u}), {"tile_starts", " 0 workgroups"});
     if (most < 0xffffffffu) {
-        expect_parts(error(starts, {a, b, c}, push, {most + 1, 1, 1}),
+        expect_parts(error(starts, {a, b, c}, push, std::array{most + 1, 1u, 1u}),
                      {"tile_starts", std::to_string(most).c_str()});
-        expect_parts(error(starts, {a, b, c}, push, {1, 1, most + 1}),
+        expect_parts(error(starts, {a, b, c}, push, std::array{1u, 1u, most + 1}),
                      {"tile_starts", std::to_string(most).c_str()});
     }
+}
+
+TEST_F(Dispatches, RefuseWorkgroupsOutsideABuffer) {
+    const auto error_of = [&](const BufferPart& groups) {
+        recording = rig().recording();
+        return error(starts, {a, b, c}, push, groups);
+    };
+    expect_parts(error_of(BufferPart(a, 1016, 8)), {"tile_starts", "workgroups at byte 1016", "1024"});
+    expect_parts(error_of(BufferPart(a, 2, 12)), {"tile_starts", "workgroups at byte 2"});
+    EXPECT_EQ(error_of(BufferPart(a, 1012, 12)), "no error");
 }
 
 TEST_F(Dispatches, FillsAndCopiesStayInsideABuffer) {
@@ -383,6 +411,7 @@ std::vector<Touch> touches(const Command& command) {
     std::vector<Touch> out;
     for (const auto& [binding, access] : accesses)
         out.push_back({command.uses.at(binding).part.buffer, access.read, access.write});
+    if (command.indirect()) out.push_back({command.uses.back().part.buffer, true, false});
     return out;
 }
 
