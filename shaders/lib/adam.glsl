@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Adam's step of a splat's parameters, or their gradient alone. The including pass declares the buffers of update.comp, push
-// (UpdatePush, or UpdateViewsPush with ADAM_OF_PUSH defined), SH_DEGREE, GRADIENT_ONLY and PACKED_MOMENTS.
+// (UpdateBlock, or UpdateViewsPush with ADAM_OF_PUSH defined), SH_DEGREE, GRADIENT_ONLY and PACKED_MOMENTS.
 #ifndef EWA_LIB_ADAM
 #define EWA_LIB_ADAM
 #include "lib/params.glsl"

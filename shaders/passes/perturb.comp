@@ -16,7 +16,7 @@ layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0, scalar) buffer Params { vec4 params[]; };
 layout(set = 0, binding = 1, scalar) buffer CountsBlock { Counts counts; };
 layout(set = 0, binding = 2, scalar) readonly buffer Moments { uvec4 moments[]; };
-layout(push_constant, scalar) uniform Push { PerturbPush push; };
+layout(set = 0, binding = 3, scalar) uniform Values { PerturbBlock push; };
 
 void main() {
     const uint i = item_index();

@@ -37,8 +37,8 @@ STORED_WORD_TEXELS(10, moments1_out);
 STORED_WORD_TEXELS(11, moments2_out);
 layout(set = 0, binding = 12, scalar) buffer Statistics { vec2 statistics[]; };
 layout(set = 0, binding = 13, scalar) readonly buffer SortedIndices { uint sorted_indices[]; };
-layout(set = 0, binding = 14, scalar) writeonly buffer MotionSums { float motion_sums[]; };
-layout(push_constant, scalar) uniform Push { UpdatePush push; };
+layout(set = 0, binding = 14, scalar) uniform Values { UpdateBlock push; };
+layout(set = 0, binding = 15, scalar) writeonly buffer MotionSums { float motion_sums[]; };
 #include "lib/slots.glsl"
 #include "lib/splat_update.glsl"
 

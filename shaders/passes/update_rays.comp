@@ -31,7 +31,7 @@ STORED_WORD_TEXELS(10, moments1_out);
 STORED_WORD_TEXELS(11, moments2_out);
 layout(set = 0, binding = 12, scalar) buffer Statistics { vec2 statistics[]; };
 layout(set = 0, binding = 13, scalar) readonly buffer SortedIndices { uint sorted_indices[]; };
-layout(push_constant, scalar) uniform Push { UpdatePush push; };
+layout(set = 0, binding = 14, scalar) uniform Values { UpdateBlock push; };
 #include "lib/splat_update.glsl"
 
 // Each iteration adds 8 slots: some drivers stop a loop after 65,535 iterations.

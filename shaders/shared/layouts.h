@@ -550,7 +550,8 @@ struct ReducePush {
     float scale;  // applied to the result
 };
 
-struct UpdatePush {
+// Values of a pass whose command is replayed in every step: a uniform block in place of push constants. So is PerturbBlock.
+struct UpdateBlock {
     uint splats;
     uint planes;  // texel planes a splat
     uint instance_capacity;
@@ -590,7 +591,7 @@ struct SumSlotsPush {
     uint first_index;  // of the view's list, in the lists of all views one after another
 };
 
-// Has the members of UpdatePush that lib/adam.glsl uses.
+// Has the members of UpdateBlock that lib/adam.glsl uses.
 struct UpdateViewsPush {
     uint splats;
     uint first;   // number of the first splat, among those of all ranks
@@ -656,7 +657,7 @@ struct McmcPush {
     uint frozen;  // as in DensifyPush
 };
 
-struct PerturbPush {
+struct PerturbBlock {
     uint splats;
     uint planes;  // texel planes a splat
     uint instance_capacity;

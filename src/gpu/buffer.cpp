@@ -29,6 +29,8 @@ uint64_t texel_bytes(Texel texel) {
     return texel == Texel::rgba8 ? 4 : 16;
 }
 
+std::atomic<uint64_t> serial_of_last{0};
+
 }  // namespace
 
 Buffer::Buffer(Device& device, std::string name, uint64_t bytes, Texel texel, bool uniform, bool host_visible)
@@ -54,11 +56,14 @@ Buffer::Buffer(const Buffer& memory, uint64_t offset, std::string name, uint64_t
     create([&] { memory_ = memory.memory_; });
 }
 
+uint64_t Buffer::last_serial() {
+    return serial_of_last;
+}
+
 /// find_memory: sets memory_ when there is a buffer that tells what it needs.
 template <class FindMemory>
 void Buffer::create(FindMemory find_memory) {
-    static std::atomic<uint64_t> last_serial{0};
-    serial_ = ++last_serial;
+    serial_ = ++serial_of_last;
     const Limits& limits = device_->limits();
     const bool bound = texel_ != Texel::any;
     const bool fetched = texel_ != Texel::none && limits.texel_buffers;

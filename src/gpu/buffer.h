@@ -45,6 +45,8 @@ class Buffer {
     vk::Buffer handle() const { return *buffer_; }
     /// Differs between all buffers of a process; 0 for none.
     uint64_t serial() const { return buffer_ ? serial_ : 0; }
+    /// The serial of the last buffer that this process has made.
+    static uint64_t last_serial();
     vk::BufferView view() const { return *view_; }
     /// Offset of the buffer in its handle, bytes. It is not 0 if an address of the host has to be aligned.
     uint64_t begin() const { return begin_; }

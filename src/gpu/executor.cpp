@@ -2,7 +2,6 @@
 #include "gpu/executor.h"
 
 #include <algorithm>
-#include <deque>
 #include <stdexcept>
 #include <variant>
 
@@ -67,12 +66,18 @@ Executor::Executor(Device& device, uint32_t ahead) : device_(device), slots_(ahe
     pool.setQueueFamilyIndex(device.queue_family())
         .setFlags(vk::CommandPoolCreateFlagBits::eResetCommandBuffer);
     command_pool_ = device.handle().createCommandPoolUnique(pool);
-    vk::CommandBufferAllocateInfo allocate;
-    allocate.setCommandPool(*command_pool_).setCommandBufferCount(1);
     for (Slot& slot : slots_) {
-        slot.commands = std::move(device.handle().allocateCommandBuffersUnique(allocate).front());
+        slot.own = new_commands();
         slot.fence = device.handle().createFenceUnique({});
     }
+}
+
+Executor::Commands Executor::new_commands() {
+    Commands commands;
+    vk::CommandBufferAllocateInfo allocate;
+    allocate.setCommandPool(*command_pool_).setCommandBufferCount(1);
+    commands.buffer = std::move(device_.handle().allocateCommandBuffersUnique(allocate).front());
+    return commands;
 }
 
 Executor::~Executor() {
@@ -83,32 +88,32 @@ Executor::~Executor() {
     }
 }
 
-void Executor::reserve(Slot& slot, const Recording& recording, bool timed) {
+void Executor::reserve(Commands& to, const Recording& recording, bool timed) {
     uint32_t sets = 0, bindings = 0;
     for (const Command& command : recording.commands()) {
         if (command.kind != Command::Kind::dispatch) continue;
         ++sets;
         bindings += uint32_t(command.pipeline->reflection().bindings.size());
     }
-    if (!slot.descriptor_pool || sets > slot.pool_sets || bindings > slot.pool_bindings) {
-        slot.pool_sets = std::max(1u, 2 * sets);
-        slot.pool_bindings = std::max(1u, 2 * bindings);
+    if (!to.descriptor_pool || sets > to.pool_sets || bindings > to.pool_bindings) {
+        to.pool_sets = std::max(1u, 2 * sets);
+        to.pool_bindings = std::max(1u, 2 * bindings);
         const std::array sizes{
-            vk::DescriptorPoolSize(vk::DescriptorType::eStorageBuffer, slot.pool_bindings),
-            vk::DescriptorPoolSize(vk::DescriptorType::eUniformBuffer, slot.pool_bindings),
-            vk::DescriptorPoolSize(vk::DescriptorType::eUniformTexelBuffer, slot.pool_bindings)};
+            vk::DescriptorPoolSize(vk::DescriptorType::eStorageBuffer, to.pool_bindings),
+            vk::DescriptorPoolSize(vk::DescriptorType::eUniformBuffer, to.pool_bindings),
+            vk::DescriptorPoolSize(vk::DescriptorType::eUniformTexelBuffer, to.pool_bindings)};
         vk::DescriptorPoolCreateInfo create;
-        create.setMaxSets(slot.pool_sets).setPoolSizes(sizes);
-        slot.descriptor_pool = device_.handle().createDescriptorPoolUnique(create);
+        create.setMaxSets(to.pool_sets).setPoolSizes(sizes);
+        to.descriptor_pool = device_.handle().createDescriptorPoolUnique(create);
     } else {
-        device_.handle().resetDescriptorPool(*slot.descriptor_pool);
+        device_.handle().resetDescriptorPool(*to.descriptor_pool);
     }
     const uint32_t queries = uint32_t(recording.commands().size()) + 1;
-    if (timed && queries > slot.query_count) {
-        slot.query_count = 2 * queries;
+    if (timed && queries > to.query_count) {
+        to.query_count = 2 * queries;
         vk::QueryPoolCreateInfo create;
-        create.setQueryType(vk::QueryType::eTimestamp).setQueryCount(slot.query_count);
-        slot.queries = device_.handle().createQueryPoolUnique(create);
+        create.setQueryType(vk::QueryType::eTimestamp).setQueryCount(to.query_count);
+        to.queries = device_.handle().createQueryPoolUnique(create);
     }
 }
 
@@ -117,9 +122,14 @@ vk::DescriptorSet Executor::bind(const Command& command, vk::DescriptorPool pool
     vk::DescriptorSetAllocateInfo allocate;
     allocate.setDescriptorPool(pool).setSetLayouts(layout);
     const vk::DescriptorSet set = device_.handle().allocateDescriptorSets(allocate).front();
-    std::deque<vk::DescriptorBufferInfo> infos;
-    std::deque<vk::BufferView> views;
+    const size_t bindings = command.pipeline->reflection().bindings.size();
+    // The updates point into these, so they never grow beyond what is reserved.
+    std::vector<vk::DescriptorBufferInfo> infos;
+    std::vector<vk::BufferView> views;
     std::vector<vk::WriteDescriptorSet> updates;
+    infos.reserve(bindings);
+    views.reserve(bindings);
+    updates.reserve(bindings);
     for (const Binding& binding : command.pipeline->reflection().bindings) {
         const BufferPart& part = command.uses[binding.binding].part;
         vk::WriteDescriptorSet update;
@@ -136,8 +146,15 @@ vk::DescriptorSet Executor::bind(const Command& command, vk::DescriptorPool pool
     return set;
 }
 
-void Executor::record(const Recording& recording, const Slot& slot, bool timed) {
-    const vk::CommandBuffer commands = *slot.commands;
+void Executor::record(const Recording& recording, Commands& to, bool timed,
+                      vk::CommandBufferUsageFlags usage) {
+    reserve(to, recording, timed);
+    to.timed_names.clear();
+    if (timed)
+        for (const Command& command : recording.commands()) to.timed_names.push_back(command.name);
+    const vk::CommandBuffer commands = *to.buffer;
+    commands.reset();
+    commands.begin(vk::CommandBufferBeginInfo(usage));
     using Stage = vk::PipelineStageFlagBits;
     using Flag = vk::AccessFlagBits;
     const vk::PipelineStageFlags work = Stage::eComputeShader | Stage::eTransfer;
@@ -145,7 +162,7 @@ void Executor::record(const Recording& recording, const Slot& slot, bool timed) 
     const vk::AccessFlags used = written | Flag::eShaderRead | Flag::eTransferRead | Flag::eUniformRead;
     uint32_t query = 0;
     const auto stamp = [&] {
-        if (timed) commands.writeTimestamp(Stage::eBottomOfPipe, *slot.queries, query++);
+        if (timed) commands.writeTimestamp(Stage::eBottomOfPipe, *to.queries, query++);
     };
     // What earlier submissions wrote is seen here: their fence orders the host alone.
     const auto barrier = [&](vk::PipelineStageFlags after, vk::AccessFlags writes, bool for_groups) {
@@ -154,7 +171,7 @@ void Executor::record(const Recording& recording, const Slot& slot, bool timed) 
             vk::MemoryBarrier(writes, for_groups ? used | Flag::eIndirectCommandRead : used), {}, {});
     };
     barrier(Stage::eAllCommands, Flag::eMemoryWrite, true);
-    if (timed) commands.resetQueryPool(*slot.queries, 0, uint32_t(recording.commands().size()) + 1);
+    if (timed) commands.resetQueryPool(*to.queries, 0, uint32_t(recording.commands().size()) + 1);
     stamp();
     for (const Command& command : recording.commands()) {
         if (command.barrier_before) barrier(work, written, command.barrier_for_groups);
@@ -167,11 +184,16 @@ void Executor::record(const Recording& recording, const Slot& slot, bool timed) 
             commands.copyBuffer(source.handle(), target.handle(),
                                 vk::BufferCopy(source.begin() + command.source_offset,
                                                target.begin() + command.target_offset, command.bytes));
+        } else if (command.kind == Command::Kind::write) {
+            const Buffer& target = *command.uses[0].part.buffer;
+            commands.updateBuffer(
+                target.handle(), target.begin() + command.target_offset,
+                vk::ArrayProxy<const std::byte>(uint32_t(command.push.size()), command.push.data()));
         } else {
             const vk::PipelineBindPoint compute = vk::PipelineBindPoint::eCompute;
             commands.bindPipeline(compute, command.pipeline->handle());
             commands.bindDescriptorSets(compute, command.pipeline->layout(), 0,
-                                        bind(command, *slot.descriptor_pool), {});
+                                        bind(command, *to.descriptor_pool), {});
             if (!command.push.empty())
                 commands.pushConstants(command.pipeline->layout(), vk::ShaderStageFlagBits::eCompute, 0,
                                        uint32_t(command.push.size()), command.push.data());
@@ -186,33 +208,56 @@ void Executor::record(const Recording& recording, const Slot& slot, bool timed) 
     }
     // The fence alone does not make writes visible to the host.
     commands.pipelineBarrier(work, Stage::eHost, {}, vk::MemoryBarrier(written, Flag::eHostRead), {}, {});
+    commands.end();
 }
 
-template <class Record>
-void Executor::submit(Slot& slot, vk::SubmitInfo info, Record record) {
-    with_driver_errors(device_, [&] {
-        slot.commands->reset();
-        slot.commands->begin(vk::CommandBufferBeginInfo(vk::CommandBufferUsageFlagBits::eOneTimeSubmit));
-        record();
-        slot.commands->end();
-        info.setCommandBuffers(*slot.commands);
-        device_.handle().resetFences(*slot.fence);
-        device_.submit(info, *slot.fence);
-    });
+Executor::Slot& Executor::free_slot() {
+    if (unfinished_ == slots_.size()) throw std::logic_error("a submission too many ahead of the device");
+    Slot& slot = slots_[next_];
+    slot.kept = nullptr;
+    return slot;
+}
+
+void Executor::submit(Slot& slot, vk::SubmitInfo info) {
+    const std::array buffers{*slot.own.buffer, slot.kept ? *slot.kept->buffer : vk::CommandBuffer()};
+    info.setCommandBufferCount(slot.kept ? 2 : 1).setPCommandBuffers(buffers.data());
+    device_.handle().resetFences(*slot.fence);
+    device_.submit(info, *slot.fence);
     next_ = (next_ + 1) % uint32_t(slots_.size());
     ++unfinished_;
 }
 
 void Executor::submit(const Recording& recording, bool timed) {
-    if (unfinished_ == slots_.size()) throw std::logic_error("a submission too many ahead of the device");
-    Slot& slot = slots_[next_];
-    timed = timed && device_.limits().timestamps;
-    slot.timed_names.clear();
-    if (timed)
-        for (const Command& command : recording.commands()) slot.timed_names.push_back(command.name);
-    submit(slot, {}, [&] {
-        reserve(slot, recording, timed);
-        record(recording, slot, timed);
+    Slot& slot = free_slot();
+    with_driver_errors(device_, [&] {
+        record(recording, slot.own, timed && device_.limits().timestamps,
+               vk::CommandBufferUsageFlagBits::eOneTimeSubmit);
+        submit(slot);
+    });
+}
+
+bool Executor::used(const Commands& commands) const {
+    const auto count = uint32_t(slots_.size());
+    for (uint32_t ago = 1; ago <= unfinished_; ++ago)
+        if (slots_[(next_ + count - ago) % count].kept == &commands) return true;
+    return false;
+}
+
+void Executor::keep(uint32_t number, const Recording& recording, bool timed) {
+    while (kept_.size() <= number) kept_.push_back(new_commands());
+    if (used(kept_[number])) throw std::logic_error("a kept recording that the device still needs");
+    with_driver_errors(device_,
+                       [&] { record(recording, kept_[number], timed && device_.limits().timestamps, {}); });
+}
+
+void Executor::submit(const Recording& first, uint32_t kept, bool timed) {
+    if (used(kept_.at(kept))) throw std::logic_error("a kept recording that the device still needs");
+    Slot& slot = free_slot();
+    slot.kept = &kept_[kept];
+    with_driver_errors(device_, [&] {
+        record(first, slot.own, timed && device_.limits().timestamps,
+               vk::CommandBufferUsageFlagBits::eOneTimeSubmit);
+        submit(slot);
     });
 }
 
@@ -263,8 +308,8 @@ void Executor::record(std::span<const CopyOut> copies, vk::CommandBuffer command
 
 void Executor::copy_out(std::span<const CopyOut> copies, const DeviceSync& sync) {
     while (unfinished_) wait();
-    Slot& slot = slots_[next_];
-    slot.timed_names.clear();
+    Slot& slot = free_slot();
+    slot.own.timed_names.clear();
     const vk::Semaphore waits(sync.wait), signals(sync.signal);
     const vk::PipelineStageFlags stage = vk::PipelineStageFlagBits::eAllCommands;
     const vk::TimelineSemaphoreSubmitInfo values(1, &sync.wait_value, 1, &sync.signal_value);
@@ -272,7 +317,13 @@ void Executor::copy_out(std::span<const CopyOut> copies, const DeviceSync& sync)
     if (waits) info.setWaitSemaphores(waits).setWaitDstStageMask(stage);
     if (signals) info.setSignalSemaphores(signals);
     if (sync.wait_value || sync.signal_value) info.setPNext(&values);
-    submit(slot, info, [&] { record(copies, *slot.commands); });
+    with_driver_errors(device_, [&] {
+        slot.own.buffer->reset();
+        slot.own.buffer->begin(vk::CommandBufferBeginInfo(vk::CommandBufferUsageFlagBits::eOneTimeSubmit));
+        record(copies, *slot.own.buffer);
+        slot.own.buffer->end();
+        submit(slot, info);
+    });
     wait();
 }
 
@@ -283,7 +334,10 @@ void Executor::wait() {
         if (device_.handle().waitForFences(*slot.fence, true, kForever) != vk::Result::eSuccess)
             throw RunError("the device did not finish");
         --unfinished_;
-        if (!slot.timed_names.empty()) read_timings(slot);
+        if (slot.own.timed_names.empty() && (!slot.kept || slot.kept->timed_names.empty())) return;
+        timings_.clear();
+        add_timings(slot.own);
+        if (slot.kept) add_timings(*slot.kept);
     });
     device_.check_validation();
 }
@@ -293,14 +347,14 @@ void Executor::run(const Recording& recording, bool timed) {
     while (unfinished_) wait();
 }
 
-void Executor::read_timings(const Slot& slot) {
-    const uint32_t count = uint32_t(slot.timed_names.size()) + 1;
+void Executor::add_timings(const Commands& commands) {
+    if (commands.timed_names.empty()) return;
+    const uint32_t count = uint32_t(commands.timed_names.size()) + 1;
     const auto stamps = device_.handle().getQueryPoolResults<uint64_t>(
-        *slot.queries, 0, count, count * sizeof(uint64_t), sizeof(uint64_t),
+        *commands.queries, 0, count, count * sizeof(uint64_t), sizeof(uint64_t),
         vk::QueryResultFlagBits::e64 | vk::QueryResultFlagBits::eWait);
-    timings_.clear();
     for (uint32_t i = 0; i + 1 < count; ++i) {
-        const std::string& name = slot.timed_names[i];
+        const std::string& name = commands.timed_names[i];
         const double ticks = double(stamps.value[i + 1] - stamps.value[i]);
         auto found =
             std::find_if(timings_.begin(), timings_.end(), [&](const PassTime& t) { return t.pass == name; });

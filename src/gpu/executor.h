@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Turns recordings into submissions, and times every command by its name. The device runs submissions one after
-// the other; the host may be a few ahead of it.
+// the other; the host may be a few ahead of it. A recording that is kept is turned into the device's commands once, and submitted any
+// number of times.
 #pragma once
 #include <cstdint>
+#include <deque>
 #include <span>
 #include <string>
 #include <vector>
@@ -27,6 +29,13 @@ class Executor {
     /// Submits a recording. Its buffers and pipelines must live until wait() has returned for it. timed: also measures
     /// each command. Throws RunError if the device is lost, std::logic_error if too many submissions are unfinished.
     void submit(const Recording& recording, bool timed = false);
+    /// Keeps a recording under a number from 0, in place of an earlier one. Its buffers and pipelines must live as long as it is
+    /// submitted. timed: each submission measures its commands. Throws std::logic_error if an unfinished submission uses the earlier
+    /// one.
+    void keep(uint32_t number, const Recording& recording, bool timed = false);
+    /// Submits a recording and then the kept one, which no unfinished submission may use. timed: also measures the commands of the
+    /// first.
+    void submit(const Recording& first, uint32_t kept, bool timed);
     /// Submissions that wait() has not returned for.
     uint32_t unfinished() const { return unfinished_; }
     /// Waits until the oldest unfinished submission is done. Then everything that it wrote is visible to the
@@ -50,29 +59,39 @@ class Executor {
     const std::vector<PassTime>& timings() const { return timings_; }
 
   private:
-    /// Objects that a submission needs until it is done.
-    struct Slot {
-        vk::UniqueCommandBuffer commands;
-        vk::UniqueFence fence;
+    /// The device's commands of a recording, and the objects that they need.
+    struct Commands {
+        vk::UniqueCommandBuffer buffer;
         vk::UniqueDescriptorPool descriptor_pool;
         uint32_t pool_sets = 0, pool_bindings = 0;
         vk::UniqueQueryPool queries;
         uint32_t query_count = 0;
         std::vector<std::string> timed_names;  // of the commands; empty: not timed
     };
+    /// A submission until it is done.
+    struct Slot {
+        Commands own;
+        vk::UniqueFence fence;
+        const Commands* kept = nullptr;  // which follow; null: none
+    };
 
+    Commands new_commands();
     vk::DescriptorSet bind(const Command& command, vk::DescriptorPool pool);
-    void record(const Recording& recording, const Slot& slot, bool timed);
+    void record(const Recording& recording, Commands& commands, bool timed,
+                vk::CommandBufferUsageFlags usage);
     void record(std::span<const CopyOut> copies, vk::CommandBuffer commands) const;
-    /// Records by record(), and submits with what `info` has besides.
-    template <class Record>
-    void submit(Slot& slot, vk::SubmitInfo info, Record record);
-    void read_timings(const Slot& slot);
-    void reserve(Slot& slot, const Recording& recording, bool timed);
+    Slot& free_slot();
+    /// Whether an unfinished submission uses kept commands.
+    bool used(const Commands& commands) const;
+    /// Submits the slot's commands, with what `info` has besides.
+    void submit(Slot& slot, vk::SubmitInfo info = {});
+    void add_timings(const Commands& commands);
+    void reserve(Commands& commands, const Recording& recording, bool timed);
 
     Device& device_;
     vk::UniqueCommandPool command_pool_;
     std::vector<Slot> slots_;
+    std::deque<Commands> kept_;  // by number
     uint32_t next_ = 0, unfinished_ = 0;
     std::vector<PassTime> timings_;
 };

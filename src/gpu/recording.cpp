@@ -89,6 +89,18 @@ void Recording::copy(const Buffer& source, uint64_t source_offset, const Buffer&
             .bytes = bytes});
 }
 
+void Recording::write(const Buffer& target, uint64_t offset, std::span<const std::byte> bytes) {
+    if (bytes.empty() || bytes.size() > kMostWritten || offset % 4 || bytes.size() % 4 ||
+        offset + bytes.size() > target.bytes())
+        throw std::logic_error("write of " + std::to_string(bytes.size()) + " bytes to " + target.name());
+    append({.kind = Command::Kind::write,
+            .name = "write " + target.name(),
+            .uses = {{target, Access::write}},
+            .push = {bytes.begin(), bytes.end()},
+            .target_offset = offset,
+            .bytes = bytes.size()});
+}
+
 void Recording::append(Command command) {
     // A command needs a barrier if, since the last one, memory that it reads was written, or memory that it
     // writes was read or written. Buffers may share memory.

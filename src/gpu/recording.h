@@ -39,12 +39,12 @@ struct Use {
 using Workgroups = std::variant<std::array<uint32_t, 3>, BufferPart>;
 
 struct Command {
-    enum class Kind { dispatch, fill, copy } kind = Kind::dispatch;
+    enum class Kind { dispatch, fill, copy, write } kind = Kind::dispatch;
     std::string name;
-    // dispatch: by binding, then the buffer with the workgroups if there is one; fill: the target; copy: source, then target
+    // dispatch: by binding, then the buffer with the workgroups if there is one; fill, write: the target; copy: source, then target
     std::vector<Use> uses;
     const Pipeline* pipeline = nullptr;
-    std::vector<std::byte> push{};
+    std::vector<std::byte> push{};  // write: the bytes
     Workgroups groups = std::array<uint32_t, 3>{1, 1, 1};
     uint32_t fill_value = 0;
     uint64_t source_offset = 0, target_offset = 0, bytes = 0;
@@ -70,6 +70,9 @@ class Recording {
     void fill(const Buffer& target, uint32_t value, uint64_t offset, uint64_t bytes);
     void copy(const Buffer& source, uint64_t source_offset, const Buffer& target, uint64_t target_offset,
               uint64_t bytes);
+    /// Writes bytes that are part of the recording. Their number and the offset are multiples of 4.
+    void write(const Buffer& target, uint64_t offset, std::span<const std::byte> bytes);
+    static constexpr size_t kMostWritten = 65536;  // bytes
     /// Adds a command that may come from another recording. Its barrier is derived again.
     void append(Command command);
 

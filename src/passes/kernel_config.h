@@ -31,10 +31,11 @@ struct KernelConfig {
     uint32_t loop_limit = 65535;   // iterations of a loop in one invocation
     uint32_t broadcast = shared::BROADCAST_SHUFFLES;  // of blending: SPEC_BROADCAST
     uint32_t frames_in_flight = 1;                    // training steps that are submitted and not finished
+    bool replayed_steps = false;  // the commands of a training step are recorded once and submitted again
+    bool texel_buffers = true;    // read-only buffers are texel buffers, or storage buffers
     // The next two are of frames with FrameRequest::splatting. Others have sorted slots and lists of tiles.
     uint32_t slots = shared::SLOTS_SORTED;  // SPEC_SLOTS
     uint32_t quads = 0;                     // SPEC_QUADS
-    bool texel_buffers = true;              // read-only buffers are texel buffers, or storage buffers
     /// Modules that the build has made faster to compile. They change no byte. Tests compare them with whole ones.
     bool optimised_modules = true;
     /// Smaller alphas are skipped. Benchmarks change it to compare speed.
@@ -79,6 +80,7 @@ inline KernelConfig config_for(const gpu::Limits& limits) {
         config.sort_lanes_max = 16384;
         config.sort_chunk = 64;
         config.frames_in_flight = 2;
+        config.replayed_steps = true;
         // A third fewer instances than with 64 pixels. A lane of 32 has registers for four pixels.
         if (config.subgroup == 32) config.tile_width = 16;
         config.scan_turns = 16;

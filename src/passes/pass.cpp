@@ -25,10 +25,10 @@ static_assert(sizeof(PpispPush) == 24 && sizeof(PpispUpdatePush) == 36 && sizeof
               sizeof(GridPush) == 32 && sizeof(GridUpdatePush) == 32);
 static_assert(sizeof(SkyPush) == 24 && sizeof(SkyGradientPush) == 28 && sizeof(SkyUpdatePush) == 24);
 static_assert(sizeof(MoveCameraPush) == 8 && sizeof(MotionUpdatePush) == 44);
-static_assert(sizeof(UpdatePush) == 76 && sizeof(DensifyPush) == 96 && sizeof(ResetPush) == 12);
+static_assert(sizeof(UpdateBlock) == 76 && sizeof(DensifyPush) == 96 && sizeof(ResetPush) == 12);
 static_assert(sizeof(BandTilesPush) == 16 && sizeof(CollectVisiblePush) == 24 && sizeof(ReceivePush) == 12 &&
               sizeof(SumSlotsPush) == 8 && sizeof(UpdateViewsPush) == 92);
-static_assert(sizeof(McmcPush) == 96 && sizeof(PerturbPush) == 40);
+static_assert(sizeof(McmcPush) == 96 && sizeof(PerturbBlock) == 40);
 static_assert(sizeof(TraceView) == 4 * (9 + 3 + 2 + 2 + 2 + 9 + 1) && sizeof(TraceCounts) == 8 &&
               sizeof(TracePush) == 24);
 

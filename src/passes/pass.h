@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The common parts of all passes. A pass is a struct that describes one shader (passes.h). It has
 // - shader: the file in shaders/passes without extension, which is also the name of the timing;
-// - Work: the push constants (Push), the invocations of a workgroup (group_size), and the workgroups
+// - Work: the push constants (Push), or those of a uniform block, the invocations of a workgroup (group_size), and the workgroups
 //   (groups);
 // - data members: one gpu::BufferPart for each of the shader's bindings, in their order.
 // A pass does not say what it reads or writes: a recording derives that from the shader.
@@ -46,6 +46,12 @@ struct PerElement : ElementGroup<decltype(push_of(kItems))> {
     static Groups groups(const KernelConfig& config, const decltype(push_of(kItems))& push) {
         return element_groups(config, std::invoke(kItems, push), kLayers);
     }
+};
+
+/// The same for a pass whose values are in a uniform block. `Push` is then the block, of which only the number of elements is read.
+template <auto kItems>
+struct PerElementOfBlock : PerElement<kItems> {
+    static constexpr bool push_in_buffer = true;
 };
 
 /// One invocation for each of push.splats, in a layer for each of push.views.
@@ -133,8 +139,11 @@ struct Pass {
                 const gpu::Workgroups& groups, const char* name = Definition::shader) const {
         constexpr size_t kParts = sizeof(Definition) / sizeof(gpu::BufferPart);
         static_assert(sizeof(Definition) == kParts * sizeof(gpu::BufferPart));
+        std::span<const std::byte> constants;
+        if constexpr (!requires { Definition::Work::push_in_buffer; })
+            constants = std::as_bytes(std::span(&push, 1));
         recording.dispatch(pipeline, name, std::bit_cast<std::array<gpu::BufferPart, kParts>>(buffers),
-                           std::as_bytes(std::span(&push, 1)), groups);
+                           constants, groups);
     }
 };
 

@@ -27,11 +27,11 @@ struct ProjectRays : ProjectBuffers {
     gpu::BufferPart rays;
 };
 
-/// The buffers of a projection's gradient, fused with Adam.
+/// The buffers of a projection's gradient, fused with Adam. values: an UpdateBlock.
 struct UpdateBuffers {
-    using Work = PerElement<&shared::UpdatePush::splats>;
+    using Work = PerElementOfBlock<&shared::UpdateBlock::splats>;
     gpu::BufferPart params, camera, records, slots, moments1, moments2, tile_counts, first_instances, counts,
-        params_out, moments1_out, moments2_out, statistics, sorted_indices;
+        params_out, moments1_out, moments2_out, statistics, sorted_indices, values;
 };
 
 /// Gradient of Project. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (UPDATE_* bits), SPEC_LENSES, SPEC_SLOTS.
@@ -536,11 +536,11 @@ struct McmcWrite {
     gpu::BufferPart params, moments, dead, prefix, totals, sources, hits, array_out;
 };
 
-/// Adds noise to the means.
+/// Adds noise to the means. values: a PerturbBlock.
 struct Perturb {
     static constexpr char shader[] = "perturb";
-    using Work = PerElement<&shared::PerturbPush::splats>;
-    gpu::BufferPart params, counts, moments;
+    using Work = PerElementOfBlock<&shared::PerturbBlock::splats>;
+    gpu::BufferPart params, counts, moments, values;
 };
 
 // The sky behind the splats.

@@ -9,7 +9,7 @@
 namespace ewa::pipeline {
 namespace {
 
-shared::UpdatePush update_push(const Model& model, const FrameBuffers& frame, const Rates& rates) {
+shared::UpdateBlock update_values(const Model& model, const FrameBuffers& frame, const Rates& rates) {
     const AdamShares shares = adam_shares(rates.nesterov, rates.step);
     return {.splats = model.splats,
             .planes = model.planes(),
@@ -133,6 +133,29 @@ void FramePasses::compare_depth(const DepthUse& depths, const shared::MaskPush& 
     mean_of_partials(shared::REDUCE_TO_DEPTH, frame.sizes.partials / 3, 1, float(share));
 }
 
+/// Composites a photo over the background, into frame.target.
+void FramePasses::unpack(const gpu::Buffer& photo) const {
+    const shared::ImageLayout layout = frame.sizes.image();
+    record(passes::UnpackTarget{.photo = photo, .planes = frame.target},
+           {.background = {inputs.background[0], inputs.background[1], inputs.background[2]},
+            .image = layout,
+            .first_pixel = inputs.band.first * layout.size[0]},
+           {{shared::SPEC_COLOR_FLOATS, photo.texel() == gpu::Texel::rgba32f ? 1u : 0u}});
+}
+
+void FramePasses::write_values(const Model& model, const Rates& rates) const {
+    const shared::UpdateBlock values = update_values(model, frame, rates);
+    recording.write(frame.update_values, 0, std::as_bytes(std::span(&values, 1)));
+}
+
+void FramePasses::prepare(const Model& model, const gpu::Buffer& photo, const Rates& rates) const {
+    recording.copy(*inputs.camera.buffer, inputs.camera.offset, frame.step_camera, 0,
+                   sizeof(shared::CameraBlock));
+    clear_counts();
+    write_values(model, rates);
+    unpack(photo);
+}
+
 void FramePasses::loss(const gpu::Buffer& photo, bool masked, const AppearanceUse* appearance, bool cut,
                        const DepthUse& depths) const {
     const shared::ImageLayout layout = frame.sizes.image();
@@ -157,12 +180,8 @@ void FramePasses::loss(const gpu::Buffer& photo, bool masked, const AppearanceUs
             passes::MaskImages{
                 .photo = photo, .image = render, .target = frame.target, .masked = frame.masked},
             mask, colors);
-    else
-        record(passes::UnpackTarget{.photo = photo, .planes = frame.target},
-               {.background = {inputs.background[0], inputs.background[1], inputs.background[2]},
-                .image = layout,
-                .first_pixel = first_pixel},
-               colors);
+    else if (!inputs.prepared)
+        unpack(photo);
     compare(image, push, float(share));
     if (masked)
         record(passes::MaskGradient{.photo = photo, .image_gradient = frame.image_gradient}, mask, colors);
@@ -193,6 +212,7 @@ void FramePasses::blend_backward(const Sorted& sorted) const {
 void FramePasses::backward(const Model& model, const Sorted& sorted, const Rates& rates,
                            const MotionUse* motion) const {
     blend_backward(sorted);
+    if (!inputs.prepared) write_values(model, rates);
     const gpu::Buffer& moments2 = model.second_moments();
     // Packed moments and a gradient alone have no buffer of second moments, and a gradient no statistics. The kernel
     // does not use those bindings, but they need a buffer.
@@ -209,9 +229,10 @@ void FramePasses::backward(const Model& model, const Sorted& sorted, const Rates
                                         .moments1_out = model.moments1,
                                         .moments2_out = moments2,
                                         .statistics = plan.statistics ? model.statistics : frame.partials,
-                                        .sorted_indices = *sorted.indices};
+                                        .sorted_indices = *sorted.indices,
+                                        .values = frame.update_values};
     passes_of(*plan.method)
-        .update(*this, buffers, update_push(model, frame, rates), {shared::SPEC_MODE, update_mode(plan)});
+        .update(*this, buffers, update_values(model, frame, rates), {shared::SPEC_MODE, update_mode(plan)});
     if (plan.motion) record_motion_sums(*this, frame, inputs.camera.lenses == shared::LENSES_ROLLING);
     if (motion) record_motion_update(*this, frame, *motion);
 }

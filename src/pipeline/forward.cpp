@@ -135,9 +135,13 @@ gpu::SpecConstant FramePasses::degree() const {
     return {shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)};
 }
 
-void FramePasses::project(const Model& model) const {
+void FramePasses::clear_counts() const {
     recording.fill(frame.counts, 0, 0,
                    inputs.keep_overflow ? offsetof(shared::Counts, overflowed) : sizeof(shared::Counts));
+}
+
+void FramePasses::project(const Model& model) const {
+    if (!inputs.prepared) clear_counts();
     const passes::ProjectBuffers buffers{.params = model.params,
                                          .camera = camera(),
                                          .records = frame.records,

@@ -231,7 +231,7 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
     if (request.gradients && !request.given_gradient) size_loss(s, config, request);
     if (request.gradients && request.motion) {
         const uint64_t motion_rows = request.readouts ? shared::READOUT_MOTION_VALUES : shared::MOTION_VALUES;
-        shared::UpdatePush push{};
+        shared::UpdateBlock push{};
         push.splats = std::max(request.splats, 1u);
         const auto groups = passes::Update::Work::groups(config, push);
         s.motion_items = groups[0] * groups[1] * (config.element_group / config.subgroup);
@@ -255,18 +255,25 @@ uint64_t Sizes::total() const {
     return sum;
 }
 
-void FrameBuffers::reserve(gpu::Device& device, const passes::KernelConfig& config,
-                           const FrameRequest& request) {
-    const Sizes old = sizes;
-    sizes = sizes_for(config, request);
-    instance_capacity = request.instances;
+void FrameBuffers::reserve_counts(gpu::Device& device, const passes::KernelConfig& config) {
     if (!counts) {
         counts = gpu::Buffer(device, "counts", sizeof(shared::Counts));
         if (!counts.mapped() || config.frames_in_flight > 1)
             counts_copy = gpu::Buffer(device, "counts copy", config.frames_in_flight * sizeof(shared::Counts),
                                       Texel::none, false, true);
     }
+    if (update_values) return;
+    step_camera = gpu::Buffer(device, "step camera", sizeof(shared::CameraBlock), Texel::none, true);
+    update_values = gpu::Buffer(device, "update values", sizeof(shared::UpdateBlock), Texel::none, true);
+    noise_values = gpu::Buffer(device, "noise values", sizeof(shared::PerturbBlock), Texel::none, true);
+}
 
+void FrameBuffers::reserve(gpu::Device& device, const passes::KernelConfig& config,
+                           const FrameRequest& request) {
+    const Sizes old = sizes;
+    sizes = sizes_for(config, request);
+    instance_capacity = request.instances;
+    reserve_counts(device, config);
     for (const Allocation& each : allocations(*this, sizes)) {
         if (each.bytes == 0 || each.buffer->bytes() >= each.bytes) continue;
         if (each.buffer == &overlay) free_overlaid();

@@ -78,6 +78,9 @@ struct FrameBuffers {
     gpu::Buffer counts;  // in device memory, since every splat adds to them
     /// Host-visible copies of counts, one for each of frames_in_flight frames. Empty if the host can read `counts` itself.
     gpu::Buffer counts_copy;
+    // What differs from step to step of a training, for commands that are replayed: the view's CameraBlock, the UpdateBlock and
+    // the PerturbBlock.
+    gpu::Buffer step_camera, update_values, noise_values;
     gpu::Buffer records, depth_keys[2], order[2], tile_counts, prefix, scan_totals, first_instances;
     gpu::Buffer counters, counter_prefix, digit_totals;
     gpu::Buffer instance_keys[2], instance_splats[2], sorted_indices[2], tile_starts;
@@ -90,6 +93,8 @@ struct FrameBuffers {
     /// Allocates the buffers that a request needs. Buffers that are large enough stay. Image planes are zeroed if their layout
     /// changes. Throws as sizes_for and gpu::Buffer do.
     void reserve(gpu::Device& device, const passes::KernelConfig& config, const FrameRequest& request);
+    /// Allocates the buffers whose size depends on no request. reserve does it too.
+    void reserve_counts(gpu::Device& device, const passes::KernelConfig& config);
     /// Frees all buffers whose size depends on the number of instances, and those that share their memory, until the
     /// next reserve.
     void free_instances();

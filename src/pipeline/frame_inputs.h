@@ -45,6 +45,7 @@ struct FrameInputs {
     std::array<float, 3> background{0, 0, 0};  // black with a sky
     SkyUse sky{};
     bool keep_overflow = false;    // this frame does nothing if an earlier frame in flight overflows
+    bool prepared = false;         // FramePasses::prepare has recorded the beginning of the frame
     int sh_degree = kMaxShDegree;  // degree to evaluate, at most the plan's stored degree
     uint32_t samples = 1;          // of a ray, with Integrator::march
     Band band{};

@@ -36,6 +36,10 @@ struct FramePasses : passes::Recorder {
     const FrameBuffers& frame;
     const FrameInputs& inputs;
 
+    /// Records what differs from step to step of a training: copies the camera to frame.step_camera, clears the counts, unpacks the
+    /// photo, and writes the values of the update. The passes of a frame with inputs.prepared, whose camera is frame.step_camera,
+    /// are then the same commands in each step. photo: without a mask or a cut.
+    void prepare(const Model& model, const gpu::Buffer& photo, const Rates& rates) const;
     /// Project, depth order, instances, tile order, tile starts, blend. `frame` must be reserved for the
     /// model's splats and the camera's size. After the submission, Counts.instances is the number of instances
     /// needed. If that exceeds frame.instance_capacity, the image is empty: repeat the frame with more capacity.
@@ -109,6 +113,9 @@ struct FramePasses : passes::Recorder {
     }
 
   private:
+    void clear_counts() const;
+    void unpack(const gpu::Buffer& photo) const;
+    void write_values(const Model& model, const Rates& rates) const;
     void add_sky() const;
     void compare(const gpu::Buffer& image, const shared::LossPush& push, float share) const;
     void compare_alpha(const gpu::Buffer& photo, bool cut, const shared::MaskPush& at,

@@ -92,7 +92,7 @@ void project_rays(On on, const passes::ProjectBuffers& buffers, const shared::Pr
               {on.degree(), on.kernel(), {shared::SPEC_MODE, mode}, on.lenses(), on.wrap()});
 }
 
-void update_rays(On on, const passes::UpdateBuffers& buffers, const shared::UpdatePush& push, Mode mode) {
+void update_rays(On on, const passes::UpdateBuffers& buffers, const shared::UpdateBlock& push, Mode mode) {
     on.record(passes::UpdateRays{buffers}, push, {on.degree(), mode, on.kernel(), on.lenses()});
 }
 

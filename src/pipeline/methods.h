@@ -15,7 +15,7 @@ struct MethodPasses {
     MethodPass<passes::ProjectBuffers, shared::ProjectPush> project;
     MethodPass<passes::BlendBuffers, shared::BlendPush> blend;
     MethodPass<passes::BlendBackwardBuffers, shared::BlendPush> blend_backward;
-    MethodPass<passes::UpdateBuffers, shared::UpdatePush> update;
+    MethodPass<passes::UpdateBuffers, shared::UpdateBlock> update;
 };
 
 const MethodPasses& passes_of(const scene::Method& method);

@@ -256,20 +256,36 @@ void write_mcmc(const Phase& phase, Model& model, const McmcRules& rules, const 
                        });
 }
 
+namespace {
+
+shared::PerturbBlock noise_values(const Model& model, const FrameBuffers& frame, const Noise& noise) {
+    return {.splats = model.splats,
+            .planes = model.planes(),
+            .instance_capacity = frame.instance_capacity,
+            .amplitude = noise.amplitude,
+            .max_length = noise.max_length,
+            .seed = {uint32_t(noise.seed), uint32_t(noise.seed >> 32)},
+            .step = noise.step,
+            .first = model.first,
+            .frozen = noise.frozen};
+}
+
+}  // namespace
+
+void record_noise_values(gpu::Recording& recording, const Model& model, const FrameBuffers& frame,
+                         const Noise& noise) {
+    const shared::PerturbBlock values = noise_values(model, frame, noise);
+    recording.write(frame.noise_values, 0, std::as_bytes(std::span(&values, 1)));
+}
+
 void record_noise(const passes::Recorder& on, const Model& model, const FrameBuffers& frame,
-                  const Noise& noise) {
-    on.record(
-        passes::Perturb{
-            .params = model.params, .counts = frame.counts, .moments = marks(model, noise.frozen)},
-        {.splats = model.splats,
-         .planes = model.planes(),
-         .instance_capacity = frame.instance_capacity,
-         .amplitude = noise.amplitude,
-         .max_length = noise.max_length,
-         .seed = {uint32_t(noise.seed), uint32_t(noise.seed >> 32)},
-         .step = noise.step,
-         .first = model.first,
-         .frozen = noise.frozen});
+                  const Noise& noise, bool written) {
+    if (!written) record_noise_values(on.recording, model, frame, noise);
+    on.record(passes::Perturb{.params = model.params,
+                              .counts = frame.counts,
+                              .moments = marks(model, noise.frozen),
+                              .values = frame.noise_values},
+              noise_values(model, frame, noise));
 }
 
 }  // namespace ewa::pipeline

@@ -132,9 +132,12 @@ struct Noise {
     bool frozen = false;  // as in DensifyRules
 };
 
+/// Writes what record_noise reads of the noise.
+void record_noise_values(gpu::Recording& recording, const Model& model, const FrameBuffers& frame,
+                         const Noise& noise);
 /// Records a pass that adds to each mean amplitude * gate(opacity) * Sigma * a standard normal vector
-/// (shaders/passes/perturb.comp).
+/// (shaders/passes/perturb.comp). written: another recording has written the values.
 void record_noise(const passes::Recorder& on, const Model& model, const FrameBuffers& frame,
-                  const Noise& noise);
+                  const Noise& noise, bool written = false);
 
 }  // namespace ewa::pipeline

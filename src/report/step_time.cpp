@@ -141,6 +141,10 @@ std::string step_time_html(const StepTime& time, int earlier) {
         "in every 100th step.</p>\n",
         time.step, time.steps,
         earlier > 0 ? fmt::format(", after the run was resumed at step {}", earlier) : "");
+    if (time.host > 0)
+        html += fmt::format(
+            "<p class=\"soft\">The processor records and submits the commands of a step in {:.3f} ms.</p>\n",
+            time.host);
     return html + single_passes(time.passes);
 }
 

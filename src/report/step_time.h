@@ -20,6 +20,7 @@ struct StepTime {
     double step = 0;                // the whole step
     double refinement = 0;          // of it: adding, moving and removing splats
     std::vector<NamedTime> passes;  // on the device
+    double host = 0;                // recording and submitting the commands; 0: not measured
 };
 
 struct StageTime {

@@ -35,7 +35,7 @@ std::vector<TimesAt> times_in(const core::JsonField& all, const char* name) {
 }  // namespace
 
 report::StepTime report_times(const StepTimes& times) {
-    report::StepTime result{times.steps, times.step, times.refinement, {}};
+    report::StepTime result{times.steps, times.step, times.refinement, {}, times.host};
     for (const PassTime& time : times.passes) result.passes.push_back({time.pass, time.milliseconds});
     return result;
 }

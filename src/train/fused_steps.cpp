@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/fused_steps.h"
 
+#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -45,12 +46,63 @@ void FusedSteps::record(gpu::Recording& recording, int step, size_t index, const
         record_noise(on, model, parts_.tools.frame, noise_of(parts_, step));
 }
 
+bool FusedSteps::is_replayed(int step, const ImageCache& seen, size_t index) const {
+    const Plan& plan = parts_.plan;
+    const TrainOptions& options = parts_.options;
+    const bool same = !plan.masks && !plan.motion && !plan.sky && plan.appearance == AppearanceModel::none &&
+                      plan.loss.alpha == 0 && plan.loss.depth == 0 && !options.random_background &&
+                      options.background_noise == 0;
+    // Timestamps are commands too.
+    const bool timed_as_all = parts_.tools.frames_in_flight() == 1 || !is_timed(step);
+    return parts_.tools.cache.config().replayed_steps && same && timed_as_all && seen.cached(index);
+}
+
+void FusedSteps::submit_replayed(int step, const gpu::Buffer& photo, const portions::StepView& view) {
+    FrameTools& tools = parts_.tools;
+    const Model& model = parts_.portions.holder().use(0, portions::Need::state);
+    const Noise noise = noise_of(parts_, step);
+    const bool noisy = parts_.options.strategy == Strategy::mcmc;
+    FrameInputs inputs = view.inputs;
+    inputs.keep_overflow = !in_flight_.empty();
+    gpu::Recording ahead(parts_.device->limits());
+    FramePasses{{ahead, tools.cache}, parts_.plan, tools.frame, inputs}.prepare(model, photo,
+                                                                                rates_of(parts_, step));
+    if (noisy) record_noise_values(ahead, model, tools.frame, noise);
+    const CameraUse& camera = view.inputs.camera;
+    const Shape shape{.last_buffer = gpu::Buffer::last_serial(),
+                      .width = camera.width,
+                      .height = camera.height,
+                      .lenses = camera.lenses,
+                      .splats = model.splats,
+                      .capacity = tools.frame.instance_capacity,
+                      .sh_degree = view.inputs.sh_degree,
+                      .wraps = camera.wraps,
+                      .frozen = noise.frozen};
+    const uint32_t slot = slot_of(step);
+    if (kept_[slot] != shape) {
+        kept_[slot] = {};
+        ++parts_.log.times.recorded;
+        inputs.prepared = true;
+        inputs.camera.buffer = &tools.frame.step_camera;
+        inputs.camera.offset = 0;
+        gpu::Recording rest(parts_.device->limits());
+        const FramePasses on{{rest, tools.cache}, parts_.plan, tools.frame, inputs};
+        const Sorted sorted = on.forward(model);
+        view.record_loss(on);
+        on.backward(model, sorted, {});
+        if (noisy) record_noise(on, model, tools.frame, noise, true);
+        tools.frame.record_counts(rest, slot);
+        tools.executor.keep(slot, rest, is_timed(step));
+        kept_[slot] = shape;
+    }
+    tools.executor.submit(ahead, slot, is_timed(step));
+}
+
 void FusedSteps::submit(int step) {
     if (parts_.images.frees(size_t(parts_.schedule.halvings_at(step)))) finish_all();
     ImageCache& seen = parts_.images_at(step);
     const size_t index = parts_.index_of(step);
-    const portions::StepView view = view_of(parts_, step, seen, parts_.schedule.degree(step));
-    const CameraUse& camera = view.inputs.camera;
+    const CameraUse camera = seen.camera(index);
     // Buffers of another size, and an image from disk, take the place of what a step in flight reads.
     if (!seen.cached(index) || camera.width != parts_.tools.frame.sizes.width ||
         camera.height != parts_.tools.frame.sizes.height)
@@ -59,12 +111,21 @@ void FusedSteps::submit(int step) {
     if (in_flight_.empty())
         parts_.tools.frame.reserve(parts_.tools.cache.device(), parts_.tools.cache.config(),
                                    parts_.request_of(camera));
-    gpu::Recording recording(parts_.device->limits());
-    record(recording, step, index, view);
+    const auto start = std::chrono::steady_clock::now();
+    const portions::StepView view = view_of(parts_, step, seen, parts_.schedule.degree(step));
+    if (is_replayed(step, seen, index)) {
+        submit_replayed(step, seen.photo(index).texels, view);
+    } else {
+        gpu::Recording recording(parts_.device->limits());
+        record(recording, step, index, view);
+        ++parts_.log.times.recorded;
+        parts_.tools.frame.record_counts(recording, slot_of(step));
+        parts_.tools.executor.submit(recording, is_timed(step));
+    }
+    const auto submitted = std::chrono::steady_clock::now();
+    parts_.log.times.host += std::chrono::duration<double, std::milli>(submitted - start).count();
     if (parts_.schedule.halvings_at(step + 1) == parts_.schedule.halvings_at(step))
         seen.prepare(parts_.index_of(step + 1));
-    parts_.tools.frame.record_counts(recording, slot_of(step));
-    parts_.tools.executor.submit(recording, is_timed(step));
     in_flight_.push_back({step, view.weight()});
     compile_next_degree(step, index, seen);
     // An image from disk may be gone when its step has to be repeated: no other step follows before it is done.

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Training steps of one view by one rank that has all splats on the device in one portion. Each step is one submission. Several
 // submissions may be in flight.
+//
+// Where the kernels' configuration says so, a step is replayed: what differs from step to step is recorded in each step, and the
+// other commands only when they change.
 #pragma once
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <vector>
 
 #include "train/training_parts.h"
 
@@ -12,7 +16,7 @@ namespace ewa::train {
 
 class FusedSteps {
   public:
-    explicit FusedSteps(TrainingParts& parts) : parts_(parts) {}
+    explicit FusedSteps(TrainingParts& parts) : parts_(parts), kept_(parts.tools.frames_in_flight()) {}
 
     void optimise(int step);
     /// Waits for all steps.
@@ -24,8 +28,22 @@ class FusedSteps {
         int step;
         double weight;  // of its image's pixels
     };
+    /// What the commands of a replayed step depend on, besides the plan.
+    struct Shape {
+        uint64_t last_buffer =
+            0;  // Buffer::last_serial(): no buffer is replaced without another that is made
+        uint32_t width = 0, height = 0, lenses = 0, splats = 0, capacity = 0;
+        int sh_degree = 0;
+        bool wraps = false, frozen = false;
+        bool operator==(const Shape&) const = default;
+    };
     /// Records a step. A step can be recorded again, since all that changes from step to step is a pure function of its number.
     void record(gpu::Recording& recording, int step, size_t index, const portions::StepView& view);
+    /// Whether a step is replayed: its training image takes part in the loss alone, without a mask, a cut or depths, its background
+    /// is that of all steps, and nothing is learned besides the splats.
+    bool is_replayed(int step, const ImageCache& seen, size_t index) const;
+    /// Submits a step, with its other commands as they were recorded before if they are the same.
+    void submit_replayed(int step, const gpu::Buffer& photo, const portions::StepView& view);
     /// Submits a step. Afterwards at most frames_in_flight steps are in flight.
     void submit(int step);
     /// On a GPU, compiles the kernels of the next SH degree while the device runs a step of this degree.
@@ -41,6 +59,7 @@ class FusedSteps {
 
     TrainingParts& parts_;
     std::deque<Flight> in_flight_;
+    std::vector<Shape> kept_;   // of the executor's kept recordings, by slot
     int compiled_degree_ = -1;  // the highest SH degree whose kernels were asked for
 };
 

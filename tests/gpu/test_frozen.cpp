@@ -133,7 +133,7 @@ TEST(Frozen, NoiseLeavesThem) {
     pipeline::FrameBuffers frame;
     frame.instance_capacity = 10;
     const shared::Counts counts{};
-    frame.counts = gpu::Buffer(*device(), "counts", sizeof(counts));
+    frame.reserve_counts(*device(), rig().config());
     frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
     rig().run([&](gpu::Recording& recording) {
         record_noise({recording, rig().cache}, scene.model, frame,

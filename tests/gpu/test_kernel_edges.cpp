@@ -280,7 +280,7 @@ TEST(Noise, StaysFiniteAndMovesWhatJustFitted) {
     frame.instance_capacity = 10;
     shared::Counts counts{};
     counts.instances = 10;
-    frame.counts = gpu::Buffer(*device(), "counts", sizeof(counts));
+    frame.reserve_counts(*device(), rig().config());
     frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
     Rig& r = rig();
     r.run([&](gpu::Recording& recording) {

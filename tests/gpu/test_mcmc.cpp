@@ -272,7 +272,7 @@ TEST(Noise, MatchesTheReference) {
         pipeline::FrameBuffers frame;
         frame.instance_capacity = 10;
         shared::Counts counts{};
-        frame.counts = gpu::Buffer(*device(), "counts", sizeof(counts));
+        frame.reserve_counts(*device(), rig().config());
         frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
         const uint64_t seed = 0xabcdef0123456789ull;
         r.run([&](gpu::Recording& recording) {
@@ -314,7 +314,7 @@ TEST(Noise, IsNoLongerThanItsReach) {
     pipeline::FrameBuffers frame;
     frame.instance_capacity = 10;
     const shared::Counts counts{};
-    frame.counts = gpu::Buffer(*device(), "counts", sizeof(counts));
+    frame.reserve_counts(*device(), rig().config());
     frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
     const double reach = 0.1;
     r.run([&](gpu::Recording& recording) {

@@ -56,7 +56,7 @@ struct Slots {
 
 /// What the pass reads and writes besides the model.
 struct Bench {
-    gpu::Buffer camera;
+    gpu::Buffer camera, values{*device(), "values", sizeof(shared::UpdateBlock), gpu::Texel::none, true};
     Guarded records, slots, tile_counts, first, places, counts, statistics, motion_sums;
 
     explicit Bench(const Slots& s)
@@ -86,11 +86,12 @@ struct Bench {
     }
 
     void run(const Scene& scene, const pipeline::Model& model, const gpu::Buffer& moments1,
-             const gpu::Buffer& moments2, uint32_t mode, const shared::UpdatePush& push,
+             const gpu::Buffer& moments2, uint32_t mode, const shared::UpdateBlock& push,
              int evaluated_degree = -1) {
         Rig& r = rig();
         const int degree = evaluated_degree < 0 ? scene.gaussians.sh_degree : evaluated_degree;
         r.run([&](gpu::Recording& recording) {
+            recording.write(values, 0, std::as_bytes(std::span(&push, 1)));
             r.cache
                 .get<passes::Update>({{shared::SPEC_SH_DEGREE, uint32_t(degree)},
                                       {shared::SPEC_KERNEL, uint32_t(scene.options.kernel)},
@@ -109,7 +110,8 @@ struct Bench {
                           .moments1_out = moments1,
                           .moments2_out = moments2,
                           .statistics = statistics,
-                          .sorted_indices = places},
+                          .sorted_indices = places,
+                          .values = values},
                          motion_sums},
                         push);
         });
@@ -117,7 +119,7 @@ struct Bench {
     }
 };
 
-shared::UpdatePush push_for(const Scene& scene, uint32_t step, bool nesterov = false) {
+shared::UpdateBlock push_for(const Scene& scene, uint32_t step, bool nesterov = false) {
     const pipeline::AdamShares shares = pipeline::adam_shares(nesterov, step);
     const uint32_t n = uint32_t(scene.gaussians.size());
     return {n,
@@ -224,7 +226,7 @@ TEST(UpdateMotion, LeavesOutWhatIsNotFinite) {
     const Scene scene = random_scene(1906, 40, SplatKind::ordinary, 61, 47, 1);
     Slots slots(scene);
     GuardedModel model(scene.gaussians);
-    const auto sums_of = [&](const Slots& s, const shared::UpdatePush& push, uint32_t instances) {
+    const auto sums_of = [&](const Slots& s, const shared::UpdateBlock& push, uint32_t instances) {
         Bench bench(s);
         shared::Counts counts{};
         counts.instances = instances;
@@ -485,7 +487,7 @@ TEST(UpdateEdges, NothingMovesWhereTheInstancesDidNotFit) {
 }
 
 /// The words that a step from zero moments packs, by the CPU reference.
-std::vector<uint32_t> packed_words(const GuardedModel& exact, const shared::UpdatePush& push) {
+std::vector<uint32_t> packed_words(const GuardedModel& exact, const shared::UpdateBlock& push) {
     const auto m = exact.moments1.read<float>(), v = exact.moments2.read<float>();
     std::vector<uint32_t> words(m.size());
     for (uint32_t i = 0; i < push.splats; ++i)
@@ -571,7 +573,7 @@ TEST(PackedUpdate, FollowsTheFloatMomentsOverManySteps) {
 TEST(PackedUpdate, RoundsOtherwiseInAnotherStepAndSeedAndTheSameAgain) {
     const Scene scene = random_scene(1913, 60, SplatKind::ordinary, 61, 47);
     const Slots slots(scene);
-    const auto words = [&](const shared::UpdatePush& push) {
+    const auto words = [&](const shared::UpdateBlock& push) {
         GuardedModel model(scene.gaussians);
         Bench bench(slots);
         bench.run(scene, model.model, model.moments1, model.moments2, kPacked, push);

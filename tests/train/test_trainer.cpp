@@ -204,6 +204,48 @@ TEST(Trainer, MemoryAndKernelsOfAGpuChangeNoByte) {
     EXPECT_TRUE(mapped == bytes(gpu::HostAccess::none, false));
 }
 
+/// What a replayed step consists of changes with refinements, sizes of images, halvings and SH degrees, and the 101st step is timed.
+TEST(Trainer, ReplayedStepsChangeNoByte) {
+    Synthetic capture;
+    capture.truth = small_capture().truth;
+    capture.dataset = small_capture().dataset;
+    Frame& wide = capture.dataset.frames[7];
+    wide.camera.width = 64;
+    wide.camera.cx = 32;
+    draw_truth(capture, wide);
+    const Gaussians start = shaken_start(capture, 0.05, 1, 2);
+    for (const Strategy strategy : {Strategy::adc, Strategy::mcmc}) {
+        const auto bytes = [&](bool cpu_kernels, int& recorded) {
+            const std::shared_ptr<gpu::Device> other = open_test_device(true);
+            gpu::Limits limits = other->limits();
+            limits.cpu = cpu_kernels;
+            limits.max_storage_range = ~0u;
+            other->pretend(limits);
+            TrainOptions options = quick(130);
+            options.strategy = strategy;
+            options.sh_degree = 2;
+            options.halvings = 1;
+            options.resolution_every = 9000;  // 39 of these steps
+            options.max_splats = 60;
+            options.grow_gradient = 1e-5;
+            options.refine_stop = options.relocate_stop = 30000;
+            Trainer trainer(other, capture.dataset, all_frames(capture.dataset), start, options);
+            for (int step = 1; step <= 130; ++step) trainer.step();
+            const Gaussians trained = trainer.gaussians();
+            EXPECT_GT(trained.size(), start.size());
+            recorded = trainer.step_times().recorded;
+            const auto path = capture.folder / "out.ply";
+            save_splats(path, trained);
+            return file_bytes(path);
+        };
+        int of_cpu = 0, of_gpu = 0;
+        const std::string expected = bytes(true, of_cpu);
+        EXPECT_TRUE(expected == bytes(false, of_gpu));
+        printf("    %d and %d of 130 steps recorded\n", of_cpu, of_gpu);
+        EXPECT_LT(of_gpu, 90);
+    }
+}
+
 /// With several steps in flight, those behind a step that has too many instances are in vain and are repeated.
 TEST(Trainer, AnOverflowWithStepsInFlightChangesNoByte) {
     PointCloud points = small_capture().dataset.points;
@@ -395,6 +437,8 @@ TEST(Trainer, TimesEveryPass) {
     EXPECT_EQ(times.steps, 3);
     EXPECT_NEAR(times.step, 1000 * report.seconds / 3, 1e-6);
     EXPECT_LE(times.refinement, times.step);
+    EXPECT_GT(times.host, 0);
+    EXPECT_LT(times.host, times.step);
 }
 
 TEST(Trainer, TellsThePsnrOfEachTrainingImage) {

@@ -356,6 +356,11 @@ TEST(Report, StagesAddUpToTheStep) {
                                                "host and waiting"}));
     EXPECT_DOUBLE_EQ(sum, 20);
     EXPECT_NE(step_time_html(time).find("Means over 50 steps"), std::string::npos);
+    EXPECT_EQ(step_time_html(time).find("submits"), std::string::npos);
+    StepTime with_host = time;
+    with_host.host = 0.125;
+    EXPECT_NE(step_time_html(with_host).find("submits the commands of a step in 0.125 ms"),
+              std::string::npos);
 }
 
 TEST(Report, NoPassOfTrainingIsCalledACopy) {
