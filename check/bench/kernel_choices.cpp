@@ -64,6 +64,8 @@ void set_choice(passes::KernelConfig& config, const std::string& choice, const g
             choice, value, {{"sorted", shared::SLOTS_SORTED}, {"emitted", shared::SLOTS_EMITTED}});
     } else if (name == "counts") {
         config.live_counts = one_of<bool>(choice, value, {{"live", true}, {"capacity", false}});
+    } else if (name == "few") {
+        config.few_blocks = number_in(choice, value, 65535);
     } else if (name == "scan") {
         config.scan_turns = number_in(choice, value, 1024);
     } else if (name == "elements") {
@@ -73,9 +75,9 @@ void set_choice(passes::KernelConfig& config, const std::string& choice, const g
     } else if (name == "interleave") {
         config.tile_interleave = number_in(choice, value, 1024);
     } else {
-        refuse(
-            choice,
-            "one of tile, quads, broadcast, sort, slots, counts, scan, elements and interleave with a value");
+        refuse(choice,
+               "one of tile, quads, broadcast, sort, slots, counts, few, scan, elements and interleave with "
+               "a value");
     }
 }
 

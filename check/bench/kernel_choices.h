@@ -9,7 +9,7 @@ namespace ewa::bench {
 
 /// The configuration of a device with some choices replaced. text: NAME=VALUE,... with the names
 ///   tile=WIDTHxHEIGHT (px), quads=SPLATS of a batch, broadcast=shuffles|shared|uniform, sort=ranked|counted,
-///   slots=sorted|emitted, counts=live|capacity, scan=TURNS, elements=INVOCATIONS of a workgroup, interleave=DISTANCE.
+///   slots=sorted|emitted, counts=live|capacity, few=BLOCKS, scan=TURNS, elements=INVOCATIONS of a workgroup, interleave=DISTANCE.
 /// Throws InputError, which quotes the choice, if a name is unknown or the device cannot run the value.
 passes::KernelConfig config_with(const std::string& text, const gpu::Limits& limits);
 

@@ -142,6 +142,8 @@ EWA_UINT(SORT_DROP_KEYS, 2u);    // last pass: the sorted keys are not needed
 EWA_UINT(SORT_TRACKED, 4u);
 EWA_UINT(SORT_FIRST, 8u);  // with SORT_TRACKED, first pass: the indices are not stored yet
 EWA_UINT(SORT_LAST, 16u);  // with SORT_TRACKED, last pass
+EWA_UINT(SORT_FEW,
+         32u);  // ranked, few blocks: each adds up the counters, which are counters[block * DIGITS + digit]
 // blend_backward.comp, bits
 EWA_UINT(BLEND_BACKWARD_ABSOLUTE, 1u);  // also sums absolute gradients by the mean
 EWA_UINT(BLEND_BACKWARD_ALPHA, 2u);     // dL/d(image) also has dL/dT, in PLANE_T

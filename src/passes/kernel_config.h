@@ -25,7 +25,9 @@ struct KernelConfig {
     uint32_t sort_group = 64;                  // invocations of a sorting workgroup
     bool ranked_sort = false;                  // keys are ranked in shared memory; sort_lanes_max is not used
     bool live_counts = false;                  // with ranked_sort: the device counts the sort's workgroups
-    uint32_t scan_turns = 64;                  // items that a lane scans
+    uint32_t few_blocks =
+        0;  // with ranked_sort: a sort of no more blocks of keys does without scans of their counters
+    uint32_t scan_turns = 64;      // items that a lane scans
     uint32_t tile_interleave = 1;  // distance of neighbouring workgroups' tiles, or groups of splats
     uint32_t max_groups = 65535;   // workgroups along one dimension
     uint32_t loop_limit = 65535;   // iterations of a loop in one invocation
@@ -86,6 +88,8 @@ inline KernelConfig config_for(const gpu::Limits& limits) {
         config.scan_turns = 16;
         config.broadcast = limits.scalar_loads ? shared::BROADCAST_UNIFORM : shared::BROADCAST_SHARED;
         config.ranked_sort = config.live_counts = can_rank(limits);
+        // A workgroup reads the counters of all blocks, which takes as long as the scans with 128 blocks.
+        config.few_blocks = 128;
     }
     return config;
 }

@@ -184,7 +184,7 @@ struct RadixScatter : ScatterBuffers {
     using Work = PerSortLane;
 };
 
-/// RadixCount with the counting in shared memory. Variant: SPEC_RADIX_BITS.
+/// RadixCount with the counting in shared memory. Variant: SPEC_RADIX_BITS, SPEC_MODE (0 or SORT_FEW).
 struct RadixCountRanked {
     static constexpr char shader[] = "radix_count_ranked";
     using Work = PerRankedBlock;

@@ -48,8 +48,12 @@ uint32_t scatter_mode(const SortBuffers& buffers, const SortWork& work, bool fir
 
 uint32_t record_sort(const passes::Recorder& on, const SortBuffers& buffers, const SortWork& work) {
     const RadixCut& cut = work.cut;
-    const bool ranked = on.cache.config().ranked_sort, tracked = buffers.indices[0] != nullptr;
-    const bool live = work.live && ranked && on.cache.config().live_counts;
+    const passes::KernelConfig& config = on.cache.config();
+    const bool ranked = config.ranked_sort, tracked = buffers.indices[0] != nullptr;
+    // A caller may read the digit totals of a sort in one pass. Idle workgroups of few blocks cost next to nothing.
+    const bool few = ranked && cut.passes > 1 && cut.lanes <= config.few_blocks;
+    const bool live = work.live && ranked && config.live_counts && !few;
+    const uint32_t few_mode = few ? shared::SORT_FEW : 0;
     // A pass with a workgroup for each block of keys.
     const auto record_blocks = [&](const auto& pass, const shared::SortPush& push,
                                    const passes::Constants& variant) {
@@ -57,7 +61,7 @@ uint32_t record_sort(const passes::Recorder& on, const SortBuffers& buffers, con
         const auto groups =
             live ? gpu::Workgroups(gpu::BufferPart(buffers.counts, offsetof(shared::Counts, sort_groups),
                                                    sizeof(shared::Counts::sort_groups)))
-                 : Definition::Work::groups(on.cache.config(), push);
+                 : Definition::Work::groups(config, push);
         on.cache.get<Definition>(variant).record(on.recording, pass, push, groups, work.name);
     };
     const uint32_t counters = cut.lanes << cut.bits;
@@ -72,27 +76,30 @@ uint32_t record_sort(const passes::Recorder& on, const SortBuffers& buffers, con
         // A binding that a mode does not use gets another binding's buffer.
         const gpu::Buffer& values = first && buffers.own_indices ? keys : *buffers.values[from];
         if (ranked) {
-            record_blocks(passes::RadixCountRanked{keys, buffers.counters, buffers.counts}, push, {bits});
+            record_blocks(passes::RadixCountRanked{keys, buffers.counters, buffers.counts}, push,
+                          {bits, {shared::SPEC_MODE, few_mode}});
         } else {
             on.recording.fill(buffers.counters, 0, 0, uint64_t(counters) * 4);
             on.record(passes::RadixCount{keys, buffers.counters, buffers.counts}, push, {bits}, work.name);
         }
-        record_scan(on,
-                    {.source = buffers.counters,
-                     .order = nullptr,
-                     .prefix = buffers.counter_prefix,
-                     .totals = buffers.digit_totals,
-                     .counts = buffers.counts},
-                    {.items = counters,
-                     .block = cut.lanes,
-                     .total = shared::TOTAL_NONE,
-                     .name = work.name,
-                     .live = live});
-        const passes::Constants variant{bits, {shared::SPEC_MODE, scatter_mode(buffers, work, first, last)}};
+        if (!few)
+            record_scan(on,
+                        {.source = buffers.counters,
+                         .order = nullptr,
+                         .prefix = buffers.counter_prefix,
+                         .totals = buffers.digit_totals,
+                         .counts = buffers.counts},
+                        {.items = counters,
+                         .block = cut.lanes,
+                         .total = shared::TOTAL_NONE,
+                         .name = work.name,
+                         .live = live});
+        const passes::Constants variant{
+            bits, {shared::SPEC_MODE, scatter_mode(buffers, work, first, last) | few_mode}};
         const passes::ScatterBuffers scattered{
             .keys = keys,
             .values = values,
-            .counters = buffers.counter_prefix,
+            .counters = few ? buffers.counters : buffers.counter_prefix,
             .bases = buffers.digit_totals,
             .counts = buffers.counts,
             .keys_out = *buffers.keys[to],

@@ -121,8 +121,10 @@ void compile_splatting(Compiler& compiler) {
                                   SORT_TRACKED | SORT_FIRST | SORT_LAST};
     compiler.compile<passes::RadixCount>({{SPEC_RADIX_BITS, kBits}});
     compiler.compile<passes::RadixScatter>({{SPEC_RADIX_BITS, kBits}, {SPEC_MODE, scatter_modes}});
-    compiler.compile<passes::RadixCountRanked>({{SPEC_RADIX_BITS, kBits}});
-    compiler.compile<passes::RadixScatterRanked>({{SPEC_RADIX_BITS, kBits}, {SPEC_MODE, scatter_modes}});
+    Values ranked_modes = scatter_modes;
+    for (const uint32_t mode : scatter_modes) ranked_modes.push_back(mode | SORT_FEW);
+    compiler.compile<passes::RadixCountRanked>({{SPEC_RADIX_BITS, kBits}, {SPEC_MODE, {0, SORT_FEW}}});
+    compiler.compile<passes::RadixScatterRanked>({{SPEC_RADIX_BITS, kBits}, {SPEC_MODE, ranked_modes}});
     compiler.compile<passes::EmitInstances>({{SPEC_MODE, {0, EMIT_FIRST_INSTANCES}}});
     compiler.compile<passes::TileStarts>();
     compiler.compile<passes::Blend>(

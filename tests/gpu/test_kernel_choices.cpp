@@ -136,6 +136,7 @@ TEST_P(KernelChoices, ChangeNoByteOfAFrame) {
     EXPECT_TRUE(frame_with(other, scene) == expected) << "whole modules";
     other = own;
     other.ranked_sort = true;
+    other.few_blocks = 0;
     const FrameBytes enough = repeated_frame_with(own, scene, 40000);
     for (const bool live : {false, true}) {
         other.live_counts = live;
@@ -143,6 +144,10 @@ TEST_P(KernelChoices, ChangeNoByteOfAFrame) {
         EXPECT_TRUE(repeated_frame_with(other, scene, 1) == enough)
             << "after an overflow, live counts " << live;
     }
+    other.few_blocks = 1000;
+    EXPECT_TRUE(frame_with(other, scene) == expected) << "without scans of counters";
+    EXPECT_TRUE(repeated_frame_with(other, scene, 1) == enough)
+        << "after an overflow, without scans of counters";
     for (const uint32_t broadcast :
          {shared::BROADCAST_SHUFFLES, shared::BROADCAST_SHARED, shared::BROADCAST_UNIFORM}) {
         other = own;
