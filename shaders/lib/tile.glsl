@@ -33,6 +33,7 @@ const bool BY_RATIO = SEGMENT >= 4u && SHARP == 0u;
 layout(constant_id = SPEC_BROADCAST) const uint BROADCAST = BROADCAST_SHUFFLES;
 const uint BLOCK = SUBGROUP < 8u ? SUBGROUP : 8u;
 layout(constant_id = SPEC_QUADS) const uint QUADS = 0;
+const bool IN_QUADS = QUADS != 0u;
 const uint CREW = QUADS != 0u ? QUAD_TILES * SUBGROUP : SUBGROUP;  // invocations of a workgroup
 const uint BATCH = QUADS != 0u ? QUADS : SUBGROUP;
 shared vec4 shared_batch[QUADS != 0u || BROADCAST == BROADCAST_SHARED ? RECORD_TEXELS * BATCH : 1u];

@@ -59,7 +59,7 @@ void main() {
     // The condition of the loop comes last: where it comes first, lavapipe runs the body once more behind the last turn.
     if (k < end) do {
         const Loaded batch = load_batch(k, end);
-        UNROLL_BLOCKS for (uint first = 0; first < (QUADS != 0u ? batch.turns : BATCH); first += BLOCK) {
+        UNROLL_BLOCKS for (uint first = 0; first < (IN_QUADS ? batch.turns : BATCH); first += BLOCK) {
             [[unroll]] for (uint j = 0; j < BLOCK; ++j) {
                 const LaneSplat s = lane_splat(batch, first + j, pixel);
                 if (MODE == BLEND_ELLIPSOIDS) {

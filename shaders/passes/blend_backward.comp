@@ -69,7 +69,7 @@ void main() {
     if (k < end) do {
         const Loaded batch = load_batch(k, end);
         float slot[12] = NO_GRADIENT;
-        UNROLL_BLOCKS for (uint first = 0; first < (QUADS != 0u ? batch.turns : BATCH); first += BLOCK) {
+        UNROLL_BLOCKS for (uint first = 0; first < (IN_QUADS ? batch.turns : BATCH); first += BLOCK) {
             float sums[12][8];
             [[unroll]] for (uint j = 0; j < BLOCK; ++j) {
                 const LaneSplat s = lane_splat(batch, first + j, pixel);

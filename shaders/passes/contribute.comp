@@ -41,7 +41,7 @@ void main() {
     if (k < end) do {
         const Loaded batch = load_batch(k, end);
         float own = 0.0;
-        UNROLL_BLOCKS for (uint first = 0; first < (QUADS != 0u ? batch.turns : BATCH); first += BLOCK) {
+        UNROLL_BLOCKS for (uint first = 0; first < (IN_QUADS ? batch.turns : BATCH); first += BLOCK) {
             [[unroll]] for (uint j = 0; j < BLOCK; ++j) {
                 float raw[PIXELS], most = 0.0;
                 column_alphas(lane_splat(batch, first + j, pixel), raw);
