@@ -106,10 +106,8 @@ struct FramePasses : passes::Recorder {
     void record_tiles(const Definition& buffers, const shared::BlendPush& push,
                       passes::Constants variant) const {
         variant.insert(variant.end(), {wrap(), slots(), quads()});
-        if (frame.sizes.quads > 0)
-            record(passes::OfQuads<Definition>{buffers}, push, variant);
-        else
-            record(buffers, push, variant);
+        if (frame.sizes.quads > 0) return record(passes::OfQuads<Definition>{buffers}, push, variant);
+        record(buffers, push, variant);
     }
 
   private:
