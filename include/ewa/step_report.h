@@ -29,9 +29,9 @@ struct StepTimes {
     int steps = 0;
     double step = 0;        // wall time in Trainer::step
     double refinement = 0;  // part of `step`: adding, moving and removing splats
-    double host = 0;        // recording and submitting the commands, where a step is one submission; else 0
-    int recorded =
-        0;  // of these steps: number of those whose commands were recorded; the others were replayed
+    // Recording and submitting the commands, where a step is one submission; else 0. Steps that compile kernels do not count.
+    double host = 0;
+    int recorded = 0;  // steps with one submission whose commands were recorded; the others were replayed
     std::vector<PassTime> passes;  // on the device, in recording order. On a GPU they are of every 100th step
 };
 

@@ -120,7 +120,7 @@ StepTimes StepLog::means() const {
     StepTimes mean = times;
     mean.step /= std::max(1, times.steps);
     mean.refinement /= std::max(1, times.steps);
-    mean.host /= std::max(1, times.steps);
+    mean.host /= std::max(1, host_steps);
     for (PassTime& time : mean.passes) time.milliseconds /= std::max(1, timed_steps);
     return mean;
 }

@@ -63,8 +63,8 @@ struct Learned {
 /// Reports and times of the steps so far.
 struct StepLog {
     StepReport report;
-    StepTimes times;  // sums, over `timed_steps` steps for the passes
-    int timed_steps = 0;
+    StepTimes times;  // sums, over `timed_steps` steps for the passes and `host_steps` for the host
+    int timed_steps = 0, host_steps = 0;
     uint64_t most_own_bytes = 0;  // largest state of this rank after a step
 
     void add(const portions::StepSums& sums);
