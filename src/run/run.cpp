@@ -121,7 +121,8 @@ class Run {
 /// Compiles the kernels of the first step once the device is open, while images are decoded.
 void Run::compile_ahead(const train::RunInput& input) try {
     if (!train::has_plain_step(input.options)) return;
-    opening_ = std::async([step = train::first_step(input), opening = std::move(opening_)]() mutable {
+    train::FirstStep step = train::first_step(input);  // it may throw: before opening_ is moved
+    opening_ = std::async([step = std::move(step), opening = std::move(opening_)]() mutable {
         std::shared_ptr<gpu::Device> device = opening.get();
         train::compile_kernels(*device, step);
         return device;

@@ -112,9 +112,9 @@ void FusedSteps::submit(int step) {
     if (in_flight_.empty())
         parts_.tools.frame.reserve(parts_.tools.cache.device(), parts_.tools.cache.config(),
                                    parts_.request_of(camera));
-    const size_t kernels = parts_.device->pipelines().count();
+    const int degree = parts_.schedule.degree(step);
     const auto start = std::chrono::steady_clock::now();
-    const portions::StepView view = view_of(parts_, step, seen, parts_.schedule.degree(step));
+    const portions::StepView view = view_of(parts_, step, seen, degree);
     if (is_replayed(step, seen, index)) {
         submit_replayed(step, seen.photo(index).texels, view);
     } else {
@@ -125,13 +125,13 @@ void FusedSteps::submit(int step) {
         parts_.tools.executor.submit(recording, is_timed(step));
     }
     const auto submitted = std::chrono::steady_clock::now();
-    if (parts_.device->pipelines().count() == kernels) {  // else it has waited for the compiler
+    in_flight_.push_back({step, view.weight()});
+    if (std::exchange(last_degree_, degree) == degree) {  // else it may have waited for the compiler
         parts_.log.times.host += std::chrono::duration<double, std::milli>(submitted - start).count();
         ++parts_.log.host_steps;
     }
     if (parts_.schedule.halvings_at(step + 1) == parts_.schedule.halvings_at(step))
         seen.prepare(parts_.index_of(step + 1));
-    in_flight_.push_back({step, view.weight()});
     compile_next_degree(step, index, seen);
     // An image from disk may be gone when its step has to be repeated: no other step follows before it is done.
     if (!seen.cached(index)) finish_all();

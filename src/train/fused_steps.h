@@ -61,6 +61,7 @@ class FusedSteps {
     std::deque<Flight> in_flight_;
     std::vector<Shape> kept_;   // of the executor's kept recordings, by slot
     int compiled_degree_ = -1;  // the highest SH degree whose kernels were asked for
+    int last_degree_ = -1;      // of the step submitted last
 };
 
 }  // namespace ewa::train
