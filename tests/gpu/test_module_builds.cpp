@@ -15,6 +15,16 @@
 namespace ewa::test {
 namespace {
 
+void expect_same_bindings(const gpu::Reflection& a, const gpu::Reflection& b) {
+    EXPECT_EQ(a.push_constant_bytes, b.push_constant_bytes);
+    EXPECT_EQ(a.uses_subgroups, b.uses_subgroups);
+    ASSERT_EQ(a.bindings.size(), b.bindings.size());
+    for (size_t i = 0; i < a.bindings.size(); ++i) {
+        EXPECT_EQ(a.bindings[i].kind, b.bindings[i].kind);
+        EXPECT_EQ(a.bindings[i].access, b.bindings[i].access);
+    }
+}
+
 /// A module for pinholes differs from the whole one in that it is smaller and has no constant of lenses.
 TEST(PinholeCode, HasTheBindingsOfTheWholeModule) {
     int found = 0;
@@ -30,13 +40,7 @@ TEST(PinholeCode, HasTheBindingsOfTheWholeModule) {
             std::vector<uint32_t> expected = b.constants;
             EXPECT_EQ(std::erase(expected, shared::SPEC_LENSES), 1u);
             EXPECT_EQ(a.constants, expected);
-            EXPECT_EQ(a.push_constant_bytes, b.push_constant_bytes);
-            EXPECT_EQ(a.uses_subgroups, b.uses_subgroups);
-            ASSERT_EQ(a.bindings.size(), b.bindings.size());
-            for (size_t i = 0; i < a.bindings.size(); ++i) {
-                EXPECT_EQ(a.bindings[i].kind, b.bindings[i].kind);
-                EXPECT_EQ(a.bindings[i].access, b.bindings[i].access);
-            }
+            expect_same_bindings(a, b);
         }
     EXPECT_EQ(found, 10);
 }
@@ -67,13 +71,7 @@ TEST(OptimisedCode, HasTheBindingsOfTheWholeModule) {
         ++found;
         const gpu::Reflection a = gpu::reflect(optimised), b = gpu::reflect(passes::shader_code(name, true));
         EXPECT_TRUE(std::ranges::includes(b.constants, a.constants));
-        EXPECT_EQ(a.push_constant_bytes, b.push_constant_bytes);
-        EXPECT_EQ(a.uses_subgroups, b.uses_subgroups);
-        ASSERT_EQ(a.bindings.size(), b.bindings.size());
-        for (size_t i = 0; i < a.bindings.size(); ++i) {
-            EXPECT_EQ(a.bindings[i].kind, b.bindings[i].kind);
-            EXPECT_EQ(a.bindings[i].access, b.bindings[i].access);
-        }
+        expect_same_bindings(a, b);
     }
     EXPECT_EQ(found, 7);
 }
