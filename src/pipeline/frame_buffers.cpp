@@ -193,6 +193,10 @@ void size_loss(Sizes& s, const passes::KernelConfig& config, const FrameRequest&
 
 }  // namespace
 
+uint32_t list_side(const passes::KernelConfig& config, const FrameRequest& request) {
+    return config.quads > 0 && request.splatting && request.splats >> shared::PART_SHIFT == 0 ? 2 : 1;
+}
+
 Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request) {
     Sizes s;
     if (request.width > 1u << 20 || request.height > 1u << 20)
@@ -200,8 +204,8 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
                          std::to_string(request.height) + " pixels; at most 1048576 a side can be drawn");
     s.width = request.width;
     s.height = request.height;
-    if (request.splatting && request.splats >> shared::PART_SHIFT == 0) s.quads = config.quads;
-    const uint32_t side = s.quads > 0 ? 2 : 1;  // of a list, in tiles
+    const uint32_t side = list_side(config, request);
+    if (side > 1) s.quads = config.quads;
     s.tiles_x = divide_up(request.width, config.tile_width * side);
     s.tiles_y = divide_up(request.height, config.tile_height * side);
     const uint64_t tiles = uint64_t(s.tiles_x) * s.tiles_y;

@@ -67,6 +67,9 @@ struct Sizes {
     shared::ImageLayout image() const { return {{width, height}, stride, plane_floats}; }
 };
 
+/// Tiles along each side of what has a list: 2 with quads, else 1.
+uint32_t list_side(const passes::KernelConfig& config, const FrameRequest& request);
+
 /// Throws InputError that names the limit if the image is empty, or larger than tile indices
 /// and loop limits allow.
 Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request);

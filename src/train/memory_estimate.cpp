@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The device memory of a training, before it begins. The buffers' sizes come from the functions that the frame itself
-// uses. The number of (splat, tile) pairs is estimated from the first splats in the training views.
+// uses. The number of pairs of a splat and a list is estimated from the first splats in the training views.
 #include "train/memory_estimate.h"
 
 #include <algorithm>
@@ -9,6 +9,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
+#include <glm/vec2.hpp>
 #include <numbers>
 #include <optional>
 #include <vector>
@@ -87,8 +88,8 @@ double standard_area(const SeenSplat& f) {
 /// Sums over sampled splats that a view sees.
 struct Footprints {
     double splats = 0;
-    double sides = 0;  // of the bounding box, tiles: width / tile width + height / tile height
-    double area = 0;   // of the ellipse, tiles
+    double sides = 0;  // of the bounding box, lists: width / list width + height / list height
+    double area = 0;   // of the ellipse, lists
 };
 
 /// The share of a height around y that lies in the rows of a band.
@@ -99,9 +100,10 @@ double share_of(const Band& band, double y, double height) {
     return std::max(high - low, 0.0) / height;
 }
 
-/// Adds the ellipse {alpha >= ALPHA_MIN} of a splat that has at least this opacity, as far as it lies in the band.
+/// Adds the ellipse {alpha >= ALPHA_MIN} of a splat that has at least this opacity, as far as it lies in the band. list: width and
+/// height in px of what has a list.
 void add_footprint(Footprints& sum, const SeenSplat& f, double least_opacity, const Camera& camera,
-                   const passes::KernelConfig& config, const Band& band) {
+                   const glm::dvec2& list, const Band& band) {
     const double opacity = std::max(f.opacity, least_opacity);
     const double reach = 2 * std::log(opacity / shared::ALPHA_MIN);  // squared, in standard deviations
     if (!(reach > 0)) return;
@@ -110,8 +112,8 @@ void add_footprint(Footprints& sum, const SeenSplat& f, double least_opacity, co
     const double area = std::min(std::numbers::pi * reach * standard_area(f), 0.785 * width * height);
     const double share = share_of(band, f.y, height);
     sum.splats += share;
-    sum.sides += share * (width / config.tile_width + height / config.tile_height);
-    sum.area += share * area / (config.tile_width * config.tile_height);
+    sum.sides += share * (width / list.x + height / list.y);
+    sum.area += share * area / (list.x * list.y);
 }
 
 std::vector<SampledView> sampled_views(const Gaussians& start, const Dataset& dataset,
@@ -190,30 +192,31 @@ struct MemoryEstimator::Sample {
           opaque(optical_depth(views, stride) > kOpaque) {}
 };
 
-MemoryEstimator::MemoryEstimator(const gpu::Device& device, const Dataset& dataset,
+MemoryEstimator::MemoryEstimator(const passes::KernelConfig& config, const Dataset& dataset,
                                  const std::vector<int>& frames, const Gaussians& start,
                                  const TrainOptions& options)
-    : device_(device), dataset_(dataset), frames_(frames), start_(start), options_(options) {}
+    : config_(config), dataset_(dataset), frames_(frames), start_(start), options_(options) {}
 
 MemoryEstimator::~MemoryEstimator() = default;
 
-/// (Splat, tile) pairs of the image that has most of them, for `splats` splats that descend from the first ones.
+/// Pairs of a splat and a list, of the image that has most of them, for `splats` splats that descend from the first ones. list_side:
+/// tiles along a side of what has a list.
 /// - A convex shape at a random place of a grid touches 1 + sides + area cells in the mean.
 /// - Splats that multiply share what their parents covered, but not all of it: sides shrink with a power of the number,
 ///   areas with its square.
-uint64_t MemoryEstimator::pairs(uint32_t splats) {
+uint64_t MemoryEstimator::pairs(uint32_t splats, uint32_t list_side) {
     if (!sample_) sample_ = std::make_unique<const Sample>(start_, dataset_, frames_);
-    const passes::KernelConfig config = passes::config_for(device_.limits());
+    const glm::dvec2 list(list_side * config_.tile_width, list_side * config_.tile_height);
     const bool opaque = sample_->opaque;
     const double growth = opaque ? 1 : double(splats) / double(start_.size());
     const double shrink = std::pow(growth, options_.strategy == Strategy::mcmc ? -kMcmcShrink : -kAdcShrink);
     std::vector<double> of_view(sample_->views.size());
     core::on_all_cores(of_view.size(), [&](size_t v) {
         const SampledView& view = sample_->views[v];
-        for (const Band& band : bands_of(config, uint32_t(view.camera->height), options_.bands)) {
+        for (const Band& band : bands_of(config_, uint32_t(view.camera->height), options_.bands)) {
             Footprints sum;
             for (const SeenSplat& f : view.seen)
-                add_footprint(sum, f, opaque ? 0 : kLeastOpacity, *view.camera, config, band);
+                add_footprint(sum, f, opaque ? 0 : kLeastOpacity, *view.camera, list, band);
             const double seen = sum.splats + shrink * sum.sides + shrink * shrink * sum.area;
             of_view[v] = std::max(of_view[v], seen * double(sample_->stride) * growth);
         }
@@ -229,17 +232,18 @@ MemoryEstimate MemoryEstimator::up_to(uint32_t max_splats) {
     const bool cut =
         std::ranges::any_of(frames_, [&](int index) { return may_be_cut(dataset_.frames[size_t(index)]); });
     const Plan plan = plan_for(plan_request(start_, options, false, SIZE_MAX, cut));
-    const passes::KernelConfig config = passes::config_for(device_.limits());
     MemoryEstimate estimate;
     estimate.splats = final_splats(start_.size(), options);
     const uint64_t array = parameter_bytes(estimate.splats, start_.sh_degree);
     estimate.model =
         (1 + uint64_t(plan.moment_buffers())) * array + (plan.statistics ? 8ull * estimate.splats : 0);
-    const auto instances_needed = uint32_t(pairs(estimate.splats));
+    FrameRequest any = frame_request(plan, 1, 1);
+    any.splats = estimate.splats;
+    const auto instances_needed = uint32_t(pairs(estimate.splats, list_side(config_, any)));
     for (const int index : frames_) {
         const Frame& frame = dataset_.frames[size_t(index)];
         uint32_t rows = 0;
-        for (const Band& band : bands_of(config, uint32_t(frame.camera.height), options.bands))
+        for (const Band& band : bands_of(config_, uint32_t(frame.camera.height), options.bands))
             rows = std::max(rows, band.rows);
         FrameRequest request = frame_request(plan, uint32_t(frame.camera.width),
                                              rows > 0 ? rows : uint32_t(frame.camera.height));
@@ -247,7 +251,7 @@ MemoryEstimate MemoryEstimator::up_to(uint32_t max_splats) {
         request.instances = instances_needed;
         request.masks = frame.alpha_weighs();
         request.readouts = frame.camera.readout.has_value();
-        const Sizes sizes = sizes_for(config, request);
+        const Sizes sizes = sizes_for(config_, request);
         const uint64_t instances = sizes.overlay + 2 * sizes.instance_words;
         const uint64_t second = grows ? array + kRefineBytes * estimate.splats : 0;
         estimate.frame = std::max(estimate.frame, sizes.total() - instances + std::max(instances, second));

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "ewa/training_needs.h"
+#include "passes/kernel_config.h"
 
 namespace ewa::train {
 
@@ -12,8 +13,8 @@ namespace ewa::train {
 class MemoryEstimator {
   public:
     /// options: with resolved strategy and SH degree. The references must outlive the estimator.
-    MemoryEstimator(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& frames,
-                    const Gaussians& start, const TrainOptions& options);
+    MemoryEstimator(const passes::KernelConfig& config, const Dataset& dataset,
+                    const std::vector<int>& frames, const Gaussians& start, const TrainOptions& options);
     ~MemoryEstimator();
 
     MemoryEstimate up_to(uint32_t max_splats);
@@ -21,9 +22,9 @@ class MemoryEstimator {
   private:
     struct Sample;
 
-    uint64_t pairs(uint32_t splats);
+    uint64_t pairs(uint32_t splats, uint32_t list_side);
 
-    const gpu::Device& device_;
+    passes::KernelConfig config_;
     const Dataset& dataset_;
     const std::vector<int>& frames_;
     const Gaussians& start_;

@@ -58,7 +58,7 @@ Needs::Needs(const gpu::Device& device, const Dataset& dataset, const std::vecto
       frames_(frames),
       options_(options),
       start_(start.size()),
-      estimator_(device, dataset, frames, start, options) {}
+      estimator_(passes::config_for(device.limits()), dataset, frames, start, options) {}
 
 /// The largest number up to `most`, and not below that of the start, with which a training fits in the device's memory.
 uint32_t Needs::fitting(uint32_t most) {
