@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compiles every variant of every kernel that the device gets, and runs none. scripts/check-drivers runs it on RADV's
-// null device, whose statistics of each kernel follow the name that is printed here.
+// Compiles every variant of every kernel that the device gets, and runs none. Kernels for other lists and slots are among them.
+// scripts/check-drivers runs it on RADV's null device, whose statistics of each kernel follow the name that is printed here.
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -19,8 +20,10 @@ namespace {
 using namespace ewa;
 using Values = std::vector<uint32_t>;
 
+using Choices = std::vector<std::pair<uint32_t, Values>>;
+
 /// Every combination of one value of each constant.
-std::vector<passes::Constants> combinations(const std::vector<std::pair<uint32_t, Values>>& choices) {
+std::vector<passes::Constants> combinations(const Choices& choices) {
     std::vector<passes::Constants> result{{}};
     for (const auto& [id, values] : choices) {
         std::vector<passes::Constants> longer;
@@ -39,9 +42,11 @@ class Compiler {
     explicit Compiler(gpu::Device& device) : cache_(device) {}
 
     template <class Definition>
-    void compile(const std::vector<std::pair<uint32_t, Values>>& choices = {}) {
+    void compile(const Choices& choices = {}) {
         for (const passes::Constants& variant : combinations(choices)) {
-            std::fprintf(stderr, "kernel %s", Definition::shader);
+            const bool quads =
+                std::ranges::find(variant, shared::SPEC_QUADS, &gpu::SpecConstant::id) != variant.end();
+            std::fprintf(stderr, "kernel %s%s", Definition::shader, quads ? "-quads" : "");
             for (const gpu::SpecConstant& constant : variant) std::fprintf(stderr, " %u", constant.value);
             std::fputc('\n', stderr);
             (void)cache_.get<Definition>(variant).pipeline.handle();  // waits for the compiler
@@ -136,6 +141,48 @@ void compile_splatting(Compiler& compiler) {
            BLEND_BACKWARD_ALPHA | BLEND_BACKWARD_FOURTH}},
          {SPEC_KERNEL, {KERNEL_PEAK, KERNEL_ANTIALIAS, KERNEL_DENSITY}}});
     compiler.compile<passes::Pack>({{SPEC_MODE, {PACK_OPAQUE, PACK_BYTES, PACK_FLOATS, PACK_DEPTH}}});
+}
+
+/// A pass of tiles with emitted slots, and with lists of quads in batches of `batch` splats.
+template <class Definition>
+void compile_lists(Compiler& compiler, Choices choices, uint32_t batch) {
+    choices.push_back({shared::SPEC_SLOTS, {shared::SLOTS_EMITTED}});
+    compiler.compile<Definition>(choices);
+    if (batch == 0) return;
+    choices.back().second = {shared::SLOTS_SORTED, shared::SLOTS_EMITTED};
+    choices.push_back({shared::SPEC_QUADS, {batch}});
+    compiler.compile<passes::OfQuads<Definition>>(choices);
+}
+
+/// The kernels for the lists and slots that KernelConfig may choose, and config_for chooses for no device.
+void compile_other_lists(Compiler& compiler, const gpu::Limits& limits) {
+    using namespace shared;
+    const uint32_t batch = std::min(128u, passes::most_quads(limits));
+    const uint32_t packed = UPDATE_PACKED_MOMENTS;
+    compile_lists<passes::Blend>(
+        compiler,
+        {{SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH, BLEND_COUNT, BLEND_ELLIPSOIDS, BLEND_MEDIAN}},
+         {SPEC_KERNEL, kFootprints}},
+        batch);
+    compile_lists<passes::BlendBackward>(
+        compiler,
+        {{SPEC_MODE,
+          {0, BLEND_BACKWARD_ABSOLUTE, BLEND_BACKWARD_ALPHA, BLEND_BACKWARD_ABSOLUTE | BLEND_BACKWARD_ALPHA,
+           BLEND_BACKWARD_ALPHA | BLEND_BACKWARD_FOURTH}},
+         {SPEC_KERNEL, kFootprints}},
+        batch);
+    compile_lists<passes::Contribute>(compiler, {{SPEC_KERNEL, kFootprints}}, batch);
+    compiler.compile<passes::SumSlots>({{SPEC_MODE, {0, UPDATE_ABSOLUTE}}, {SPEC_SLOTS, {SLOTS_EMITTED}}});
+    compiler.compile<passes::Update>({{SPEC_SH_DEGREE, {3}},
+                                      {SPEC_KERNEL, kFootprints},
+                                      {SPEC_MODE, {packed | UPDATE_STATISTICS, packed | UPDATE_REGULARISED}},
+                                      {SPEC_SLOTS, {SLOTS_EMITTED}}});
+    if (batch == 0) return;
+    compiler.compile<passes::Project>(
+        {{SPEC_SH_DEGREE, {3}}, {SPEC_KERNEL, kFootprints}, {SPEC_MODE, {0}}, {SPEC_QUADS, {batch}}});
+    compiler.compile<passes::BandTiles>({{SPEC_QUADS, {batch}}});
+    compiler.compile<passes::ReceiveRecords>({{SPEC_QUADS, {batch}}});
+    compiler.compile<passes::EmitInstances>({{SPEC_MODE, {0, EMIT_FIRST_INSTANCES}}, {SPEC_QUADS, {batch}}});
 }
 
 void compile_points(Compiler& compiler) {
@@ -263,8 +310,7 @@ void compile_operators(Compiler& compiler) {
 
 void compile_path_tracer(Compiler& compiler) {
     using namespace shared;
-    const std::vector<std::pair<uint32_t, Values>> choices = {{SPEC_ALPHA_TESTED, {0, 1}},
-                                                              {SPEC_COLOR_FLOATS, {0, 1}}};
+    const Choices choices = {{SPEC_ALPHA_TESTED, {0, 1}}, {SPEC_COLOR_FLOATS, {0, 1}}};
     compiler.compile<passes::TracePaths>(choices);
     compiler.compile<passes::TraceDepth>(choices);
 }
@@ -280,6 +326,7 @@ int main(int argc, char** argv) {
                      device->info().subgroup_size);
         Compiler compiler(*device);
         compile_splatting(compiler);
+        compile_other_lists(compiler, device->limits());
         compile_points(compiler);
         compile_rays(compiler);
         compile_training(compiler);
