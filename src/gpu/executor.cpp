@@ -80,7 +80,7 @@ Executor::Commands Executor::new_commands() {
     return commands;
 }
 
-Executor::~Executor() {
+void Executor::finish() noexcept {
     const vk::Device device = device_.handle();
     for (const auto count = uint32_t(slots_.size()); unfinished_ > 0; --unfinished_) {
         const VkFence fence = *slots_[(next_ + count - unfinished_) % count].fence;

@@ -22,8 +22,7 @@ class Executor {
   public:
     /// ahead: submissions that may be unfinished at one time, at least 1.
     explicit Executor(Device& device, uint32_t ahead = 1);
-    /// Waits for all submissions.
-    ~Executor();
+    ~Executor() { finish(); }
     Executor(const Executor&) = delete;
 
     /// Submits a recording. Its buffers and pipelines must live until wait() has returned for it. timed: also measures
@@ -41,6 +40,8 @@ class Executor {
     /// Waits until the oldest unfinished submission is done. Then everything that it wrote is visible to the
     /// host. Throws RunError if the device is lost or the validation layer has a message.
     void wait();
+    /// Waits for all submissions, so that their buffers may go. A lost device counts as done.
+    void finish() noexcept;
     /// Submits, and waits for this and all before it.
     void run(const Recording& recording, bool timed = false);
 

@@ -170,6 +170,7 @@ TrainingParts::TrainingParts(std::shared_ptr<gpu::Device> on, const Dataset& dat
 }
 
 TrainingParts::~TrainingParts() {
+    tools.executor.finish();  // steps in flight use buffers that go before the executor
     if (options.device_memory_bytes > 0) device->limit_memory(0, {});
 }
 

@@ -204,6 +204,21 @@ TEST(Trainer, MemoryAndKernelsOfAGpuChangeNoByte) {
     EXPECT_TRUE(mapped == bytes(gpu::HostAccess::none, false));
 }
 
+/// The validation layer sees a buffer that goes while a step uses it.
+TEST(Trainer, EndsAfterItsStepsInFlight) {
+    const std::shared_ptr<gpu::Device> other = open_test_device(true);
+    gpu::Limits limits = other->limits();
+    limits.cpu = false;
+    limits.max_storage_range = ~0u;
+    other->pretend(limits);
+    {
+        Trainer trainer(other, small_capture().dataset, all_frames(small_capture().dataset),
+                        shaken_start(small_capture(), 0.05, 1, 1), quick(130));
+        for (int step = 0; step < 3; ++step) trainer.step();
+    }
+    EXPECT_NO_THROW(other->check_validation());
+}
+
 /// What a replayed step consists of changes with refinements, sizes of images, halvings and SH degrees, and the 101st step is timed.
 TEST(Trainer, ReplayedStepsChangeNoByte) {
     Synthetic capture;
