@@ -2,7 +2,7 @@
 #include "bench/ceiling/ceiling.h"
 
 #include <algorithm>
-#include <barrier>
+#include <condition_variable>
 #include <cstring>
 #include <mutex>
 #include <thread>
@@ -47,19 +47,24 @@ void sort_pass(const Pairs& from, Pairs& to, uint32_t shift, uint32_t digits, st
     const size_t share = (items + threads - 1) / threads;
     const uint32_t mask = digits - 1;
     counts.assign(size_t(threads) * digits, 0);
-    std::barrier all(threads);
+    // With MinGW a thread may wait for ever at a std::barrier, since its atomics miss a notification.
+    std::mutex mutex;
+    std::condition_variable all_counted;
+    unsigned counted = 0;
     on_threads(threads, [&](unsigned thread) {
         const size_t begin = std::min(thread * share, items), end = std::min(begin + share, items);
         uint32_t* own = &counts[size_t(thread) * digits];
         for (size_t i = begin; i < end; ++i) ++own[(from.keys[i] >> shift) & mask];
-        all.arrive_and_wait();
-        if (thread == 0) {
+        std::unique_lock lock(mutex);
+        if (++counted == threads) {
             uint32_t sum = 0;
             for (uint32_t digit = 0; digit < digits; ++digit)
                 for (unsigned t = 0; t < threads; ++t)
                     sum += std::exchange(counts[size_t(t) * digits + digit], sum);
+            all_counted.notify_all();
         }
-        all.arrive_and_wait();
+        all_counted.wait(lock, [&] { return counted == threads; });
+        lock.unlock();
         for (size_t i = begin; i < end; ++i) {
             const uint32_t place = own[(from.keys[i] >> shift) & mask]++;
             to.keys[place] = from.keys[i];
