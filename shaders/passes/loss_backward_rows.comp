@@ -6,7 +6,8 @@
 // The first term needs LOSS_SSIM and applies where |x| is within SSIM_LIMIT. The others apply in the image's own rows, the
 // last one with LOSS_SQUARES. It clamps to SSIM_LIMIT: a square (x - y)^2 grows linearly from there.
 // One invocation owns LOSS_TEXELS texels of channel workgroup.z; one subgroup owns one partial sum of |x - y|
-// and, in a second row, one of (x - y)^2 with both clamped to [0, 1]. With LOSS_SQUARES a third row has (x - y)^2.
+// and, in the next row, one of (x - y)^2 with both clamped to [0, 1]. With LOSS_SQUARES another row has (x - y)^2.
+// With LOSS_SSIM these rows follow the one of loss_rows.comp.
 // SPEC_MODE: LOSS_* bits.
 // It reads the blurred derivatives, the render and the target, and writes dL/d(image) and the partial sums.
 #extension GL_GOOGLE_include_directive : require
@@ -71,8 +72,9 @@ void main() {
         SQUARES ? subgroup_sum(counts ? squares.x + squares.y + squares.z + squares.w : 0.0) : 0.0;
     const uint group = (gl_WorkGroupID.z * gl_NumWorkGroups.y + gl_WorkGroupID.y) * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     if (LANE != 0u) return;
-    const uint groups = gl_NumWorkGroups.x * gl_NumWorkGroups.y * gl_NumWorkGroups.z, at = group * (GROUP_SIZE / SUBGROUP) + SUBGROUP_INDEX;
+    const uint row_sums = gl_NumWorkGroups.x * gl_NumWorkGroups.y * gl_NumWorkGroups.z * (GROUP_SIZE / SUBGROUP);
+    const uint at = (SIMILARITY ? row_sums : 0u) + group * (GROUP_SIZE / SUBGROUP) + SUBGROUP_INDEX;
     partials[at] = sum;
-    partials[groups * (GROUP_SIZE / SUBGROUP) + at] = shown_sum;
-    if (SQUARES) partials[2u * groups * (GROUP_SIZE / SUBGROUP) + at] = square_sum;
+    partials[row_sums + at] = shown_sum;
+    if (SQUARES) partials[2u * row_sums + at] = square_sum;
 }

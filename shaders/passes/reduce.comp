@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Adds the floats of each row in a fixed order.
 // One workgroup is one subgroup and owns one block of row workgroup.z. It writes the sum to that block's place in sums
-// or to Counts: REDUCE_TO_*.
+// or to the row's place in Counts: REDUCE_TO_*.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -23,11 +23,12 @@ void main() {
     for (uint e = begin + LANE; e < end; e += SUBGROUP) sum += source[e];
     sum = subgroup_sum(sum) * push.scale;
     if (LANE != 0u) return;
-    if (push.target == REDUCE_TO_SUMS) sums[row * blocks + block] = sum;
-    if (push.target == REDUCE_TO_L1 && row == 0u) counts.l1 = sum;
-    if (push.target == REDUCE_TO_L1 && row == 1u) counts.squared = sum;
-    if (push.target == REDUCE_TO_L1 && row == 2u) counts.l2 = sum;
-    if (push.target == REDUCE_TO_SSIM) counts.ssim = sum;
-    if (push.target == REDUCE_TO_ALPHA) counts.alpha = sum;
-    if (push.target == REDUCE_TO_DEPTH) counts.depth = sum;
+    const uint target = push.target == REDUCE_TO_SUMS ? REDUCE_TO_SUMS : push.target + row;
+    if (target == REDUCE_TO_SUMS) sums[row * blocks + block] = sum;
+    if (target == REDUCE_TO_SSIM) counts.ssim = sum;
+    if (target == REDUCE_TO_L1) counts.l1 = sum;
+    if (target == REDUCE_TO_SQUARED) counts.squared = sum;
+    if (target == REDUCE_TO_L2) counts.l2 = sum;
+    if (target == REDUCE_TO_ALPHA) counts.alpha = sum;
+    if (target == REDUCE_TO_DEPTH) counts.depth = sum;
 }

@@ -203,12 +203,14 @@ EWA_UINT(SLOTS_EMITTED,
 EWA_UINT(TOTAL_NONE, 0u);
 EWA_UINT(TOTAL_INSTANCES, 1u);  // Counts.instances
 EWA_UINT(TOTAL_SCAN, 2u);       // Counts.scan_total
-// ReducePush.target
-EWA_UINT(REDUCE_TO_SUMS, 0u);   // sums[block]
-EWA_UINT(REDUCE_TO_L1, 1u);     // Counts.l1, of further rows Counts.squared and Counts.l2
-EWA_UINT(REDUCE_TO_SSIM, 2u);   // Counts.ssim
-EWA_UINT(REDUCE_TO_ALPHA, 3u);  // Counts.alpha
-EWA_UINT(REDUCE_TO_DEPTH, 4u);  // Counts.depth
+// ReducePush.target: of all rows REDUCE_TO_SUMS, or of the first row one of the others. Further rows have those that follow.
+EWA_UINT(REDUCE_TO_SUMS, 0u);     // sums[block]
+EWA_UINT(REDUCE_TO_SSIM, 1u);     // Counts.ssim
+EWA_UINT(REDUCE_TO_L1, 2u);       // Counts.l1
+EWA_UINT(REDUCE_TO_SQUARED, 3u);  // Counts.squared
+EWA_UINT(REDUCE_TO_L2, 4u);       // Counts.l2
+EWA_UINT(REDUCE_TO_ALPHA, 5u);    // Counts.alpha
+EWA_UINT(REDUCE_TO_DEPTH, 6u);    // Counts.depth
 
 // ---- Loss: what one invocation owns ----
 // A pass down the columns: one texel (4 pixels) of LOSS_ROWS rows. A pass along the rows: LOSS_TEXELS texels

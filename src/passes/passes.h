@@ -377,7 +377,7 @@ struct LossColumns {
     gpu::BufferPart image, target, moments;
 };
 
-/// SSIM, its derivatives by the moments, and partial sums of SSIM.
+/// SSIM, its derivatives by the moments, and a row of partial sums of SSIM.
 struct LossRows {
     static constexpr char shader[] = "loss_rows";
     using Work = PerElement<loss_row_items<shared::LossPush>, 3>;
@@ -392,7 +392,8 @@ struct LossBackwardColumns {
 };
 
 /// Gradient of the whole loss by the render, and rows of partial sums: of absolute differences, of squared differences of
-/// clamped values, and with LOSS_SQUARES of squared differences. Variant: SPEC_MODE (LOSS_* bits).
+/// clamped values, and with LOSS_SQUARES of squared differences. With LOSS_SSIM they follow that of LossRows.
+/// Variant: SPEC_MODE (LOSS_* bits).
 struct LossBackwardRows {
     static constexpr char shader[] = "loss_backward_rows";
     using Work = PerElement<loss_row_items<shared::LossPush>, 3>;

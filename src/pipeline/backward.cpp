@@ -60,7 +60,7 @@ double loss_of(const LossWeights& weights, const shared::Counts& counts) {
     return loss_of(weights, terms_of(counts));
 }
 
-/// Adds `items` floats of each row of frame.partials, in two steps. target: shared::REDUCE_TO_*.
+/// Adds `items` floats of each row of frame.partials, in two steps. target: that of the first row, shared::REDUCE_TO_*.
 void FramePasses::mean_of_partials(uint32_t target, uint32_t items, uint32_t rows, float scale) const {
     const uint32_t block = frame.sizes.reduce_block, blocks = (items + block - 1) / block;
     record(passes::Reduce{.source = frame.partials, .sums = frame.reduced, .counts = frame.counts},
@@ -71,18 +71,16 @@ void FramePasses::mean_of_partials(uint32_t target, uint32_t items, uint32_t row
 
 /// The terms of the loss that the plan has, and their gradient by the image.
 void FramePasses::compare(const gpu::Buffer& image, const shared::LossPush& push, float share) const {
-    const bool similarity = plan.loss.ssim > 0;
+    const bool similarity = plan.loss.ssim > 0, squares = plan.loss.l2 > 0;
     if (similarity) {
         record(passes::LossColumns{.image = image, .target = frame.target, .moments = frame.moments}, push);
         record(
             passes::LossRows{
                 .moments = frame.moments, .derivatives = frame.derivatives, .partials = frame.partials},
             push);
-        mean_of_partials(shared::REDUCE_TO_SSIM, frame.sizes.partials, 1, share);
         record(passes::LossBackwardColumns{.derivatives = frame.derivatives, .blurred = frame.blurred}, push);
     }
-    const uint32_t mode =
-        (similarity ? shared::LOSS_SSIM : 0) | (plan.loss.l2 > 0 ? shared::LOSS_SQUARES : 0);
+    const uint32_t mode = (similarity ? shared::LOSS_SSIM : 0) | (squares ? shared::LOSS_SQUARES : 0);
     // A binding that a mode does not use needs a buffer.
     record(passes::LossBackwardRows{.blurred = similarity ? frame.blurred : frame.target,
                                     .image = image,
@@ -90,6 +88,8 @@ void FramePasses::compare(const gpu::Buffer& image, const shared::LossPush& push
                                     .image_gradient = frame.image_gradient,
                                     .partials = frame.partials},
            push, {{shared::SPEC_MODE, mode}});
+    mean_of_partials(similarity ? shared::REDUCE_TO_SSIM : shared::REDUCE_TO_L1, frame.sizes.partials,
+                     2u + similarity + squares, share);
 }
 
 /// The alpha of a cut-out photo as a term of the loss, and the gradient by the transmittance, which is 0 for other photos.
@@ -185,7 +185,6 @@ void FramePasses::loss(const gpu::Buffer& photo, bool masked, const AppearanceUs
     compare(image, push, float(share));
     if (masked)
         record(passes::MaskGradient{.photo = photo, .image_gradient = frame.image_gradient}, mask, colors);
-    mean_of_partials(shared::REDUCE_TO_L1, frame.sizes.partials, plan.loss.l2 > 0 ? 3 : 2, float(share));
     if (plan.loss.alpha > 0) compare_alpha(photo, cut, mask, push);
     if (plan.loss.depth > 0) compare_depth(depths, mask, push);
     if (appearance) appearance_backward(*appearance);

@@ -186,7 +186,8 @@ void size_loss(Sizes& s, const passes::KernelConfig& config, const FrameRequest&
                         : request.loss.alpha > 0 ? 4
                                                  : 3) *
                        word;
-    const uint64_t rows = request.loss.l2 > 0 ? 3 : 2;  // see LossBackwardRows
+    // See LossBackwardRows.
+    const uint64_t rows = 2u + (request.loss.ssim > 0) + (request.loss.l2 > 0);
     s.partial_sums = rows * s.partials * word;
     s.reduced = rows * s.reduce_blocks * word;
 }

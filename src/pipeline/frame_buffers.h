@@ -48,7 +48,7 @@ struct Sizes {
     uint32_t image_planes = 0;
     uint32_t slot_order = shared::SLOTS_SORTED;  // SPEC_SLOTS
     uint32_t quads = 0;                          // SPEC_QUADS
-    uint32_t partials = 0;                       // partial sums partial sums of a loss kernel
+    uint32_t partials = 0;                       // partial sums in a row of a loss kernel
     uint32_t reduce_block = 0, reduce_blocks = 0;
     uint32_t ppisp_blocks = 0;  // of pixels, for the gradient of PPISP's values
     uint32_t grid_parts = 0;    // of pixels, for the gradient of the bilateral grid
