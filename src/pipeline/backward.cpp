@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline/backward.h"
 
+#include <utility>
+
 #include "pipeline/adam.h"
 #include "pipeline/appearances.h"
 #include "pipeline/methods.h"
@@ -60,13 +62,17 @@ double loss_of(const LossWeights& weights, const shared::Counts& counts) {
     return loss_of(weights, terms_of(counts));
 }
 
-/// Adds `items` floats of each row of frame.partials, in two steps. target: that of the first row, shared::REDUCE_TO_*.
+/// Adds `items` floats of each row of frame.partials, in two steps unless they are one block. target: that of the first row,
+/// shared::REDUCE_TO_*.
 void FramePasses::mean_of_partials(uint32_t target, uint32_t items, uint32_t rows, float scale) const {
-    const uint32_t block = frame.sizes.reduce_block, blocks = (items + block - 1) / block;
-    record(passes::Reduce{.source = frame.partials, .sums = frame.reduced, .counts = frame.counts},
-           {.items = items, .block = block, .target = shared::REDUCE_TO_SUMS, .rows = rows, .scale = 1});
-    record(passes::Reduce{.source = frame.reduced, .sums = frame.partials, .counts = frame.counts},
-           {.items = blocks, .block = blocks, .target = target, .rows = rows, .scale = scale});
+    passes::Reduce pass{.source = frame.partials, .sums = frame.reduced, .counts = frame.counts};
+    if (const uint32_t block = frame.sizes.reduce_block; items > block) {
+        record(pass,
+               {.items = items, .block = block, .target = shared::REDUCE_TO_SUMS, .rows = rows, .scale = 1});
+        std::swap(pass.source, pass.sums);
+        items = (items + block - 1) / block;
+    }
+    record(pass, {.items = items, .block = items, .target = target, .rows = rows, .scale = scale});
 }
 
 /// The terms of the loss that the plan has, and their gradient by the image.

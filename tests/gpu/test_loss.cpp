@@ -414,15 +414,17 @@ TEST(Reduce, AddsUpInAFixedOrder) {
         for (size_t i = 0; i < values.size(); ++i) sum[i / items] += values[i] = float(random.uniform(-1, 2));
         const uint32_t block = 512, blocks = (items + block - 1) / block;
         Guarded source("source", values), sums("sums", 3 * blocks * 4), unused("unused", 4),
-            counts = zero_counts();
+            counts = zero_counts(), at_once = zero_counts();
         r.run([&](gpu::Recording& recording) {
             const auto reduce = r.cache.get<passes::Reduce>();
             reduce.record(recording, {source, sums, counts}, {items, block, shared::REDUCE_TO_SUMS, 3, 1});
             reduce.record(recording, {sums, unused, counts}, {blocks, blocks, shared::REDUCE_TO_L1, 3, 0.5f});
             reduce.record(recording, {sums, unused, counts},
                           {blocks, blocks, shared::REDUCE_TO_SSIM, 1, 2.0f});
+            reduce.record(recording, {source, unused, at_once},
+                          {items, items, shared::REDUCE_TO_L1, 3, 0.5f});
         });
-        expect_intact({&source, &sums, &unused, &counts});
+        expect_intact({&source, &sums, &unused, &counts, &at_once});
         const auto read = counts.read<shared::Counts>()[0];
         EXPECT_NEAR(read.l1, 0.5 * sum[0], 1e-6 * items);
         EXPECT_NEAR(read.squared, 0.5 * sum[1], 1e-6 * items);
@@ -430,6 +432,12 @@ TEST(Reduce, AddsUpInAFixedOrder) {
         EXPECT_NEAR(read.ssim, 2 * sum[0], 4e-6 * items);
         EXPECT_EQ(unused.read<uint32_t>()[0], kPoison);
         EXPECT_EQ(read.instances, 0u);
+        // The sums of one block do not depend on whether it is added up in one step or in two.
+        const auto once = at_once.read<shared::Counts>()[0];
+        const std::array sums_once{once.l1, once.squared, once.l2};
+        if (blocks == 1) {
+            EXPECT_EQ(sums_once, (std::array{read.l1, read.squared, read.l2}));
+        }
     }
 }
 
