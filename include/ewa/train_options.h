@@ -33,6 +33,10 @@ inline constexpr int kAutomaticHalvings = -1;
 /// TrainOptions::max_splats: splat_cap() of ewa/training_needs.h chooses it.
 inline constexpr uint32_t kAutomaticMaxSplats = 0;
 
+/// TrainOptions::final_splats: two thirds of max_splats, but no fewer than the first splats, in a run of mcmc that has fewer than 30,000
+/// steps and an automatic max_splats. All others keep all splats (docs/experiments/growth.md#fewer-splats-at-the-end).
+inline constexpr uint32_t kAutomaticFinalSplats = UINT32_MAX;
+
 /// Options of a Trainer. Learning rates are those of Adam. Lengths are in world units. "Scene extent" is
 /// scene_extent() of ewa/dataset.h, or the median distance of the start's splats if all cameras coincide.
 struct TrainOptions {
@@ -46,7 +50,7 @@ struct TrainOptions {
     Strategy strategy = Strategy::mcmc;
     uint32_t max_splats = kAutomaticMaxSplats;  // hard limit
     /// The most splats in the last quarter of the run: those with the largest weight at any pixel of a training image. 0: all.
-    uint32_t final_splats = 0;
+    uint32_t final_splats = kAutomaticFinalSplats;
     int sh_degree = 3;               // 0 to 3, or kAutomaticShDegree
     uint64_t seed = 0;               // the same seed on the same device gives the same bytes
     bool random_background = false;  // a new background colour each step

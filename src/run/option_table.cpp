@@ -109,8 +109,9 @@ RunOption resolution_schedule_option() {
     return option;
 }
 
+constexpr uint32_t kMost = 1000000000;  // splats
+
 RunOption max_splats_option() {
-    constexpr uint32_t kMost = 1000000000;
     const Member<uint32_t> member = [](RunOptions& o) -> uint32_t& { return o.train.max_splats; };
     RunOption option = member_option(
         "max-splats", "auto|N",
@@ -127,12 +128,19 @@ RunOption max_splats_option() {
 }
 
 RunOption final_splats_option() {
-    RunOption option = number<uint32_t>(
-        "final-splats", "N",
+    const Member<uint32_t> member = [](RunOptions& o) -> uint32_t& { return o.train.final_splats; };
+    RunOption option = member_option(
+        "final-splats", "auto|N",
         "Keep only so many splats for the last quarter of the run: those that show most at a pixel of a "
-        "training "
-        "image. 0: all",
-        kDecides, [](RunOptions& o) -> uint32_t& { return o.train.final_splats; }, 0, 1000000000);
+        "training image. 0: all. auto: two thirds of an automatic --max-splats in runs of mcmc of fewer "
+        "than 30000 steps, else all",
+        kDecides, member, [](const std::string& text) {
+            return text == "auto" ? kAutomaticFinalSplats : parse_within(text, 0u, kMost);
+        });
+    option.get = [](const RunOptions& options) {
+        const uint32_t splats = options.train.final_splats;
+        return splats == kAutomaticFinalSplats ? Json("auto") : Json(splats);
+    };
     option.before = "0";
     return option;
 }

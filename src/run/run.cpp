@@ -115,6 +115,7 @@ class Run {
     std::shared_ptr<gpu::Device> device_;
     std::optional<train::RunLog> log_;
     report::ReportData report_;
+    uint32_t final_splats_ = 0;
     std::filesystem::path first_render_;
 };
 
@@ -179,10 +180,15 @@ MemoryEstimate Run::choose_cap() {
     if (!earlier_ && train::thin_for_device(input_, *needs)) needs = needed();
     const SplatCap cap = needs->cap();
     report_.summary.max_splats = cap.splats;
+    final_splats_ = needs->final_splats(cap.splats);
     saves_.settings()["cap"] = cap.splats;
     if (train.max_splats == kAutomaticMaxSplats && train.strategy != Strategy::none)
         input_.notes.push_back(fmt::format("at most {}: {}; --max-splats N sets another limit",
                                            core::counted(cap.splats, "splat"), cap.reason));
+    if (train.final_splats == kAutomaticFinalSplats)
+        input_.notes.push_back(
+            fmt::format("at most {} in the last quarter: those that show most; --final-splats 0 keeps all",
+                        core::counted(final_splats_, "splat")));
     const std::string full = train::check_disk_room(folder_.path(), input_.start.size(), cap.splats, train);
     if (!full.empty()) input_.remarks.push_back(full);
     return needs->memory(cap.splats);
@@ -192,6 +198,7 @@ MemoryEstimate Run::choose_cap() {
 TrainOptions Run::capped_options() const {
     TrainOptions capped = options().train;
     capped.max_splats = report_.summary.max_splats;
+    capped.final_splats = final_splats_;
     return capped;
 }
 

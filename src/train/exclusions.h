@@ -70,7 +70,10 @@ inline constexpr std::array kDemands{
     Demand{"--background sky", learns_sky, &scene::Method::no_sky_gradient},
     Demand{"--absgrad", [](const TrainOptions& options) { return options.absolute_gradients; },
            &scene::Method::no_pixel_gradient},
-    Demand{"--final-splats", [](const TrainOptions& options) { return options.final_splats > 0; },
+    Demand{"--final-splats",
+           [](const TrainOptions& options) {
+               return options.final_splats > 0 && options.final_splats != kAutomaticFinalSplats;
+           },
            &scene::Method::no_weight}};
 
 inline constexpr std::array kSkyExclusions{

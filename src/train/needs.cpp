@@ -20,6 +20,7 @@ namespace {
 constexpr double kSplatsPerPixel = 0.6;
 // 30,000 steps can have 3 million, as the papers' largest scenes. Splats that come late have few steps left.
 constexpr double kSplatsPerStep = 100;
+constexpr double kFinalShare = 2.0 / 3;  // docs/experiments/growth.md#fewer-splats-at-the-end
 constexpr double kMemoryShare =
     0.8;  // of the device's; the rest is for other programs, and for errors of the estimate
 
@@ -97,6 +98,11 @@ SplatCap Needs::cap() {
     if (cap.splats < options_.least_max_splats) cap = {options_.least_max_splats, "as before"};
     if (cap.splats < first) cap = {first, "as many as there are to start from"};
     return cap;
+}
+
+uint32_t Needs::final_splats(uint32_t max_splats) const {
+    if (options_.final_splats != kAutomaticFinalSplats) return options_.final_splats;
+    return std::max(uint32_t(start_), uint32_t(kFinalShare * max_splats));
 }
 
 int Needs::portions(uint32_t max_splats, int ranks) {

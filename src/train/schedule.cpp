@@ -300,6 +300,10 @@ TrainOptions resolve(TrainOptions options, const Dataset& dataset, const std::ve
     const bool adc_asked_for = options.absolute_gradients || !train::has_opacities(options);
     if (options.strategy == Strategy::automatic)
         options.strategy = adc_asked_for ? Strategy::adc : strategy_for(options.steps);
+    if (options.final_splats == kAutomaticFinalSplats &&
+        (options.strategy != Strategy::mcmc || options.steps >= train::kFullRun ||
+         options.max_splats != kAutomaticMaxSplats || scene::method_of(options.render).no_weight))
+        options.final_splats = 0;
     if (options.sh_degree == kAutomaticShDegree)
         options.sh_degree = dataset.color_depends_on_view ? kMaxShDegree : 0;
     if (options.halvings == kAutomaticHalvings) {

@@ -192,6 +192,7 @@ Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
     const uint32_t most = agreed(*ranks, needs.cap().splats);
     const auto count = int(agreed(*ranks, uint32_t(needs.portions(most, ranks->size()))));
     resolved.max_splats = most;
+    resolved.final_splats = needs.final_splats(most);
     if (resolved.device_memory_bytes > 0 && device->memory_limit() > 0)
         throw InputError(
             "another training has limited this device's memory: a device takes one such training");

@@ -138,6 +138,7 @@ TEST(Schedule, AFullRunIsThatOf3DGS) {
 
 TEST(Schedule, SplatsAreRemovedOnceAndTheirNumberThenStays) {
     TrainOptions options;
+    options.final_splats = 0;
     options.refine_stop = options.relocate_stop = 30000;
     EXPECT_TRUE(schedule_for(options).densifies(29900));
     const Schedule whole = schedule_for(options);
@@ -154,6 +155,23 @@ TEST(Schedule, SplatsAreRemovedOnceAndTheirNumberThenStays) {
         int removals = 0;
         for (int step = 1; step <= steps; ++step) removals += schedule_for(options).prunes(step);
         EXPECT_EQ(removals, 1) << steps;
+    }
+}
+
+/// Others keep all splats, unless options say how many.
+TEST(Schedule, AnAutomaticNumberOfFinalSplatsIsForShortRunsOfMcmc) {
+    TrainOptions options;
+    options.steps = 29999;
+    EXPECT_EQ(resolve(options, {}, {}).final_splats, kAutomaticFinalSplats);
+    TrainOptions longer = options, capped = options, other = options, along_rays = options;
+    longer.steps = 30000;
+    capped.max_splats = 1000;
+    other.strategy = Strategy::adc;
+    along_rays.render.integrator = Integrator::ray;
+    for (TrainOptions each : {longer, capped, other, along_rays}) {
+        EXPECT_EQ(resolve(each, {}, {}).final_splats, 0u);
+        each.final_splats = 7;
+        EXPECT_EQ(resolve(each, {}, {}).final_splats, 7u);
     }
 }
 
@@ -211,6 +229,7 @@ TEST(Schedule, SplatsAreBoundedByTheirDistanceInShortRuns) {
 
 TEST(Schedule, RelocationsStopWhereMcmcsCodeStopsThem) {
     TrainOptions options;
+    options.final_splats = 0;
     const Schedule full = schedule_for(options);
     EXPECT_FALSE(full.relocates(500));
     EXPECT_TRUE(full.relocates(600));

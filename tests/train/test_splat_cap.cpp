@@ -107,6 +107,7 @@ TEST(SplatCap, BoundsATraining) {
     const auto frames = all_frames(small_capture().dataset);
     TrainOptions options = busy(Strategy::mcmc, 1);
     options.max_splats = kAutomaticMaxSplats;
+    options.final_splats = 0;
     options.growth = 10;
     Trainer trainer(device(), small_capture().dataset, frames, start, options);
     while (trainer.steps_done() < options.steps) trainer.step();

@@ -343,6 +343,15 @@ TEST(Trainer, TheLastQuarterHasTheSplatsThatShowMost) {
         for (size_t i = 0; i < left.size(); ++i) EXPECT_LT(left.means[3 * i + 1], 10) << int(strategy);
         EXPECT_GT(train_psnr(left), 15);
     }
+    TrainOptions grows = quick(160);
+    grows.strategy = Strategy::mcmc;
+    grows.relocate_stop = 30000;
+    grows.growth = 3;
+    Trainer automatic(device(), small_capture().dataset, all_frames(small_capture().dataset), start, grows);
+    const uint32_t cap = automatic.max_splats();
+    for (int step = 1; step <= 160; ++step)
+        ASSERT_LE(automatic.step().splats, step < 120 ? cap : cap * 2 / 3) << "step " << step;
+    EXPECT_EQ(automatic.splats(), cap * 2 / 3);
     TrainOptions options = quick(8);
     options.final_splats = 40;  // no fewer than there are
     EXPECT_EQ(train(options, start, 8).report.splats, 40u);
