@@ -79,7 +79,8 @@ class Trainer {
     /// of them. Throws InputError if the splats are points.
     std::vector<Image> render(std::span<const Camera> cameras) const;
     uint32_t splats() const;
-    uint32_t max_splats() const;  // the number that was chosen if TrainOptions::max_splats is automatic
+    uint32_t max_splats() const;    // the number that was chosen if TrainOptions::max_splats is automatic
+    uint32_t final_splats() const;  // as well
     int steps_done() const;
     StepReport report() const;                         // of the last step, once the device has finished it
     std::vector<Exposure> exposures() const;           // one for each training frame; empty if not learned

@@ -229,6 +229,7 @@ class Training {
     RunOptions options() const {
         RunOptions all = start_.run;
         all.train.max_splats = trainer_->max_splats();
+        all.train.final_splats = trainer_->final_splats();
         return all;
     }
     const StepReport& last() const { return last_; }

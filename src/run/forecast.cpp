@@ -83,6 +83,9 @@ double Forecast::cost_from(const TrainOptions& options, int step, double splats,
                                 : mcmc                             ? schedule.relocate_stop
                                                                    : schedule.refine_stop,
                                 schedule.halvings * schedule.resolution_every);
+    const uint32_t left = options.final_splats == kAutomaticFinalSplats
+                              ? std::max(scene_.splats, most / 3 * 2)
+                              : options.final_splats;
     const double added = adc ? added_by_adc() : 0;
     double sum = 0;
     while (step < options.steps) {
@@ -95,6 +98,7 @@ double Forecast::cost_from(const TrainOptions& options, int step, double splats,
         if (mcmc && schedule.relocates(step)) splats = std::max(splats, std::floor(schedule.growth * splats));
         if (adc && schedule.densifies(step)) splats += added;
         splats = std::min(splats, std::max<double>(most, scene_.splats));
+        if (!schedule.may_refine(step)) splats = std::min<double>(splats, left);
     }
     return sum +
            kEvaluation * double(scene_.evaluated) * cost(schedule, options.strategy, options.steps, splats);

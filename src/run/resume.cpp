@@ -143,6 +143,7 @@ int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, 
         take("background", options);
         take("background-noise", options);
     }
+    if (asked.train.final_splats == kAutomaticFinalSplats) take("final-splats", options);
     if (asked.train.halvings == kAutomaticHalvings) {
         options.train.resolution_every = asked.train.resolution_every;
         take("resolution-schedule", options);

@@ -185,7 +185,7 @@ MemoryEstimate Run::choose_cap() {
     if (train.max_splats == kAutomaticMaxSplats && train.strategy != Strategy::none)
         input_.notes.push_back(fmt::format("at most {}: {}; --max-splats N sets another limit",
                                            core::counted(cap.splats, "splat"), cap.reason));
-    if (train.final_splats == kAutomaticFinalSplats)
+    if (train.final_splats == kAutomaticFinalSplats && final_splats_ > 0)
         input_.notes.push_back(
             fmt::format("at most {} in the last quarter: those that show most; --final-splats 0 keeps all",
                         core::counted(final_splats_, "splat")));

@@ -45,8 +45,8 @@ Split chosen_frames(const Dataset& dataset, Split split, const std::string& list
 bool refines(const TrainOptions& options) {
     const Schedule schedule = schedule_for(options);
     return options.strategy == Strategy::mcmc
-               ? schedule.refine_start + schedule.relocate_every < schedule.relocate_stop
-               : schedule.refine_start + schedule.refine_every < schedule.refine_stop;
+               ? schedule.relocates(schedule.refine_start + schedule.relocate_every)
+               : schedule.densifies(schedule.refine_start + schedule.refine_every);
 }
 
 /// What to tell of a run whose strategy never gets to work.

@@ -227,6 +227,7 @@ uint64_t MemoryEstimator::pairs(uint32_t splats, uint32_t list_side) {
 
 MemoryEstimate MemoryEstimator::up_to(uint32_t max_splats) {
     TrainOptions options = options_;
+    options.final_splats = thins_at_end(options_) ? max_splats : 0;
     options.max_splats = max_splats;
     const bool grows = options.strategy != Strategy::none;
     const bool cut =

@@ -102,7 +102,7 @@ SplatCap Needs::cap() {
 
 uint32_t Needs::final_splats(uint32_t max_splats) const {
     if (options_.final_splats != kAutomaticFinalSplats) return options_.final_splats;
-    return std::max(uint32_t(start_), uint32_t(kFinalShare * max_splats));
+    return start_ >= max_splats ? 0 : std::max(uint32_t(start_), uint32_t(kFinalShare * max_splats));
 }
 
 int Needs::portions(uint32_t max_splats, int ranks) {

@@ -32,7 +32,7 @@ class Needs {
     SplatCap cap();
     /// About how many of the first splats the device's memory can train: all of them, or fewer.
     size_t fitting_start();
-    /// TrainOptions::final_splats, if the largest number is max_splats.
+    /// TrainOptions::final_splats, if the largest number is max_splats. 0 if there are as many to start from.
     uint32_t final_splats(uint32_t max_splats) const;
     MemoryEstimate memory(uint32_t max_splats) { return estimator_.up_to(max_splats); }
     /// The number of portions into which each of `ranks` ranks divides its splats. It is 1 if all splats fit in

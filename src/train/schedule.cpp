@@ -65,6 +65,12 @@ bool has_opacities(const TrainOptions& options) {
     return !scene::method_of(options.render).no_opacity;
 }
 
+bool thins_at_end(const TrainOptions& options) {
+    if (options.final_splats != kAutomaticFinalSplats) return options.final_splats > 0;
+    return options.strategy == Strategy::mcmc && options.steps < kFullRun &&
+           options.max_splats == kAutomaticMaxSplats && !scene::method_of(options.render).no_weight;
+}
+
 bool few_photos(const TrainOptions& options, size_t photos) {
     return photos <= size_t(options.few_photos) && options.strategy != Strategy::mcmc &&
            has_opacities(options) && !options.refine_poses;
@@ -86,7 +92,7 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
             .absolute_gradients = options.absolute_gradients,
             .packed_moments = options.moment_bits == 16,
             .regularised = options.strategy == Strategy::mcmc || few_photos(options, photos),
-            .pruned = options.final_splats > 0};
+            .pruned = thins_at_end(options)};
 }
 
 void check_exclusions(const TrainOptions& options, int ranks) {
@@ -243,7 +249,7 @@ Schedule schedule_for(const TrainOptions& options, size_t photos) {
     if (options.opacity_reset_every > 0 && has_opacities(options))
         s.opacity_reset_every =
             scaled(options.opacity_reset_every, std::min(options.opacity_reset_every, kLeastResetEvery));
-    if (options.final_splats > 0) s.prune_step = std::max(1, int(std::lround(kPruneShare * options.steps)));
+    if (thins_at_end(options)) s.prune_step = std::max(1, int(std::lround(kPruneShare * options.steps)));
     s.sh_degree_every = scaled(options.sh_degree_every, std::min(options.sh_degree_every, kLeastShEvery));
     s.sh_degree = options.sh_degree;
     s.halvings = options.halvings;
@@ -300,10 +306,7 @@ TrainOptions resolve(TrainOptions options, const Dataset& dataset, const std::ve
     const bool adc_asked_for = options.absolute_gradients || !train::has_opacities(options);
     if (options.strategy == Strategy::automatic)
         options.strategy = adc_asked_for ? Strategy::adc : strategy_for(options.steps);
-    if (options.final_splats == kAutomaticFinalSplats &&
-        (options.strategy != Strategy::mcmc || options.steps >= train::kFullRun ||
-         options.max_splats != kAutomaticMaxSplats || scene::method_of(options.render).no_weight))
-        options.final_splats = 0;
+    if (!train::thins_at_end(options)) options.final_splats = 0;
     if (options.sh_degree == kAutomaticShDegree)
         options.sh_degree = dataset.color_depends_on_view ? kMaxShDegree : 0;
     if (options.halvings == kAutomaticHalvings) {

@@ -98,6 +98,9 @@ uint64_t cache_share(const TrainOptions& options, int halvings);
 /// Whether the method of drawing gives splats an opacity, so that their edges fade. Solid spheres have none.
 bool has_opacities(const TrainOptions& options);
 
+/// Whether the run removes splats down to TrainOptions::final_splats. options: kAutomaticFinalSplats with resolved strategy.
+bool thins_at_end(const TrainOptions& options);
+
 /// Whether adc or none has so few training photos that the run is regularised, and may fade. False for a run that refines poses,
 /// since its splats have to follow the cameras. photos: number of training images.
 bool few_photos(const TrainOptions& options, size_t photos);

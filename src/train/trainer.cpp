@@ -332,6 +332,9 @@ uint32_t Trainer::splats() const {
 uint32_t Trainer::max_splats() const {
     return training_->parts.options.max_splats;
 }
+uint32_t Trainer::final_splats() const {
+    return training_->parts.options.final_splats;
+}
 size_t Trainer::images_on_disk() const {
     return training_->parts.images.full().on_disk();
 }

@@ -228,6 +228,27 @@ TEST(Run, SaysAndKeepsAnAutomaticCap) {
     expect_error<InputError>([&] { run_training(options); }, {"--max-splats \"auto\", not 600"});
 }
 
+/// The rule for the splats at the end is that of the run's own steps: a full run keeps all.
+TEST(Run, ContinuesAShortRunOfMcmcToAFullOne) {
+    TempFolder folder;
+    RunOptions options = small_run(folder / "o");
+    options.train.strategy = Strategy::mcmc;
+    options.train.max_splats = kAutomaticMaxSplats;
+    Recorder recorder;
+    run_training(options, recorder);
+    const auto tells = [](const Recorder& of) {
+        return std::ranges::any_of(of.started.remarks, [](const std::string& remark) {
+            return remark.ends_with("in the last quarter: those that show most; --final-splats 0 keeps all");
+        });
+    };
+    EXPECT_TRUE(tells(recorder));
+    options.resume = true;
+    options.train.steps = 30000;
+    Recorder stops(45);
+    EXPECT_EQ(run_training(options, stops).summary.steps, 45);
+    EXPECT_FALSE(tells(stops));
+}
+
 TEST(Run, ADenseStartKeepsToACapThatIsGiven) {
     TempFolder folder;
     RunOptions options = small_run(folder / "o");

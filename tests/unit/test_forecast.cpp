@@ -70,6 +70,7 @@ TEST(Forecast, OfMcmcFollowsItsSchedule) {
     for (int step = 1; step <= options.steps; ++step) {
         seconds += 2 * (0.2e-6 * scene.pixels + 1.05e-6 * splats);
         if (schedule.relocates(step)) splats = std::min(500000.0, std::floor(schedule.growth * splats));
+        if (schedule.prunes(step)) splats = std::min(splats, 500000.0 * 2 / 3);
         run.push_back({step, seconds, uint32_t(splats)});
     }
     const double evaluation = 47 * 0.75 * 2 * (0.2e-6 * scene.pixels + 1.05e-6 * splats);
