@@ -124,7 +124,8 @@ double Forecast::on_reference() const {
 double usual_seconds(ForecastScene scene, TrainOptions options, bool on_cpu) {
     if (options.strategy == Strategy::automatic) options.strategy = strategy_for(options.steps);
     const double most = kSplatsPerPixel * scene.pixels * std::sqrt(double(scene.photos));
-    scene.max_splats = uint32_t(std::min({most, double(options.max_splats), 1e9}));
+    const double asked = options.max_splats == kAutomaticMaxSplats ? 1e9 : double(options.max_splats);
+    scene.max_splats = uint32_t(std::min(most, asked));
     scene.splats = std::min(scene.splats, scene.max_splats);
     return (on_cpu ? 1 : kOnGpu) * Forecast(scene, options).on_reference();
 }

@@ -80,6 +80,13 @@ TEST(Forecast, OfMcmcFollowsItsSchedule) {
     EXPECT_GT(seconds, 8 * options.steps * run.front().seconds);
 }
 
+/// An automatic cap is that of the pixels: the run is not one without splats.
+TEST(Forecast, OfAnAutomaticCapCountsItsSplats) {
+    TrainOptions automatic, one;
+    one.max_splats = 1;
+    EXPECT_GT(usual_seconds(kFox, automatic, true), 2 * usual_seconds(kFox, one, true));
+}
+
 TEST(Forecast, OfAShorterRunUsesTheMeasuredSpeed) {
     TrainOptions options;
     options.steps = 30000;
