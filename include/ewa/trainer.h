@@ -80,7 +80,7 @@ class Trainer {
     std::vector<Image> render(std::span<const Camera> cameras) const;
     uint32_t splats() const;
     uint32_t max_splats() const;    // the number that was chosen if TrainOptions::max_splats is automatic
-    uint32_t final_splats() const;  // as well
+    uint32_t final_splats() const;  // the same of TrainOptions::final_splats; 0: all splats stay
     int steps_done() const;
     StepReport report() const;                         // of the last step, once the device has finished it
     std::vector<Exposure> exposures() const;           // one for each training frame; empty if not learned
