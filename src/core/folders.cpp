@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/folders.h"
 
+#include <chrono>
 #include <system_error>
+#include <thread>
 
 #include "core/text.h"
 #include "ewa/error.h"
@@ -49,9 +51,18 @@ void make_folder(const std::filesystem::path& folder) {
 }
 
 FolderLock::FolderLock(const std::filesystem::path& folder) {
-    if (platform::lock_folder(folder, held_) == platform::Lock::taken)
+    if (platform::lock_path(folder, held_) == platform::Lock::taken)
         throw RunError(one_line(folder.string()) +
                        ": another process uses this folder; wait for it, or give another --output");
+}
+
+FileLock::FileLock(const std::filesystem::path& file) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (platform::lock_path(file, held_) == platform::Lock::taken) {
+        is_others_ = std::chrono::steady_clock::now() > end;
+        if (is_others_) return;
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
 }
 
 TemporaryFolder::TemporaryFolder(const std::string& prefix) {

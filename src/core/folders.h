@@ -37,6 +37,20 @@ class FolderLock {
     platform::File held_;
 };
 
+/// Locks the existing file of this name until the object or the process ends, for who replaces it. Waits while another process has
+/// the lock, at most a minute. Nothing is left on disk. Where there is no such file, or the file system has no locks, this does
+/// nothing.
+class FileLock {
+  public:
+    explicit FileLock(const std::filesystem::path& file);
+    /// Whether another process had the lock for the whole minute.
+    bool is_others() const { return is_others_; }
+
+  private:
+    platform::File held_;
+    bool is_others_ = false;
+};
+
 /// A new folder in the system's folder for temporary files. The destructor removes it with its contents.
 class TemporaryFolder {
   public:

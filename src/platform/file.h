@@ -65,8 +65,9 @@ class File {
 /// Whether another open file locks this one.
 bool is_locked(const std::filesystem::path& path);
 
-/// Locks a folder until `held` is closed. Nothing is left on disk. Windows: processes of other machines do not see the lock.
-Lock lock_folder(const std::filesystem::path& folder, File& held);
+/// Locks the file or folder of this name until `held` is closed. Others may read, rename and replace it; who has replaced it
+/// meanwhile makes this `taken`. Nothing is left on disk. Windows: processes of other machines do not see the lock.
+Lock lock_path(const std::filesystem::path& path, File& held);
 
 /// Renames a file. A file of the new name is replaced in one step. Windows: where others have it open, on NTFS alone, elsewhere an
 /// error.

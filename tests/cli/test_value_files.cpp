@@ -2,13 +2,17 @@
 // The files beside a .gltf and the meta.json of a SOG that hold their values.
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <future>
+#include <memory>
 
 #include "cli/expect.h"
 #include "cli/faulty.h"
+#include "core/folders.h"
 #include "ewa/splat_files.h"
+#include "platform/file.h"
 
 namespace {
 
@@ -167,6 +171,34 @@ TEST(ValueFiles, SeveralWritersAtOnce) {
             const size_t splats = ewa::load_splats(out).size();
             EXPECT_TRUE(splats >= 1000 && splats <= 2500 && splats % 500 == 0) << splats;
         }
+}
+
+/// Who replaces a file has it locked until its older values are gone.
+TEST(ValueFiles, AWriterWaitsForAnother) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    for (const std::string name : {"g.gltf", "meta.json", "lod-meta.json", "tileset.json"}) {
+        SCOPED_TRACE(name);
+        const std::string out = folder / ("out-" + name + "/" + name);
+        const Names convert{"convert", folder / "s.ply", out, "--quiet"};
+        expect_success(run_ewa(convert));
+        const auto before = ewa::platform::file_id(out);
+        auto lock = std::make_unique<ewa::core::FileLock>(out);
+        ewa::platform::File second;
+        if (ewa::platform::lock_path(out, second) != ewa::platform::Lock::taken)
+            GTEST_SKIP() << "no locks in the folder for temporary files";
+        auto writer = std::async(std::launch::async, [&] { return run_ewa(convert); });
+        EXPECT_EQ(writer.wait_for(std::chrono::milliseconds(400)), std::future_status::timeout);
+        EXPECT_EQ(ewa::platform::file_id(out), before);
+        // The lock is that of a file, not of its name.
+        fs::copy_file(out, out + "-new");
+        EXPECT_FALSE(ewa::platform::replace(out + "-new", out));
+        lock.reset();
+        expect_success(writer.get());
+        const size_t files = files_below(out.substr(0, out.rfind('/'))).size();
+        expect_success(run_ewa(convert));
+        EXPECT_EQ(files_below(out.substr(0, out.rfind('/'))).size(), files);
+    }
 }
 
 /// A .gltf of another program keeps its values, which others may use.

@@ -94,7 +94,11 @@ std::string PartFolders::add(const std::string& usual) {
 
 void PartFolders::replace(std::string_view text) {
     Paths before;
-    if (written_by_ewa(naming_)) before = kind_.named_by(naming_);
+    // As for values: a folder's name is free once another process has removed the folder.
+    std::error_code absent;
+    const bool replaces = fs::exists(naming_, absent);
+    const core::FileLock lock(naming_);
+    if (replaces && !lock.is_others() && written_by_ewa(naming_)) before = kind_.named_by(naming_);
     core::write_text_file(naming_, text);
     std::erase_if(before, [&](const fs::path& part) {
         const fs::path folder = part.parent_path();

@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "core/atomic_file.h"
+#include "core/folders.h"
 #include "core/text.h"
 
 namespace ewa::io {
@@ -111,8 +112,13 @@ void NewValues::replace(std::string_view text) {
     core::AtomicFile naming(naming_);
     naming.write(text);
     for (const auto& file : files_) file->commit();
+    // Who replaces the same file at the same time would remove the same values, and a name is free once they are gone: without a
+    // lock, the later one might remove new values of that name.
+    const bool replaces = !is_free(naming_);
+    const core::FileLock lock(naming_);
     const ValueFiles beside = beside_(naming_);
     naming.commit();
+    if (!replaces || lock.is_others()) return;
     std::error_code ignored;  // older values are of no use, and no harm
     for (const std::filesystem::path& file : beside.removed) std::filesystem::remove(file, ignored);
 }

@@ -19,8 +19,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr off_t kLockPlace = off_t(1) << 62;
+
 std::error_code reason() {
     return {errno, std::generic_category()};
+}
+
+FileId id_of(const struct stat& status) {
+    return {uint64_t(status.st_dev), uint64_t(status.st_ino)};
 }
 
 int flags_of(Open how) {
@@ -114,9 +120,27 @@ bool is_locked(const fs::path& path) {
     return file.is_open() && flock(int(file.handle()), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
 }
 
-Lock lock_folder(const fs::path& folder, File& held) {
-    held = File(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    return held.is_open() ? held.try_lock() : Lock::unknown;
+Lock lock_path(const fs::path& path, File& held) {
+    // A byte behind every end. Network file systems would keep others from reading a file that is locked whole, or lock none that is
+    // open for reading alone. Opening a named pipe would wait for a writer.
+    struct flock place {};
+    place.l_type = F_WRLCK;
+    place.l_whence = SEEK_SET;
+    place.l_start = kLockPlace;
+    place.l_len = 1;
+    Lock lock = Lock::locked;
+    held = File(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
+    if (!held.is_open()) {  // a folder, or a file that this user may not write
+        held = File(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+        lock = held.is_open() ? held.try_lock() : Lock::unknown;
+    } else if (fcntl(int(held.handle()), F_OFD_SETLK, &place) != 0) {
+        lock = errno == EAGAIN || errno == EACCES ? Lock::taken : Lock::unknown;
+    }
+    struct stat status {};
+    if (lock != Lock::locked || (fstat(int(held.handle()), &status) == 0 && file_id(path) == id_of(status)))
+        return lock;
+    held.close();
+    return Lock::taken;
 }
 
 std::error_code replace(const fs::path& from, const fs::path& to) {
@@ -135,7 +159,7 @@ void remove_now(const fs::path::value_type* path) noexcept {
 std::optional<FileId> file_id(const fs::path& path) {
     struct stat status {};
     if (stat(path.c_str(), &status) != 0) return std::nullopt;
-    return FileId{uint64_t(status.st_dev), uint64_t(status.st_ino)};
+    return id_of(status);
 }
 
 fs::file_time_type write_time(const fs::path& file, std::error_code& error) {

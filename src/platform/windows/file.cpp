@@ -196,16 +196,18 @@ bool is_locked(const fs::path& path) {
     return file.is_open() && !lock_now(handle_of(file.handle()), 0) && is_held();
 }
 
-// A mutex with the name of the folder: Windows locks no folders, and a file in it would keep others from renaming it.
-Lock lock_folder(const fs::path& folder, File& held) {
-    const std::optional<FileId> id = file_id(folder);
+// A mutex with the number of the file or folder: Windows locks no folders, and an open file keeps others from renaming its folder,
+// and from replacing it on some disks.
+Lock lock_path(const fs::path& path, File& held) {
+    const std::optional<FileId> id = file_id(path);
     if (!id) return Lock::unknown;
     const std::wstring name =
         L"Global\\ewa-folder-" + std::to_wstring(id->device) + L"-" + std::to_wstring(id->number);
     HANDLE mutex = CreateMutexW(nullptr, FALSE, name.c_str());
     if (!mutex) return GetLastError() == ERROR_ACCESS_DENIED ? Lock::taken : Lock::unknown;
-    const bool taken = GetLastError() == ERROR_ALREADY_EXISTS;
+    const bool exists = GetLastError() == ERROR_ALREADY_EXISTS;
     held = File(value_of(mutex));
+    const bool taken = exists || file_id(path) != id;
     if (taken) held.close();
     return taken ? Lock::taken : Lock::locked;
 }
