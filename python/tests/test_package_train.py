@@ -193,6 +193,9 @@ def test_the_cap_is_chosen_and_kept(still_life, tmp_path):
     trainer = ewa.Trainer(still_life, steps=12)
     first = len(trainer.splats())
     assert trainer.options["max_splats"] == first + 100 * 12
+    assert trainer.options["final_splats"] == 0  # adc ends with all
+    mcmc = ewa.Trainer(still_life, steps=200, strategy="mcmc").options
+    assert mcmc["final_splats"] == mcmc["max_splats"] * 2 // 3 > first
     trainer.step()
     trainer.save_checkpoint(tmp_path / "a.ewa")
     resumed = ewa.Trainer.resume(tmp_path / "a.ewa", still_life)
