@@ -106,7 +106,9 @@ SortRun::SortRun(std::shared_ptr<gpu::Device> device, uint32_t items, const pass
       executor_(*device_),
       items_(items),
       input_(items) {
-    const Sizes sizes = sizes_for(cache_.config(), {.splats = items, .width = 8, .height = 8});
+    passes::KernelConfig sorting = cache_.config();
+    sorting.sorted_lists = 0;
+    const Sizes sizes = sizes_for(sorting, {.splats = items, .width = 8, .height = 8});
     cut_ = sizes.depth_sort;
     for (uint32_t i = 0; i < items; ++i) input_[i] = core::pcg4d({i, 0x736f7274u, 0, 0})[0];
     source_ = gpu::Buffer(*device_, "input", sizes.splat_words);
@@ -151,16 +153,27 @@ namespace {
 struct Lists {
     std::vector<float> records;
     std::vector<uint32_t> tile_counts, order, prefix, totals;  // one per splat; totals: one per block
+    bool sorted_lists =
+        false;  // instances are emitted in the order of the splats; `order` is then the reference's
     std::vector<uint32_t> keys, indices, splats, tile_starts;  // one per instance; tile_starts: one per tile
     uint32_t scan_block = 1, tiles = 0, instances = 0;
 };
 
-/// A sort in several passes leaves the sorted keys. That in one pass leaves the keys as emitted.
+/// A sort in several passes leaves the sorted keys. That in one pass, and sorted lists, leave the keys as emitted.
 std::vector<uint32_t> sorted_keys(const FrameBuffers& frame, uint32_t instances) {
-    const bool emitted = frame.sizes.tile_sort.passes == 1;
+    const bool emitted = frame.sizes.sorted_lists || frame.sizes.tile_sort.passes == 1;
     std::vector<uint32_t> keys = frame.instance_keys[emitted ? 0 : 1].download<uint32_t>(instances);
     if (emitted) std::ranges::sort(keys);
     return keys;
+}
+
+std::vector<uint32_t> depth_order(const Lists& lists) {
+    std::vector<uint32_t> keys(lists.tile_counts.size());
+    for (size_t i = 0; i < keys.size(); ++i)
+        keys[i] =
+            lists.tile_counts[i] > 0 ? std::bit_cast<uint32_t>(lists.records[12 * i + 11]) : 0xffffffffu;
+    const auto order = reference::stable_order<uint32_t>(keys);
+    return {order.begin(), order.end()};
 }
 
 Lists download(FrameRun& run) {
@@ -171,7 +184,8 @@ Lists download(FrameRun& run) {
     Lists lists;
     lists.records = run.records();
     lists.tile_counts = frame.tile_counts.download<uint32_t>(n);
-    lists.order = frame.order[0].download<uint32_t>(n);
+    lists.sorted_lists = sizes.sorted_lists;
+    lists.order = sizes.sorted_lists ? depth_order(lists) : frame.order[0].download<uint32_t>(n);
     lists.prefix = frame.prefix.download<uint32_t>(n);
     lists.totals = frame.scan_totals.download<uint32_t>(size_t(sizes.scan_blocks) + 1);
     lists.instances = run.counts().instances;
@@ -189,20 +203,18 @@ Check wrong_entries(const char* what, uint64_t wrong) {
 }
 
 Check check_depth_order(const Lists& lists) {
-    std::vector<uint32_t> keys(lists.tile_counts.size());
-    for (size_t i = 0; i < keys.size(); ++i)
-        keys[i] =
-            lists.tile_counts[i] > 0 ? std::bit_cast<uint32_t>(lists.records[12 * i + 11]) : 0xffffffffu;
-    const auto expected = reference::stable_order<uint32_t>(keys);
+    const auto expected = depth_order(lists);
     uint64_t wrong = 0;
-    for (size_t i = 0; i < keys.size(); ++i) wrong += lists.order[i] != expected[i];
+    for (size_t i = 0; i < expected.size(); ++i) wrong += lists.order[i] != expected[i];
     return wrong_entries("depth order: wrong entries", wrong);
 }
 
 Check check_scan(const Lists& lists) {
     std::vector<uint32_t> counts(lists.order.size());
-    for (size_t rank = 0; rank < counts.size(); ++rank)
-        counts[rank] = lists.order[rank] < counts.size() ? lists.tile_counts[lists.order[rank]] : 0;
+    for (size_t rank = 0; rank < counts.size(); ++rank) {
+        const size_t splat = lists.sorted_lists ? rank : lists.order[rank];
+        counts[rank] = splat < counts.size() ? lists.tile_counts[splat] : 0;
+    }
     const auto expected = reference::exclusive_scan(counts);
     uint64_t wrong = expected.back() != lists.instances;
     for (size_t rank = 0; rank < counts.size(); ++rank)
@@ -210,8 +222,8 @@ Check check_scan(const Lists& lists) {
     return wrong_entries("instance offsets: wrong entries", wrong);
 }
 
-/// Tiles ascend; within a tile instances keep the order in which they were emitted, which is by depth; and
-/// every splat is there as often as it was counted; with gradients, no two instances share a place.
+/// Tiles ascend; within a tile instances are in depth order; every splat is there as often as it was counted; with gradients, no
+/// two instances share a place.
 Check check_tile_order(const Lists& lists) {
     const size_t n = lists.tile_counts.size();
     std::vector<uint32_t> rank(n), times(n);
@@ -282,7 +294,7 @@ constexpr double kAdamBound = 1e-3;      // in learning rates
 std::vector<Check> check_lists(FrameRun& run, const BenchScene& scene) {
     const Lists lists = download(run);
     std::vector<Check> checks = check_project(lists, run, scene);
-    checks.push_back(check_depth_order(lists));
+    if (!lists.sorted_lists) checks.push_back(check_depth_order(lists));
     checks.push_back(check_scan(lists));
     checks.push_back(check_tile_order(lists));
     checks.push_back(check_tile_starts(lists));

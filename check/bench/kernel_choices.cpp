@@ -62,6 +62,9 @@ void set_choice(passes::KernelConfig& config, const std::string& choice, const g
     } else if (name == "slots") {
         config.slots = one_of<uint32_t>(
             choice, value, {{"sorted", shared::SLOTS_SORTED}, {"emitted", shared::SLOTS_EMITTED}});
+    } else if (name == "order") {
+        const bool lists = one_of<bool>(choice, value, {{"splats", false}, {"lists", true}});
+        config.sorted_lists = lists ? passes::most_sorted_lists(limits) : 0;
     } else if (name == "counts") {
         config.live_counts = one_of<bool>(choice, value, {{"live", true}, {"capacity", false}});
     } else if (name == "few") {
@@ -76,7 +79,8 @@ void set_choice(passes::KernelConfig& config, const std::string& choice, const g
         config.tile_interleave = number_in(choice, value, 1024);
     } else {
         refuse(choice,
-               "one of tile, quads, broadcast, sort, slots, counts, few, scan, elements and interleave with "
+               "one of tile, quads, broadcast, sort, slots, order, counts, few, scan, elements and "
+               "interleave with "
                "a value");
     }
 }

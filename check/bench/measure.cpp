@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -140,7 +141,8 @@ void add_ceilings(CaseResult& result, const FrameRun& run, int runs) {
     set_ceiling(result, "blend", result.ceiling_blend);
     set_ceiling(result, "blend_backward", result.ceiling_blend);
 
-    const uint32_t tile_bits = sizes.tile_sort.passes * sizes.tile_sort.bits;
+    const uint32_t tile_bits = sizes.sorted_lists ? uint32_t(std::bit_width(sizes.tiles))
+                                                  : sizes.tile_sort.passes * sizes.tile_sort.bits;
     set_ceiling(result, "depth order", time_sort(run.model().splats, 32, runs));
     set_ceiling(result, "tile order", time_sort(result.instances, tile_bits, runs));
 }

@@ -93,6 +93,10 @@ EWA_UINT(QUAD_TILES, 4u);
 // A splat in a batch has its record, its word, and for each tile a pick and up to 12 sums (lib/tile.glsl, lib/tile_sums.glsl).
 EWA_UINT(QUAD_SPLAT_BYTES, 260u);
 
+// ---- Lists that are sorted one by one (sort_lists.comp) ----
+EWA_UINT(LIST_BLOCK_BITS, 11u);
+EWA_UINT(LIST_BLOCK, 2048u);  // 2^LIST_BLOCK_BITS instances are sorted in shared memory, 8 bytes each
+
 // ---- Image planes ----
 // Plane p of pixel (x, y) is float p * plane_floats + y * stride + x.
 struct ImageLayout {
@@ -119,6 +123,11 @@ EWA_UINT(PROJECT_RAYS_DEEP, 1u);     // a splat counts to MARCH_DEPTH_MIN, not t
 EWA_UINT(PROJECT_RAYS_BY_MEAN, 2u);  // the key is the depth of the mean
 // emit_instances.comp
 EWA_UINT(EMIT_FIRST_INSTANCES, 1u);  // also writes where each splat's instances begin
+EWA_UINT(EMIT_LISTS, 2u);            // in the order of the splats; also counts each list's instances
+// sort_lists.comp: what it writes for place k of the sorted lists
+EWA_UINT(LISTS_SPLATS, 0u);   // the splat
+EWA_UINT(LISTS_TRACKED, 1u);  // the splat; and for an instance its place
+EWA_UINT(LISTS_EMITTED, 2u);  // the instance's number
 // scan_blocks.comp
 EWA_UINT(SCAN_GATHERED, 1u);  // entry e is source[order[e]]
 EWA_UINT(SCAN_FLAGS, 2u);     // entry e is 1 where source[e] is not 0
@@ -406,6 +415,11 @@ struct EmitPush {
 struct TileStartsPush {
     uint tiles;
     uint capacity;
+};
+
+struct ListPush {
+    uint tiles;
+    uint capacity;  // of instances
 };
 
 struct BlendPush {

@@ -40,7 +40,7 @@ void add_bench_options(App& app, BenchOptions& options) {
     app.add_option("--kernels", options.kernels,
                    "Use other kernels than those for the device: tile=8x8, quads=N, "
                    "broadcast=shuffles|shared|uniform, sort=ranked|counted, slots=sorted|emitted, "
-                   "counts=live|capacity, few=N, scan=N, elements=N, interleave=N")
+                   "order=splats|lists, counts=live|capacity, few=N, scan=N, elements=N, interleave=N")
         ->type_name("NAME=VALUE,...");
     app.add_flag("--check", options.check,
                  "Compare the results with the CPU reference; exit with status 1 if one exceeds its bound");

@@ -38,6 +38,9 @@ struct KernelConfig {
     // The next two are of frames with FrameRequest::splatting. Others have sorted slots and lists of tiles.
     uint32_t slots = shared::SLOTS_SORTED;  // SPEC_SLOTS
     uint32_t quads = 0;                     // SPEC_QUADS
+    /// Most splats of a frame whose instances are put into lists of tiles, each of which is sorted in shared memory. 0: none. Then
+    /// all splats are sorted by depth, and all instances by tile.
+    uint32_t sorted_lists = 0;
     /// Modules that the build has made faster to compile. They change no byte. Tests compare them with whole ones.
     bool optimised_modules = true;
     /// Smaller alphas are skipped. Benchmarks change it to compare speed.
@@ -58,6 +61,14 @@ inline uint32_t most_quads(const gpu::Limits& limits) {
     if (limits.max_invocations < crew) return 0;
     const uint32_t room = limits.shared_bytes / shared::QUAD_SPLAT_BYTES;
     return std::min(crew, room / limits.subgroup_size * limits.subgroup_size);
+}
+
+constexpr uint32_t kListGroup = 128;  // invocations that sort a list
+
+/// For KernelConfig::sorted_lists: one list may have all splats of a frame. An invocation of sort_lists.comp then does 1.2 million
+/// turns of loops on a GPU, which takes less than a second, and 50,367 on a CPU, whose driver ends loops after 65,535.
+inline uint32_t most_sorted_lists(const gpu::Limits& limits) {
+    return limits.cpu ? 1u << 16 : 1u << 20;
 }
 
 /// Throws std::logic_error unless the subgroup size is a power of two up to 64.

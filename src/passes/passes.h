@@ -206,7 +206,36 @@ struct EmitInstances {
             return dealt_groups(config, push.splats, (push.tiles[1] + push.strip_rows - 1) / push.strip_rows);
         }
     };
-    gpu::BufferPart records, order, tile_counts, prefix, totals, counts, keys, splats, first_instances;
+    gpu::BufferPart records, order, tile_counts, prefix, totals, counts, keys, splats, first_instances, lists;
+};
+
+/// Where each tile's list begins: in place of how many instances it has, and in tile_starts. One workgroup.
+struct ScanLists {
+    static constexpr char shader[] = "scan_lists";
+    struct Work : ElementGroup<shared::ListPush> {
+        static Groups groups(const KernelConfig&, const Push&) { return {1, 1, 1}; }
+    };
+    gpu::BufferPart lists, tile_starts;
+};
+
+/// Puts instances into the lists of their tiles, with the depth keys of their splats.
+struct FillLists {
+    static constexpr char shader[] = "fill_lists";
+    using Work = PerElement<&shared::ListPush::capacity>;
+    gpu::BufferPart tiles, splats, depth_keys, counts, lists, keys, instances;
+};
+
+/// Sorts each tile's list by depth. A workgroup for each. Variant: SPEC_MODE (LISTS_*).
+struct SortLists {
+    static constexpr char shader[] = "sort_lists";
+    struct Work {
+        using Push = shared::ListPush;
+        static uint32_t group_size(const KernelConfig&) { return kListGroup; }
+        static Groups groups(const KernelConfig& config, const Push& push) {
+            return grid_of(config, uint64_t(push.tiles) + 1);
+        }
+    };
+    gpu::BufferPart tile_starts, keys, instances, splats, places;
 };
 
 /// Finds where each tile's instances begin in the sorted list.

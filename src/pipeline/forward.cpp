@@ -40,12 +40,13 @@ void record_depth_order(const passes::Recorder& on, uint32_t splats, const Frame
                  .name = "depth order"});
 }
 
+/// In depth order, or in the order of the splats if their lists are sorted later.
 void record_instances(const passes::Recorder& on, bool gradients, uint32_t splats, const FrameBuffers& frame,
-                      const gpu::Buffer& order, bool wraps) {
+                      bool wraps) {
     const Sizes& s = frame.sizes;
     record_scan(on,
                 {.source = frame.tile_counts,
-                 .order = &order,
+                 .order = s.sorted_lists ? nullptr : &frame.order[0],
                  .prefix = frame.prefix,
                  .totals = frame.scan_totals,
                  .counts = frame.counts},
@@ -55,21 +56,23 @@ void record_instances(const passes::Recorder& on, bool gradients, uint32_t splat
                  .name = "instance offsets",
                  .capacity = frame.instance_capacity});
     on.record(passes::EmitInstances{.records = frame.records,
-                                    .order = order,
+                                    .order = s.sorted_lists ? frame.tile_counts : frame.order[0],
                                     .tile_counts = frame.tile_counts,
                                     .prefix = frame.prefix,
                                     .totals = frame.scan_totals,
                                     .counts = frame.counts,
                                     .keys = frame.instance_keys[frame.tile_sort_start()],
                                     .splats = frame.emitted_splats(),
-                                    .first_instances = frame.first_instances},
+                                    .first_instances = frame.first_instances,
+                                    .lists = s.sorted_lists ? frame.lists : frame.first_instances},
               {.splats = splats,
                .capacity = frame.instance_capacity,
                .scan_block = s.scan_block,
                .strip_rows = s.strip_rows,
                .size = {s.width, s.height},
                .tiles = {s.tiles_x, s.tiles_y}},
-              {{shared::SPEC_MODE, gradients ? shared::EMIT_FIRST_INSTANCES : 0},
+              {{shared::SPEC_MODE,
+                (gradients ? shared::EMIT_FIRST_INSTANCES : 0) | (s.sorted_lists ? shared::EMIT_LISTS : 0)},
                {shared::SPEC_WRAP, wraps ? 1u : 0u},
                {shared::SPEC_QUADS, s.quads}});
 }
@@ -107,6 +110,35 @@ void record_tile_order(const passes::Recorder& on, bool gradients, const FrameBu
             {.tiles = s.tiles, .capacity = frame.instance_capacity});
 }
 
+/// Puts the instances into the tiles' lists and sorts each by depth. The result is where record_tile_order leaves it.
+void record_lists(const passes::Recorder& on, bool gradients, const FrameBuffers& frame) {
+    constexpr const char* kName = "tile order";
+    const shared::ListPush push{.tiles = frame.sizes.tiles, .capacity = frame.instance_capacity};
+    const bool emitted = frame.slots_emitted();
+    const gpu::Buffer &keys = frame.instance_keys[1],
+                      &instances = emitted ? frame.sorted_indices[1] : frame.instance_splats[1];
+    on.record(passes::ScanLists{frame.lists, frame.tile_starts}, push, {}, kName);
+    on.record(passes::FillLists{.tiles = frame.instance_keys[0],
+                                .splats = frame.emitted_splats(),
+                                .depth_keys = frame.depth_keys[0],
+                                .counts = frame.counts,
+                                .lists = frame.lists,
+                                .keys = keys,
+                                .instances = instances},
+              push, {}, kName);
+    // A binding that a mode does not use needs a buffer.
+    on.record(passes::SortLists{.tile_starts = frame.tile_starts,
+                                .keys = keys,
+                                .instances = instances,
+                                .splats = frame.emitted_splats(),
+                                .places = gradients && !emitted ? frame.sorted_indices[1] : frame.lists},
+              push,
+              {{shared::SPEC_MODE, emitted     ? shared::LISTS_EMITTED
+                                   : gradients ? shared::LISTS_TRACKED
+                                               : shared::LISTS_SPLATS}},
+              kName);
+}
+
 }  // namespace
 
 shared::BlendPush blend_push(const passes::KernelConfig& config, const FrameBuffers& frame,
@@ -122,9 +154,16 @@ shared::BlendPush blend_push(const passes::KernelConfig& config, const FrameBuff
 
 void record_tile_lists(const passes::Recorder& on, bool gradients, uint32_t splats, const FrameBuffers& frame,
                        bool wraps) {
-    record_depth_order(on, splats, frame);
-    record_instances(on, gradients, splats, frame, frame.order[0], wraps);
-    record_tile_order(on, gradients, frame);
+    const bool lists = frame.sizes.sorted_lists;
+    if (lists)
+        on.recording.fill(frame.lists, 0, 0, frame.sizes.lists);
+    else
+        record_depth_order(on, splats, frame);
+    record_instances(on, gradients, splats, frame, wraps);
+    if (lists)
+        record_lists(on, gradients, frame);
+    else
+        record_tile_order(on, gradients, frame);
 }
 
 gpu::BufferPart FramePasses::camera() const {

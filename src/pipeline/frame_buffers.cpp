@@ -72,23 +72,30 @@ uint64_t placed(uint64_t bytes) {
 std::vector<Allocation> overlaid(FrameBuffers& f, const Sizes& s) {
     const Texel floats = Texel::rgba32f, words = Texel::rgba32ui;
     const uint64_t splats = placed(s.splat_words), instances = placed(s.instance_words);
-    const uint64_t indices = s.slots > 0 ? s.instance_words : 0;
+    const uint64_t indices = s.slots > 0 && !s.sorted_lists ? s.instance_words : 0;
     const uint64_t sorted_splats = s.slot_order == shared::SLOTS_SORTED ? s.instance_words : 0;
-    return {// The depth sort, which ends in order[0].
-            {&f.depth_keys[0], "depth keys", s.splat_words, words, 0},
-            {&f.depth_keys[1], "depth keys", s.splat_words, words, splats},
-            {&f.order[1], "order", s.splat_words, words, 2 * splats},
-            // The tile sort, which ends in instance_splats[1] and sorted_indices[1].
-            {&f.instance_keys[0], "instance keys", s.instance_words, words, 0},
-            {&f.instance_keys[1], "instance keys", s.instance_words, words, instances},
-            {&f.instance_splats[0], "instance splats", sorted_splats, words, 2 * instances},
-            {&f.sorted_indices[0], "sorted indices", indices, words, 3 * instances},
-            // The loss. It is done with the moments when it blurs their derivatives.
-            {&f.moments, "moments", s.moments, floats, 0},
-            {&f.derivatives, "derivatives", s.derivatives, floats, placed(s.moments)},
-            {&f.blurred, "blurred", s.derivatives, floats, 0},
-            // The gradient of blending.
-            {&f.slots, "slots", s.slots, floats, 0}};
+    // Lists that are sorted one by one get the keys while they are filled.
+    const uint64_t keys_place = s.sorted_lists ? 2 * instances + placed(sorted_splats) : 0;
+    std::vector<Allocation> all{
+        // The depth sort, which ends in order[0].
+        {&f.depth_keys[0], "depth keys", s.splat_words, words, keys_place},
+        {&f.depth_keys[1], "depth keys", s.sorted_words, words, splats},
+        {&f.order[1], "order", s.sorted_words, words, 2 * splats},
+        // The tile sort or the lists' sorts, which end in instance_splats[1] and sorted_indices[1].
+        {&f.instance_keys[0], "instance keys", s.instance_words, words, 0},
+        {&f.instance_keys[1], "instance keys", s.instance_words, words, instances},
+        {&f.instance_splats[0], "instance splats", sorted_splats, words, 2 * instances},
+        {&f.sorted_indices[0], "sorted indices", indices, words, 3 * instances},
+        // The loss. It is done with the moments when it blurs their derivatives.
+        {&f.moments, "moments", s.moments, floats, 0},
+        {&f.derivatives, "derivatives", s.derivatives, floats, placed(s.moments)},
+        {&f.blurred, "blurred", s.derivatives, floats, 0},
+        // The gradient of blending.
+        {&f.slots, "slots", s.slots, floats, 0}};
+    // What holds nothing needs no room behind the others.
+    for (Allocation& each : all)
+        if (each.bytes == 0) each.place = 0;
+    return all;
 }
 
 /// Bytes of the memory that overlaid buffers share.
@@ -108,10 +115,11 @@ std::vector<Allocation> allocations(FrameBuffers& f, const Sizes& s) {
         {&f.overlay, "overlay", s.overlay, Texel::any},
         {&f.records, "records", s.records, floats},
         {&f.rays, "rays", s.rays, floats},
-        {&f.order[0], "order", s.splat_words, words},
+        {&f.order[0], "order", s.sorted_words, words},
         {&f.tile_counts, "tile counts", s.splat_words},
         {&f.prefix, "prefix", s.splat_words},
         {&f.scan_totals, "scan totals", s.scan_totals},
+        {&f.lists, "lists", s.lists},
         {&f.counters, "counters", s.counters},
         {&f.counter_prefix, "counter prefix", s.counters},
         {&f.digit_totals, "digit totals", s.digit_totals},
@@ -216,9 +224,12 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
     s.plane_floats = s.stride * request.height;
     s.scan_block = config.scan_turns * config.subgroup;
     s.scan_blocks = divide_up(std::max(request.splats, 1u), s.scan_block);
-    s.depth_sort = radix_cut(config, request.splats, 32);
-    // One more than there are tiles: the sentinel tile.
-    s.tile_sort = radix_cut(config, request.instances, uint32_t(std::bit_width(s.tiles)));
+    s.sorted_lists = config.sorted_lists > 0 && request.splats <= config.sorted_lists;
+    if (!s.sorted_lists) {
+        s.depth_sort = radix_cut(config, request.splats, 32);
+        // One more than there are tiles: the sentinel tile.
+        s.tile_sort = radix_cut(config, request.instances, uint32_t(std::bit_width(s.tiles)));
+    }
     s.strip_rows = std::min(s.tiles_y, (config.loop_limit - s.tiles_y) / (s.tiles_x + 2));
     s.image_planes = request.fifth_plane || request.loss.depth > 0 ? 5 : 4;
 
@@ -226,9 +237,12 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
     s.records = std::max<uint64_t>(request.splats, 1) * shared::RECORD_TEXELS * texel;
     s.rays = request.rays ? std::max<uint64_t>(request.splats, 1) * shared::RAY_TEXELS * texel : 0;
     s.splat_words = std::max<uint64_t>(request.splats, 1) * word;
+    s.sorted_words = s.sorted_lists ? 0 : s.splat_words;
     s.scan_totals = (uint64_t(s.scan_blocks) + 1) * word;
+    s.lists = s.sorted_lists ? (uint64_t(s.tiles) + 1) * word : 0;
     s.counters = std::max(counter_words(s.depth_sort), counter_words(s.tile_sort)) * word;
-    s.digit_totals = ((uint64_t(1) << std::max(s.depth_sort.bits, s.tile_sort.bits)) + 1) * word;
+    if (!s.sorted_lists)
+        s.digit_totals = ((uint64_t(1) << std::max(s.depth_sort.bits, s.tile_sort.bits)) + 1) * word;
     s.instance_words = std::max<uint64_t>(request.instances, 1) * word;
     s.tile_starts = (uint64_t(s.tiles) + 2) * word;
     s.planes = uint64_t(s.plane_floats) * s.image_planes * word;

@@ -43,6 +43,7 @@ struct Sizes {
     uint32_t tiles_x = 0, tiles_y = 0, tiles = 0;  // that have a list
     uint32_t stride = 0, plane_floats = 0;         // of an image plane
     uint32_t scan_block = 0, scan_blocks = 0;      // of the prefix sum over tile counts
+    bool sorted_lists = false;                     // in place of these sorts
     RadixCut depth_sort, tile_sort;
     uint32_t strip_rows = 0;  // tile rows of an emitting lane
     uint32_t image_planes = 0;
@@ -56,7 +57,8 @@ struct Sizes {
     uint32_t motion_blocks = 0;
 
     // Bytes.
-    uint64_t records = 0, splat_words = 0, scan_totals = 0, counters = 0, digit_totals = 0;
+    uint64_t records = 0, splat_words = 0, sorted_words = 0, lists = 0, scan_totals = 0, counters = 0,
+             digit_totals = 0;
     uint64_t instance_words = 0, tile_starts = 0, planes = 0, target = 0;
     uint64_t masked = 0, exposed = 0, moments = 0, derivatives = 0, image_gradient = 0, partial_sums = 0,
              appearance_sums = 0, motion_sums = 0, motion_reduced = 0, reduced = 0, slots = 0, rays = 0;
@@ -86,6 +88,8 @@ struct FrameBuffers {
     gpu::Buffer step_camera, update_values, noise_values;
     gpu::Buffer records, depth_keys[2], order[2], tile_counts, prefix, scan_totals, first_instances;
     gpu::Buffer counters, counter_prefix, digit_totals;
+    gpu::Buffer
+        lists;  // with sorted_lists: how long each tile's list is, then the place of its next instance
     gpu::Buffer instance_keys[2], instance_splats[2], sorted_indices[2], tile_starts;
     gpu::Buffer planes, target, exposed, masked, moments, derivatives, blurred, image_gradient, partials,
         appearance_sums, motion_sums, motion_reduced, reduced, slots, rays;
@@ -104,7 +108,9 @@ struct FrameBuffers {
 
     /// Which of each two buffers of keys, splats and indices the tile sort reads first. The sort ends in buffer 1. Buffer 0 is
     /// unused afterwards and may be overlaid.
-    uint32_t tile_sort_start() const { return sizes.tile_sort.passes % 2 == 0 ? 1 : 0; }
+    uint32_t tile_sort_start() const {
+        return !sizes.sorted_lists && sizes.tile_sort.passes % 2 == 0 ? 1 : 0;
+    }
     /// Whether the tile sort moves the emitted instances' numbers alone. Their splats stay in instance_splats[1].
     bool slots_emitted() const { return sizes.slot_order == shared::SLOTS_EMITTED; }
     const gpu::Buffer& emitted_splats() const {

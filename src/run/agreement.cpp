@@ -56,9 +56,9 @@ Json parsed(const std::vector<std::byte>& text) {
 uint64_t kernels_of(const gpu::Device& device) {
     const passes::KernelConfig config = passes::config_for(device.limits());
     core::Hash hash;
-    for (const uint32_t value :
-         {config.subgroup, config.tile_width, config.tile_height, config.broadcast,
-          uint32_t(config.ranked_sort), config.slots, config.quads, uint32_t(config.texel_buffers)})
+    for (const uint32_t value : {config.subgroup, config.tile_width, config.tile_height, config.broadcast,
+                                 uint32_t(config.ranked_sort), config.slots, config.quads,
+                                 config.sorted_lists, uint32_t(config.texel_buffers)})
         hash.add(value);
     return hash.value();
 }

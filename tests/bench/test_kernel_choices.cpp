@@ -37,6 +37,9 @@ TEST(BenchKernels, ReplaceWhatTheDeviceGets) {
     const passes::KernelConfig quads = bench::config_with("tile=8x8,quads=96,slots=emitted", limits);
     EXPECT_EQ(quads.quads, 96u);
     EXPECT_EQ(quads.slots, shared::SLOTS_EMITTED);
+    EXPECT_EQ(own.sorted_lists, 0u);
+    EXPECT_EQ(bench::config_with("order=lists", limits).sorted_lists, passes::most_sorted_lists(limits));
+    EXPECT_EQ(bench::config_with("order=splats", limits).sorted_lists, 0u);
 }
 
 TEST(BenchKernels, NamesWhatItCannotUse) {
@@ -58,7 +61,7 @@ TEST(BenchKernels, NamesWhatItCannotUse) {
         EXPECT_EQ(text.find('\n'), std::string::npos);
     }
     for (const char* wrong : {"tile=axb", "tile=0x8", "tile=64x8", "scan", "scan=0", "scan=1025",
-                              "elements=2048", "broadcast=", "sort=fast", "slots=any"}) {
+                              "elements=2048", "broadcast=", "sort=fast", "slots=any", "order=any"}) {
         const std::string text = message(std::string("interleave=2,") + wrong);
         EXPECT_TRUE(text.starts_with("--kernels: " + std::string(wrong) + ": '")) << wrong << ": " << text;
         EXPECT_NE(text.find("' is not "), std::string::npos) << text;

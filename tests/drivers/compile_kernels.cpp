@@ -177,12 +177,18 @@ void compile_other_lists(Compiler& compiler, const gpu::Limits& limits) {
                                       {SPEC_KERNEL, kFootprints},
                                       {SPEC_MODE, {packed | UPDATE_STATISTICS, packed | UPDATE_REGULARISED}},
                                       {SPEC_SLOTS, {SLOTS_EMITTED}}});
+    compiler.compile<passes::ScanLists>();
+    compiler.compile<passes::FillLists>();
+    compiler.compile<passes::SortLists>({{SPEC_MODE, {LISTS_SPLATS, LISTS_TRACKED, LISTS_EMITTED}}});
+    compiler.compile<passes::EmitInstances>({{SPEC_MODE, {EMIT_LISTS, EMIT_LISTS | EMIT_FIRST_INSTANCES}}});
     if (batch == 0) return;
     compiler.compile<passes::Project>(
         {{SPEC_SH_DEGREE, {3}}, {SPEC_KERNEL, kFootprints}, {SPEC_MODE, {0}}, {SPEC_QUADS, {batch}}});
     compiler.compile<passes::BandTiles>({{SPEC_QUADS, {batch}}});
     compiler.compile<passes::ReceiveRecords>({{SPEC_QUADS, {batch}}});
-    compiler.compile<passes::EmitInstances>({{SPEC_MODE, {0, EMIT_FIRST_INSTANCES}}, {SPEC_QUADS, {batch}}});
+    compiler.compile<passes::EmitInstances>(
+        {{SPEC_MODE, {0, EMIT_FIRST_INSTANCES, EMIT_LISTS, EMIT_LISTS | EMIT_FIRST_INSTANCES}},
+         {SPEC_QUADS, {batch}}});
 }
 
 void compile_points(Compiler& compiler) {

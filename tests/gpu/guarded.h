@@ -87,6 +87,7 @@ class GuardedFrame {
         make(frame.scan_totals, "scan totals", s.scan_totals);
         make(frame.first_instances, "first instances", request.gradients ? s.splat_words : 16);
         make(frame.counters, "counters", s.counters);
+        make(frame.lists, "lists", s.lists);
         make(frame.counter_prefix, "counter prefix", s.counters);
         make(frame.digit_totals, "digit totals", s.digit_totals);
         for (auto* pair : {&frame.instance_keys, &frame.instance_splats})

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <numeric>
+#include <random>
+#include <utility>
+#include <vector>
 
 #include "gpu/guarded.h"
 #include "gpu/reference_inputs.h"
@@ -42,7 +45,8 @@ Emitted run_emit(const Scene& scene, const reference::Rendered& cpu, const std::
     r.run([&](gpu::Recording& recording) {
         r.cache
             .get<passes::EmitInstances>({{shared::SPEC_MODE, with_first ? shared::EMIT_FIRST_INSTANCES : 0}})
-            .record(recording, {records, ranks, tiles, prefixes, bases, device_counts, keys, values, first},
+            .record(recording,
+                    {records, ranks, tiles, prefixes, bases, device_counts, keys, values, first, first},
                     {splats,
                      capacity,
                      block,
@@ -137,6 +141,30 @@ TEST(EmitEdges, NeverWritesPastAPromiseThatWasTooSmall) {
     for (const uint32_t first : out.first) EXPECT_EQ(first, kPoison);  // asked for with gradients only
 }
 
+/// A driver may round the footprint of project and of this pass differently: here it may be empty.
+TEST(EmitEdges, PadsThePromiseToASplatThatReachesNoTile) {
+    Scene scene = random_scene(1402, 200, SplatKind::ordinary, 160, 120);
+    for (size_t i = 0; i < 200; i += 5) scene.gaussians.opacity_logits[i] = -20;
+    const auto cpu =
+        reference::render(scene.gaussians, scene.camera, scene.options, reference_tiles(rig().config()));
+    std::vector<uint32_t> counts;
+    for (size_t i = 0; i < 200; ++i) {
+        const auto tiles = covered_tiles(cpu.projected[i], cpu.instances.grid);
+        EXPECT_TRUE(i % 5 != 0 || tiles.empty());
+        counts.push_back(i % 5 == 0 ? 3 : uint32_t(tiles.size()));
+    }
+    const uint32_t capacity = std::accumulate(counts.begin(), counts.end(), 0u);
+    const Emitted out = run_emit(scene, cpu, counts, false, capacity, 2);
+    uint32_t padded = 0;
+    for (uint32_t at = 0; at < capacity; ++at) {
+        ASSERT_LT(out.splats[at], 200u) << at;
+        if (out.splats[at] % 5 != 0) continue;
+        EXPECT_EQ(out.keys[at], cpu.instances.grid.count()) << at;
+        ++padded;
+    }
+    EXPECT_EQ(padded, 3u * 40);
+}
+
 TEST(EmitEdges, WritesNothingWhereNotAllFit) {
     const Scene scene = random_scene(1401, 200, SplatKind::ordinary, 160, 120);
     const auto cpu =
@@ -183,6 +211,95 @@ TEST_P(Starts, AreTheLowerBounds) {
 INSTANTIATE_TEST_SUITE_P(Sizes, Starts,
                          testing::Values(std::pair{1u, 0u}, std::pair{1u, 1u}, std::pair{3u, 10000u},
                                          std::pair{300u, 7u}, std::pair{5000u, 20000u}));
+
+class ListStarts : public testing::TestWithParam<uint32_t> {};
+
+TEST_P(ListStarts, AreTheSumsOfTheLengthsBefore) {
+    const uint32_t tiles = GetParam();
+    Random random(tiles);
+    std::vector<uint32_t> expected(tiles + 1);
+    for (uint32_t& length : expected) length = uint32_t(random.bits() % 1000);
+    Guarded lists("lists", expected), starts("tile starts", (tiles + 2) * 4);
+    Rig& r = rig();
+    r.run([&](gpu::Recording& recording) {
+        r.cache.get<passes::ScanLists>().record(recording, {lists, starts}, {.tiles = tiles, .capacity = 0});
+    });
+    const uint32_t last = expected.back();
+    std::exclusive_scan(expected.begin(), expected.end(), expected.begin(), 0u);
+    EXPECT_EQ(lists.read<uint32_t>(), expected);
+    expected.push_back(expected.back() + last);
+    EXPECT_EQ(starts.read<uint32_t>(), expected);
+    expect_intact({&lists, &starts});
+}
+
+INSTANTIATE_TEST_SUITE_P(Tiles, ListStarts, testing::Values(1u, 7u, 8u, 1022u, 1023u, 1024u, 5000u));
+
+/// Lists of these lengths, in any order, with few different keys or many.
+void expect_sorted_lists(const std::vector<uint32_t>& lengths, uint32_t different) {
+    const uint32_t count = std::accumulate(lengths.begin(), lengths.end(), 0u);
+    Random random(count + different);
+    std::vector<uint32_t> starts{0}, keys, instances(count), splats(count);
+    for (const uint32_t length : lengths) starts.push_back(starts.back() + length);
+    std::iota(instances.begin(), instances.end(), 0u);
+    std::shuffle(instances.begin(), instances.end(), std::mt19937(count));
+    for (uint32_t i = 0; i < count; ++i) {
+        keys.push_back(uint32_t(random.bits() % different) * (0xffffffffu / different));
+        splats[i] = i ^ 0xa5000000u;
+    }
+    std::vector<uint32_t> expected(count), order(count);
+    std::iota(order.begin(), order.end(), 0u);
+    for (size_t tile = 0; tile < lengths.size(); ++tile)
+        std::sort(order.begin() + starts[tile], order.begin() + starts[tile + 1],
+                  [&](uint32_t a, uint32_t b) {
+                      return std::pair(keys[a], instances[a]) < std::pair(keys[b], instances[b]);
+                  });
+    for (uint32_t at = 0; at < count; ++at) expected[at] = instances[order[at]];
+    Rig& r = rig();
+    for (const uint32_t mode : {shared::LISTS_SPLATS, shared::LISTS_TRACKED, shared::LISTS_EMITTED}) {
+        SCOPED_TRACE(mode);
+        Guarded device_starts("tile starts", starts), device_keys("keys", keys),
+            sorted("instances", instances), device_splats("splats", splats),
+            places("places", std::vector<uint32_t>(count, kPoison));
+        r.run([&](gpu::Recording& recording) {
+            r.cache.get<passes::SortLists>({{shared::SPEC_MODE, mode}})
+                .record(recording, {device_starts, device_keys, sorted, device_splats, places},
+                        {.tiles = uint32_t(lengths.size()) - 1, .capacity = count});
+        });
+        const auto actual = sorted.read<uint32_t>(), placed = places.read<uint32_t>();
+        for (uint32_t at = 0; at < count; ++at) {
+            ASSERT_EQ(actual[at], mode == shared::LISTS_EMITTED ? expected[at] : splats[expected[at]]) << at;
+            ASSERT_EQ(placed[expected[at]], mode == shared::LISTS_TRACKED ? at : kPoison) << at;
+        }
+        expect_intact({&device_keys, &sorted, &places});
+    }
+}
+
+TEST(SortedLists, AreInOrderWhateverTheirLength) {
+    constexpr uint32_t kBlock = shared::LIST_BLOCK;
+    const std::vector<uint32_t> lengths{0,
+                                        1,
+                                        2,
+                                        3,
+                                        0,
+                                        5,
+                                        8,
+                                        31,
+                                        64,
+                                        65,
+                                        127,
+                                        kBlock - 1,
+                                        kBlock,
+                                        kBlock + 1,
+                                        2 * kBlock,
+                                        100,
+                                        3 * kBlock + 17,
+                                        1,
+                                        0};
+    for (const uint32_t different : {1u, 5u, 0xffffffffu}) expect_sorted_lists(lengths, different);
+    expect_sorted_lists({9 * kBlock + 1}, 1000);
+    expect_sorted_lists({std::min(passes::most_sorted_lists(device()->limits()), 1u << 16)}, 1u << 20);
+    expect_sorted_lists({0, 1}, 1);
+}
 
 }  // namespace
 }  // namespace ewa::test

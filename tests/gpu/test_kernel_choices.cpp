@@ -169,6 +169,67 @@ INSTANTIATE_TEST_SUITE_P(Kinds, KernelChoices,
                          testing::Values(SplatKind::ordinary, SplatKind::mixed, SplatKind::needles),
                          [](const auto& kind) { return std::string(name_of(kind.param)); });
 
+/// As `config`, but that each tile's list is sorted by itself.
+passes::KernelConfig with_lists(passes::KernelConfig config = rig().config()) {
+    config.sorted_lists = passes::most_sorted_lists(device()->limits());
+    return config;
+}
+
+/// The same splats in each list, and the same image and gradient.
+void expect_same(const FrameBytes& actual, const FrameBytes& expected) {
+    EXPECT_TRUE(actual.same_image(expected));
+    EXPECT_TRUE(actual.same_gradient(expected));
+    EXPECT_EQ(actual.splats, expected.splats);
+}
+
+TEST_P(KernelChoices, ListsThatAreSortedOneByOneChangeNoByte) {
+    const Scene scene = random_scene(4101, 900, GetParam(), 131, 93, 2);
+    const passes::KernelConfig own = rig().config();
+    expect_same(frame_with(with_lists(), scene), frame_with(own, scene));
+    // Also with buffers that share memory, and after an overflow.
+    const FrameBytes enough = repeated_frame_with(own, scene, 40000);
+    for (const uint32_t capacity : {1u, 40000u})
+        expect_same(repeated_frame_with(with_lists(), scene, capacity), enough);
+    passes::KernelConfig emitted = own;
+    emitted.slots = shared::SLOTS_EMITTED;
+    const FrameBytes lists = frame_with(with_lists(emitted), scene), expected = frame_with(own, scene);
+    EXPECT_TRUE(lists.same_image(expected) && lists.same_gradient(expected));
+    for (size_t k = 0; k < lists.splats.size(); ++k)
+        ASSERT_EQ(lists.splats[lists.indices[k]], expected.splats[k]) << "instance " << k;
+    EXPECT_TRUE(repeated_frame_with(with_lists(emitted), scene, 40000).same_gradient(enough));
+    expect_same(frame_with(with_lists(), scene, {.render = {}}), frame_with(own, scene, {.render = {}}));
+}
+
+TEST(SortedListsOfAFrame, ServeSpheresRaysAndLongLists) {
+    Scene scene = random_scene(4300, 300, SplatKind::ordinary, 61, 47, 1);
+    for (const Integrator integrator : {Integrator::march, Integrator::ray, Integrator::fast_ray}) {
+        scene.options.integrator = integrator;
+        expect_same(frame_with(with_lists(), scene, {.render = {}}),
+                    frame_with(rig().config(), scene, {.render = {}}));
+    }
+    scene.options.integrator = Integrator::splat;
+    scene.options.points = true;
+    expect_same(frame_with(with_lists(), scene, {.render = {}}),
+                frame_with(rig().config(), scene, {.render = {}}));
+    Scene dense = random_scene(3800, 10000, SplatKind::ordinary, 8, 8);
+    for (float& logit : dense.gaussians.opacity_logits) logit = -5;
+    for (float& scale : dense.gaussians.log_scales) scale = 1;
+    expect_same(frame_with(with_lists(), dense), frame_with(rig().config(), dense));
+}
+
+/// More splats than the lists may have are sorted as ever.
+TEST(SortedListsOfAFrame, HaveALimit) {
+    passes::KernelConfig config = with_lists();
+    const pipeline::FrameRequest most{.splats = config.sorted_lists, .width = 8, .height = 8, .instances = 1};
+    pipeline::FrameRequest more = most;
+    ++more.splats;
+    EXPECT_TRUE(sizes_for(config, most).sorted_lists);
+    EXPECT_EQ(sizes_for(config, most).counters, 0u);
+    EXPECT_FALSE(sizes_for(config, more).sorted_lists);
+    EXPECT_LT(sizes_for(config, most).total(), sizes_for(config, more).total());
+    EXPECT_FALSE(sizes_for(rig().config(), most).sorted_lists);
+}
+
 passes::KernelConfig with_quads(uint32_t slots = shared::SLOTS_SORTED) {
     passes::KernelConfig config = rig().config();
     config.quads = passes::most_quads(device()->limits());
@@ -216,6 +277,7 @@ TEST_P(QuadsBlendPass, GradientsAreThoseOfTilesAndOfTheReference) {
     const FrameBytes tiles = frame_with(rig().config(), scene), quads = frame_with(with_quads(), scene);
     EXPECT_TRUE(quads.same_image(tiles));
     expect_close(quads, tiles);
+    expect_same(frame_with(with_lists(with_quads()), scene), quads);
     const FrameBytes emitted = frame_with(with_quads(shared::SLOTS_EMITTED), scene);
     EXPECT_TRUE(emitted.same_image(tiles) && emitted.same_gradient(quads));
     const auto expected =

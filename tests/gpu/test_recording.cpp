@@ -458,7 +458,8 @@ std::optional<std::string> unordered_pair(const std::vector<Command>& commands) 
 struct FrameParts {
     pipeline::Model model;
     pipeline::FrameBuffers frame;
-    pipeline::FrameBuffers wide;  // its tiles are sorted in several passes
+    pipeline::FrameBuffers wide;    // its tiles are sorted in several passes
+    pipeline::FrameBuffers listed;  // each tile's list is sorted by itself
     gpu::Buffer camera, photo;
     pipeline::Appearances exposures, ppisp, grids;
     pipeline::Motions motions;
@@ -482,7 +483,7 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     Rig& r = rig();
     const Scene scene = random_scene(3000, 50, SplatKind::ordinary, 61, 47, 2);
     FrameParts& parts = frame_parts->get([] { return FrameParts(); });
-    auto& [model, frame, wide, camera, photo, exposures, ppisp, grids, motions, sky, views] = parts;
+    auto& [model, frame, wide, listed, camera, photo, exposures, ppisp, grids, motions, sky, views] = parts;
     exposures = pipeline::Appearances(*device(), AppearanceModel::affine, {0, 0, 0}, 1);
     const pipeline::AppearanceUse exposure{&exposures, 1, 0, 0.01f, 1};
     ppisp = pipeline::Appearances(*device(), AppearanceModel::ppisp, {0, 1, 0}, 2);
@@ -591,6 +592,25 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     gpu::Recording gradient = r.recording();
     record_gradient(parts, gradient, request, inputs, true);
     out.push_back(gradient.commands());
+
+    passes::KernelConfig with_lists = r.config();
+    with_lists.sorted_lists = 50;
+    listed.reserve(*device(), with_lists,
+                   {.splats = 50,
+                    .width = 61,
+                    .height = 47,
+                    .instances = 4096,
+                    .gradients = true,
+                    .fifth_plane = true,
+                    .overlaid = true,
+                    .loss = {}});
+    gpu::Recording lists = r.recording();
+    const auto plan_of_lists = plan_for(request);
+    const pipeline::FramePasses of_lists{{lists, r.cache}, plan_of_lists, listed, inputs};
+    const auto in_lists = of_lists.forward(model);
+    of_lists.loss(photo);
+    of_lists.backward(model, in_lists, {});
+    out.push_back(lists.commands());
 
     // All terms of a loss.
     request.alpha = request.depths = true;

@@ -236,9 +236,10 @@ TEST(SizesFor, StripsKeepLoopsUnderTheLimit) {
 }
 
 TEST(SizesFor, TotalIsWhatAFrameHolds) {
-    const auto config = passes::config_for(device()->limits());
+    auto config = passes::config_for(device()->limits());
     for (const bool gradients : {false, true})
         for (const bool depth : {false, true}) {
+            config.sorted_lists = gradients == depth ? 12345 : 0;
             const FrameRequest request{12345, 61, 47, 54321, gradients, depth, gradients};
             pipeline::FrameBuffers frame;
             frame.reserve(*device(), config, request);
@@ -252,6 +253,7 @@ TEST(SizesFor, TotalIsWhatAFrameHolds) {
                                          &frame.prefix,
                                          &frame.scan_totals,
                                          &frame.first_instances,
+                                         &frame.lists,
                                          &frame.counters,
                                          &frame.counter_prefix,
                                          &frame.digit_totals,
@@ -311,6 +313,37 @@ TEST(SizesFor, OverlaidBuffersShareMemory) {
                     EXPECT_EQ(x->overlaps(*y), x == y) << x->name() << y->name();
         EXPECT_TRUE(frame.slots.overlaps(frame.moments) && frame.blurred.overlaps(frame.moments));
     }
+}
+
+/// Fewer instances than splats: what the lists do not need has no place beyond the others.
+TEST(SizesFor, OverlaidBuffersOfSortedListsShareMemory) {
+    auto config = passes::config_for(device()->limits());
+    config.sorted_lists = 5000;
+    for (const uint32_t slots : {shared::SLOTS_SORTED, shared::SLOTS_EMITTED})
+        for (const uint32_t instances : {1u, 300u, 9000u}) {
+            config.slots = slots;
+            pipeline::FrameBuffers frame;
+            frame.reserve(*device(), config,
+                          {.splats = 4000,
+                           .width = 8,
+                           .height = 8,
+                           .instances = instances,
+                           .gradients = true,
+                           .overlaid = true,
+                           .splatting = true,
+                           .loss = {.ssim = 0}});
+            EXPECT_EQ(frame.sizes.slot_order, slots);
+            const std::vector<const gpu::Buffer*> group{&frame.depth_keys[0],     &frame.instance_keys[0],
+                                                        &frame.instance_keys[1],  &frame.instance_splats[1],
+                                                        &frame.sorted_indices[1], &frame.tile_counts};
+            for (const gpu::Buffer* x : group)
+                for (const gpu::Buffer* y : group)
+                    EXPECT_EQ(x->overlaps(*y), x == y) << x->name() << y->name();
+            if (slots == shared::SLOTS_SORTED) {
+                EXPECT_FALSE(frame.instance_splats[0].overlaps(frame.depth_keys[0]) ||
+                             frame.instance_splats[0].overlaps(frame.instance_keys[1]));
+            }
+        }
 }
 
 /// The tile sort ends in the second buffers, however many passes it takes.
