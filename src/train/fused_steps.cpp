@@ -160,8 +160,8 @@ void FusedSteps::finish_oldest() {
         }
         return;
     }
-    check_rays_finished(counts);
     in_flight_.pop_front();
+    check_rays_finished(counts);
     parts_.log.add({.loss = loss_of(parts_.plan.loss, counts),
                     .psnr = -10 * std::log10(double(counts.squared) / weight),
                     .skipped_nonfinite = counts.skipped_nonfinite,
