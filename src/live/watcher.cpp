@@ -91,7 +91,8 @@ class Client::Http final : public httplib::ClientImpl {
         set_tcp_nodelay(true);
         set_decompress(false);
         // The server refuses names because of browsers. This client is none.
-        httplib::Headers headers{{"Host", "localhost"}};
+        // Newer versions of cpp-httplib ask for compressed answers by themselves, even where they leave these packed.
+        httplib::Headers headers{{"Host", "localhost"}, {"Accept-Encoding", "identity"}};
         if (!token.empty()) headers.emplace("Authorization", "Bearer " + token);
         set_default_headers(std::move(headers));
     }
