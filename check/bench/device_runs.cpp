@@ -153,8 +153,7 @@ namespace {
 struct Lists {
     std::vector<float> records;
     std::vector<uint32_t> tile_counts, order, prefix, totals;  // one per splat; totals: one per block
-    bool sorted_lists =
-        false;  // instances are emitted in the order of the splats; `order` is then the reference's
+    bool sorted_lists = false;  // emitted in the order of the splats; `order` is then the reference's
     std::vector<uint32_t> keys, indices, splats, tile_starts;  // one per instance; tile_starts: one per tile
     uint32_t scan_block = 1, tiles = 0, instances = 0;
 };

@@ -43,7 +43,7 @@ struct Sizes {
     uint32_t tiles_x = 0, tiles_y = 0, tiles = 0;  // that have a list
     uint32_t stride = 0, plane_floats = 0;         // of an image plane
     uint32_t scan_block = 0, scan_blocks = 0;      // of the prefix sum over tile counts
-    bool sorted_lists = false;                     // in place of these sorts
+    bool sorted_lists = false;                     // in place of the next two
     RadixCut depth_sort, tile_sort;
     uint32_t strip_rows = 0;  // tile rows of an emitting lane
     uint32_t image_planes = 0;
@@ -88,8 +88,7 @@ struct FrameBuffers {
     gpu::Buffer step_camera, update_values, noise_values;
     gpu::Buffer records, depth_keys[2], order[2], tile_counts, prefix, scan_totals, first_instances;
     gpu::Buffer counters, counter_prefix, digit_totals;
-    gpu::Buffer
-        lists;  // with sorted_lists: how long each tile's list is, then the place of its next instance
+    gpu::Buffer lists;  // with sorted_lists: each tile's length, then the place of its next instance
     gpu::Buffer instance_keys[2], instance_splats[2], sorted_indices[2], tile_starts;
     gpu::Buffer planes, target, exposed, masked, moments, derivatives, blurred, image_gradient, partials,
         appearance_sums, motion_sums, motion_reduced, reduced, slots, rays;
